@@ -59,7 +59,7 @@ def make_async_bus(link: Link, family: Family, *, report: Notify | None = None) 
 
 def exclude_echo(bus: BaseBus) -> None:
     """Tell the bus that its line has no echo, as the echo test of `motorbus.open` finds out."""
-    bus.engine.echo.excluded()
+    bus.engine.echo.exclude()
 
 
 def is_idle(bus: BaseBus) -> bool:
@@ -115,7 +115,7 @@ class Tries:
     def __init__(self, family: Family, rate: int, *, echo: bool = True) -> None:
         self.engine = Engine(family, rate=rate)
         if not echo:
-            self.engine.echo.excluded()
+            self.engine.echo.exclude()
 
     def answered(self, exchange: Exchange[Any], data: list[Data]) -> tuple[Any, str]:
         """The answer, None where it failed, and the kind of failure of what is missing: `silence`, `checksum` …"""

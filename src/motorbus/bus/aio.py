@@ -17,8 +17,7 @@ from motorbus.bus.jobs import RequestJob
 from motorbus.bus.prepared import Prepared
 from motorbus.bus.tasks import Notify, TaskTree
 from motorbus.core.operation import UNLIKE, Exchange, Runnable
-from motorbus.errors import LinkError, MotorbusError
-from motorbus.link.memory import MemoryLink
+from motorbus.errors import LinkError
 
 T = TypeVar("T")
 
@@ -189,7 +188,7 @@ async def run_on(procedures: Mapping[AsyncBus, Runnable[Any]]) -> dict[AsyncBus,
     news = asyncio.Event()
     parts = [_Part(bus, procedure, None, news) for bus, procedure in procedures.items()]
     await _run_parts(parts)
-    return {part.bus: part.outcome() for part in parts}
+    return {part.bus: part.tree.outcome() for part in parts}
 
 
 class _Part(Generic[T]):
@@ -212,13 +211,6 @@ class _Part(Generic[T]):
         if get_ident() != self._thread:  # the stop thread: wake the loop
             self._loop.call_soon_threadsafe(self.news.set)
 
-    def outcome(self) -> Any:
-        """The value or the MotorbusError; raises any other error."""
-        error = self.tree.error()
-        if error is None or isinstance(error, MotorbusError):
-            return self.tree.root.value if error is None else error
-        raise error
-
     def advance(self) -> bool:
         """Step the tree and send, until it waits for something; True when it has ended."""
         with self.bus.turn:
@@ -233,13 +225,6 @@ class _Part(Generic[T]):
     def receive(self, until: float) -> None:
         with self.bus.turn:
             self.bus.receive(until)
-
-    def next_event(self) -> float:
-        """When something happens on this simulated bus, in s of its clock."""
-        link = self.bus.link
-        due = link.due() if isinstance(link, MemoryLink) else inf
-        moment = min(self.tree.next_moment(), self.bus.engine.next_deadline(), due)
-        return max(moment, link.now())
 
     def cancel(self, error: BaseException) -> None:
         if not self.tree.root.finished:
@@ -260,9 +245,7 @@ async def _run_parts(parts: Sequence[_Part[Any]]) -> None:
                 if not going:
                     return
                 for part in parts:
-                    error = part.tree.root.error
-                    if part.tree.cancellation is None and not isinstance(error, MotorbusError | None):
-                        part.tree.cancellation = error
+                    if (error := part.tree.foreign_error()) is not None:
                         raise error
                 await _wait(going)
             except GeneratorExit:
@@ -279,8 +262,9 @@ async def _run_parts(parts: Sequence[_Part[Any]]) -> None:
 async def _wait(parts: Sequence[_Part[Any]]) -> None:
     """Wait until one of these can go on."""
     if all(part.bus.link.virtual for part in parts):
-        moment = min(part.next_event() for part in parts)
-        for part in sorted(parts, key=_Part.next_event):
+        events = {part: part.bus.next_event(part.tree.next_moment()) for part in parts}
+        moment = min(events.values())
+        for part in sorted(parts, key=events.__getitem__):
             part.receive(moment if moment < inf else part.bus.now() + IDLE)
         await asyncio.sleep(0)
         return

@@ -93,7 +93,7 @@ class Attempt:
             due.node in self.excluded and (due.key, due.length) == kind for due in dues
         )
 
-    def hear_noise(self, fault: str, data: bytes) -> None:
+    def take_noise(self, fault: str, data: bytes) -> None:
         """Noise before the first reply does no harm; behind a reply that reply may be shifted by a byte."""
         if self.complete:
             self.surplus = True
@@ -125,9 +125,9 @@ class Attempt:
         dues = self.request.replies
         if dues is ANY:
             return Answer(tuple(self.replies.values()), (), at)
-        heard = [i for i, due in enumerate(dues) if i in self.replies and due.node not in self.excluded]
-        missing = tuple(due.node for i, due in enumerate(dues) if i not in heard)
-        return Answer(tuple(self.replies[i] for i in heard), missing, at)
+        taken = [i for i, due in enumerate(dues) if i in self.replies and due.node not in self.excluded]
+        missing = tuple(due.node for i, due in enumerate(dues) if i not in taken)
+        return Answer(tuple(self.replies[i] for i in taken), missing, at)
 
     def received(self) -> bytes:
         """All that came, for the error message."""

@@ -141,9 +141,14 @@ class BaseBus:
         except LinkError as error:
             self._lost(error)
 
+    def next_event(self, moment: float) -> float:
+        """When something happens on a simulated bus in virtual time, at `moment` (s) at the latest."""
+        due = self.link.due() if isinstance(self.link, MemoryLink) else inf
+        return max(min(moment, self.engine.next_deadline(), due), self.now())
+
     def _lost(self, error: LinkError) -> None:
-        if isinstance(error, LinkLost) and self._reconnects:
-            error = failures.reconnecting(error)
+        if isinstance(error, LinkLost):
+            error = failures.reconnecting(error) if self._reconnects else failures.final(error)
         self.engine.lost(error)
 
     def _set_rate(self, job: RateJob) -> None:

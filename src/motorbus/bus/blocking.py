@@ -222,31 +222,29 @@ def exchange_on(
     batches: Mapping[Bus, Sequence[Exchange[Any]]], tolerated: tuple[type[Exception], ...] = ()
 ) -> dict[BaseBus, Any]:
     """Carry out a batch on each bus at the same time: the values of each, or its MotorbusError."""
+    found: dict[BaseBus, Any] = {}
+    pending: list[Pending] = []
     with interrupts():
-        found: dict[BaseBus, Any] = {}
-        pending: list[Pending] = []
-        for bus, requests in batches.items():
-            try:
-                pending.append(bus.start(requests))
-            except MotorbusError as error:
-                found[bus] = error
-        unsent = {
-            one.bus: carry_out_batch(one.requests, tolerated) for one in pending if one.prepared is None
-        }
         try:
-            found |= run_on(unsent) if unsent else {}
+            for bus, requests in batches.items():
+                try:
+                    pending.append(bus.start(requests))
+                except MotorbusError as error:
+                    found[bus] = error
+            unsent = [one for one in pending if one.prepared is None]
+            if unsent:
+                found |= run_on({one.bus: carry_out_batch(one.requests, tolerated) for one in unsent})
         finally:
             for one in pending:
                 if one.prepared is not None:
-                    found[one.bus] = _value_or_error(one, tolerated)
-        return found
-
-
-def _value_or_error(pending: Pending, tolerated: tuple[type[Exception], ...]) -> Any:
-    try:
-        return pending.result(tolerated)
-    except MotorbusError as error:
-        return error
+                    try:
+                        found[one.bus] = one.result(tolerated)
+                    except Exception as error:
+                        found[one.bus] = error
+    for value in found.values():
+        if isinstance(value, Exception) and not isinstance(value, MotorbusError):
+            raise value
+    return found
 
 
 def _check_requests(requests: Sequence[Any]) -> None:
@@ -275,7 +273,7 @@ def run_on(procedures: Mapping[Bus, Runnable[Any]]) -> dict[BaseBus, Any]:
     with interrupts():
         parts = [_Part(bus, procedure, None) for bus, procedure in procedures.items()]
         _run_parts(parts)
-        return {part.bus: part.outcome() for part in parts}
+        return {part.bus: part.tree.outcome() for part in parts}
 
 
 class _Part(Generic[T]):
@@ -296,13 +294,6 @@ class _Part(Generic[T]):
         if self.sleeps:
             with self.bus.settled:
                 self.bus.settled.notify_all()
-
-    def outcome(self) -> Any:
-        """The value or the MotorbusError; raises any other error."""
-        error = self.tree.error()
-        if error is None or isinstance(error, MotorbusError):
-            return self.tree.root.value if error is None else error
-        raise error
 
     def take_turn(self) -> None:
         if not self.holds_turn:
@@ -367,7 +358,9 @@ def _run_parts(parts: Sequence[_Part[Any]]) -> None:
                 going = [part for part in parts if not part.advance()]
                 if not going:
                     return
-                _raise_interrupt(parts)
+                for part in parts:
+                    if (error := part.tree.foreign_error()) is not None:
+                        raise error
                 signals.waiting = all(part.bus.engine.idle for part in going)
                 signals.raise_pending()
                 _wait(going)
@@ -386,34 +379,17 @@ def _run_parts(parts: Sequence[_Part[Any]]) -> None:
                 part.bus.turn.release()
 
 
-def _raise_interrupt(parts: Sequence[_Part[Any]]) -> None:
-    """Raise what ended one tree and is no MotorbusError, so that the others end, too."""
-    for part in parts:
-        error = part.tree.root.error
-        if part.tree.cancellation is None and not isinstance(error, MotorbusError | None):
-            part.tree.cancellation = error
-            raise error
-
-
 def _wait(parts: Sequence[_Part[Any]]) -> None:
     """Wait until one of these can go on."""
     if len(parts) == 1:
         parts[0].wait()
     elif all(part.bus.link.virtual for part in parts):
-        moment = min(map(_next_event, parts))
-        for part in sorted(parts, key=_next_event):
-            part.bus.receive(moment)
+        events = {part: part.bus.next_event(part.tree.next_moment()) for part in parts}
+        for part in sorted(parts, key=events.__getitem__):
+            part.bus.receive(min(events.values()))
             part.news = True
     else:
         _poll(parts)
-
-
-def _next_event(part: _Part[Any]) -> float:
-    """When something happens on this simulated bus, in s of its clock."""
-    link = part.bus.link
-    due = link.due() if hasattr(link, "due") else inf
-    moment = min(part.tree.next_moment(), part.bus.engine.next_deadline(), due)
-    return max(moment, link.now())
 
 
 def _poll(parts: Sequence[_Part[Any]]) -> None:

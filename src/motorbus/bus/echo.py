@@ -1,12 +1,11 @@
-"""Some adapters hand back every byte that is sent. An echo can be a perfect forgery of an answer.
+"""Echo: some adapters return every byte that is sent.
 
-The echo of a FEETECH READ is a valid status frame, the echo of a PING is a PING reply with an alarm. So echo is
-found out by an exchange whose answer differs in length (at open, and again by every probe after a doubt), and from
-then on exactly the bytes sent are taken off what comes in.
+The echo of a FEETECH READ is a valid status frame, and the echo of a PING is a PING reply with an alarm. So a request
+whose reply differs in length from its echo shows whether there is one: at open, and in every probe. From then on
+exactly the bytes sent are removed from what comes in.
 
-Where a reply carries nothing of its own, the beginning of the echo is a whole acknowledgement: the stepper controller
-answers "stop" by the first six bytes of "stop". Until an echo is excluded such a reply waits for what an echo would
-still bring. An echo of which no more ever comes than that cannot be told from the reply by anybody.
+The stepper controller acknowledges some commands by their first six bytes. Until an echo is excluded, such a reply
+waits for the rest of an echo. An echo of these six bytes alone cannot be distinguished from the reply.
 """
 
 from __future__ import annotations
@@ -18,10 +17,10 @@ from motorbus.core.operation import Exchange
 
 
 class Echo:
-    """`present` is None while unknown. `strip` takes off what is expected back.
+    """`present` is None while unknown. `strip` removes the expected echo.
 
-    `recent` is what was sent lately, `test` the exchange that shows, when the bus is opened, whether there is an echo.
-    `broken` is set when an echo was due and did not come, or not all of it, `returned` when one came that was not due.
+    `recent` is what was sent last, `test` the request that shows at open whether there is an echo. `broken` is set when
+    an expected echo did not come as a whole, `returned` when an unexpected one came.
     """
 
     def __init__(self) -> None:
@@ -35,7 +34,7 @@ class Echo:
         self._since = b""
 
     def sent(self, data: bytes, testing: bool) -> None:
-        """These bytes leave; `testing` when their answer can tell whether they come back."""
+        """These bytes are sent; `testing`: the reply to them shows whether there is an echo."""
         self.recent.append(data)
         self._since = b""
         if self.present or (self.present is None and testing):
@@ -45,22 +44,18 @@ class Echo:
     def _last(self) -> bytes:
         return self.recent[-1] if self.recent else b""
 
-    def left(self) -> None:
-        """What was sent last has gone the straight way, and nothing has come since."""
-        self._since = b""
-
     @property
     def is_out(self) -> bool:
-        """It is known that nothing comes back, and nothing is held back to find out."""
+        """There is no echo, and no byte is held back."""
         return self.present is False and not (self._expected or self._matched)
 
     @property
     def disproved(self) -> bool:
-        """Since something was sent last bytes came that it does not begin with: no echo came first."""
+        """The bytes that came since the last request are not its beginning: there is no echo."""
         return bool(self._since) and not self._last.startswith(self._since)
 
     def may_be(self, reply: bytes) -> bool:
-        """Nobody knows yet whether there is an echo, and what was sent last begins with this reply."""
+        """Echo is unknown, and the last request begins with this reply."""
         return self.present is None and self._last.startswith(reply)
 
     def strip(self, data: bytes) -> bytes:
@@ -94,23 +89,23 @@ class Echo:
         return data
 
     def give_up(self) -> bytes:
-        """Nothing more is coming: the bytes held back as the beginning of an echo, which is broken if one was due."""
+        """Return the bytes held back as the beginning of an echo; nothing more is coming."""
         if self._matched and self.present:
             self.broken = True
             self.present = None
         held, self._matched, self._expected = self._matched, b"", b""
         return held
 
-    def excluded(self) -> None:
-        """An answer came that no echo preceded."""
+    def exclude(self) -> None:
+        """A reply came that no echo preceded."""
         self.present = False
 
-    def doubted(self) -> None:
-        """The bytes sent came back where none were expected: find out again."""
+    def suspect(self) -> None:
+        """A request came back unexpectedly: echo is unknown again."""
         self.present = None
 
-    def doubt_anew(self) -> None:
-        """The adapter was gone and is there again: nothing that was sent before comes back, and nobody knows more."""
+    def reset(self) -> None:
+        """The adapter was replugged: echo is unknown, and nothing sent before comes back."""
         self.present = None
         self.broken = self.returned = False
         self._expected = self._matched = self._since = b""

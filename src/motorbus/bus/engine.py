@@ -58,7 +58,7 @@ UNCOUNTED: Final = 64
 class Engine:
     """The engine of one bus. `rate` in bit/s and `latency` in s describe the link; `paced`: frames take their time.
 
-    `time` (s) is the latest moment that the engine was told.
+    `time` (s) is the moment of the last call.
     """
 
     def __init__(
@@ -349,7 +349,7 @@ class Engine:
             self.trace.put(TraceRecord(now, "tx", request.request))
 
     def adopt(self, attempt: Attempt) -> None:
-        """A prepared request that was written goes on as any other attempt."""
+        """A prepared request that was written is an attempt like any other from now on."""
         request = attempt.request
         self.note_last()
         self.sync.mark_sent(request, attempt.sent_at)
@@ -428,7 +428,7 @@ class Engine:
         if self.echo.returned and not any(
             attempt.echo_excluded or attempt.fault == "echo" for attempt in self.in_flight.values()
         ):
-            self.echo.doubted()
+            self.echo.suspect()
             self._fail_all_by_echo()
 
     def _take_all(self, events: Sequence[Event], now: float) -> None:
@@ -456,7 +456,7 @@ class Engine:
         if attempt is None:
             self._take_unexpected(None, reply, now)
         elif reply.data in self.echo.recent and not attempt.echo_excluded:
-            self.echo.doubted()
+            self.echo.suspect()
             attempt.fault = "echo"
             self.statistics.other["echo"] += 1
         elif attempt.complete:
@@ -499,7 +499,7 @@ class Engine:
             return
         for lane, attempt in self.in_flight.items():
             if noise.lane in (None, lane):
-                attempt.hear_noise(noise.fault, noise.data)
+                attempt.take_noise(noise.fault, noise.data)
         self.sync.mark_recent(now, self.quiet_time, noise.lane)
 
     def _echo_broke(self, now: float) -> None:
@@ -553,7 +553,7 @@ class Engine:
                 self._fail(lane, attempt, now)
 
     def _accept(self, lane: int, attempt: Attempt, now: float) -> None:
-        """The replies are accepted: their nodes are in sync, and the job goes on."""
+        """The replies are accepted: their nodes are in sync, and their job continues."""
         request, dues = attempt.request, attempt.request.replies
         answer = attempt.answer(min(now, attempt.deadline))
         if attempt.is_probe and not (request.read is not None and request.read(answer)):
@@ -566,20 +566,20 @@ class Engine:
             if lane == EVERY_LANE:  # a node that obeyed an order to all must be stopped, too
                 self.positions.add([reply.lane for reply in answer.replies])
         else:
-            heard = self._heard(attempt, dues, now)
+            answered = self._answered(attempt, dues, now)
             if request.rank is not Rank.STOP:  # a request that the stop cut short may still be answered
-                for due in heard:
+                for due in answered:
                     self.sync.confirm(due, probe=attempt.is_probe)
-            self.statistics.answered(heard, now - attempt.sent_at)
-            self.positions.heard([due.node for due in heard], request, answer, self.rate)
+            self.statistics.answered(answered, now - attempt.sent_at)
+            self.positions.answered([due.node for due in answered], request, answer, self.rate)
         self._continue(attempt)
 
-    def _heard(self, attempt: Attempt, dues: Sequence[Due], now: float) -> list[Due]:
+    def _answered(self, attempt: Attempt, dues: Sequence[Due], now: float) -> list[Due]:
         """The nodes whose reply counts; the others are out of sync."""
-        heard = []
+        answered = []
         for index, due in enumerate(dues):
             if index in attempt.replies and due.node not in attempt.excluded:
-                heard.append(due)
+                answered.append(due)
                 continue
             node = self.sync.of(due.node)
             if index not in attempt.replies:
@@ -587,7 +587,7 @@ class Engine:
             else:
                 node.quiet_until = now + self.quiet_time
             self.statistics.of(due.node).errors[attempt.failure()] += 1
-        return heard
+        return answered
 
     def _fail(self, lane: int, attempt: Attempt, now: float) -> None:
         attempt.fault = attempt.failure()
@@ -612,7 +612,7 @@ class Engine:
         if self.echo.present is not None or attempt.noise:
             return
         if attempt.is_probe or attempt.request is self.echo.test or self.echo.disproved:
-            self.echo.excluded()
+            self.echo.exclude()
 
     # -- prepared requests -------------------------------------------------------------------------------------
 
@@ -764,7 +764,7 @@ class Engine:
         """The port is open again: nothing known of the devices counts, but which there were."""
         self.latency = latency
         self.receiver = self.family.receiver()
-        self.echo.doubt_anew()
+        self.echo.reset()
         self.sync.mark_all(now + self.quiet_time)
         self.positions.forget()
         self.gone = None

@@ -56,6 +56,7 @@ FAULTS: Final[dict[str, tuple[type[MotorbusError], str, str]]] = {
     ),
 }
 """Faults of an attempt: the error, its likely cause and what to do."""
+REOPEN: Final = ", then open the bus again"
 RECONNECTING: Final = (
     "the next request looks for the port again; requests of before the loss are not repeated"
 )
@@ -143,8 +144,14 @@ def outlived(request: Exchange[Any] | None = None) -> LinkLost:
 def reconnecting(error: LinkLost) -> LinkLost:
     """The same error, saying that the port is looked for again."""
     if RECONNECTING not in error.advice:
-        advice = error.advice.removesuffix(", then open the bus anew") or "check the cable"
-        error.advice = f"{advice}; {RECONNECTING}"
+        error.advice = f"{error.advice or 'check the cable'}; {RECONNECTING}"
+    return error
+
+
+def final(error: LinkLost) -> LinkLost:
+    """The same error, saying that this bus does not look for the port."""
+    if REOPEN not in error.advice:
+        error.advice = f"{error.advice or 'check the cable'}{REOPEN}"
     return error
 
 

@@ -33,7 +33,7 @@ class Context(Protocol):
 
 
 def carry_out(engine: Context, request: Exchange[Any]) -> Policy:
-    """The reply to this request. Raises MotorbusError when it fails for good."""
+    """The reply to this request. Raises MotorbusError when the last attempt fails."""
     tries, sent, fault = 0, False, ""
     while True:
         excluded: tuple[int, ...] = ()

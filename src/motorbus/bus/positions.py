@@ -62,7 +62,7 @@ class LastPositions(Mapping[int, Reading]):
             return prepared.source.exchange, prepared.answer(), prepared.orders
         return self._readings[node]
 
-    def heard(self, nodes: Iterable[int], exchange: Exchange[Any], answer: Answer, rate: int) -> None:
+    def answered(self, nodes: Iterable[int], exchange: Exchange[Any], answer: Answer, rate: int) -> None:
         """These nodes answered this request."""
         self.rate = rate
         self.add(nodes)
@@ -146,16 +146,16 @@ class LastPositions(Mapping[int, Reading]):
         """This request was answered and not refused: nodes that it stops have accepted a stop."""
         if exchange.effect not in GATED or exchange.replies is ANY:
             return
-        heard = [due for due in exchange.replies if self._acknowledged.get(due.node) is answer]
+        answered = [due for due in exchange.replies if self._acknowledged.get(due.node) is answer]
         if exchange.rank is Rank.STOP:
-            for due in heard:
+            for due in answered:
                 replies = self._stop_replies.setdefault(due.node, set())
                 replies.add(due)
                 if len(replies) >= self._stop_reply_count(due.node):
                     self.accepted(due.node)
         elif exchange.later is None:
             resting = {goal.node for goal in exchange.goals if rests(goal)}
-            for due in heard:
+            for due in answered:
                 if due.node in resting:
                     self.accepted(due.node)
 

@@ -1,6 +1,6 @@
-"""How well each node is doing: counted by turns, read by anyone, reset by nobody.
+"""Counters per node: requests, replies, retries, errors, latencies.
 
-`sent = ok + errors + what is in flight` balances per node; a retry counts as sent again.
+`sent = ok + errors + what is in flight` balances per node; a retry counts as sent again. Counters are never reset.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ BUCKETS = 32
 
 @dataclass(slots=True)
 class NodeStatistics:
-    """One node's ledger. `latency[k]` counts replies that took at least 2**(k-1) and less than 2**k µs."""
+    """Counters of one node. `latency[k]` counts replies that took at least 2**(k-1) and less than 2**k µs."""
 
     sent: int = 0
     ok: int = 0
@@ -27,9 +27,9 @@ class NodeStatistics:
 
 
 class Statistics:
-    """The ledgers of all nodes, and what belongs to none: noise, foreign frames, notices, echoes.
+    """The counters of all nodes; `other` counts what belongs to none: noise, foreign frames, notices, echoes.
 
-    `settle` is called before anybody looks at `nodes`: it counts what was put off.
+    `settle` is called before `nodes` is read; it adds the replies of prepared requests.
     """
 
     def __init__(self, settle: Callable[[], None] | None = None) -> None:
@@ -39,23 +39,23 @@ class Statistics:
 
     @property
     def nodes(self) -> dict[int, NodeStatistics]:
-        """The ledgers by node."""
+        """The counters by node."""
         if self._settle is not None:
             self._settle()
         return self._nodes
 
     def add(self, nodes: Sequence[int], times: Sequence[int]) -> None:
-        """Several exchanges with all of these, each answered; `times` are they by their buckets."""
+        """Add answered requests of these nodes; `times` counts them by latency bucket."""
         count, hit = sum(times), [(bucket, number) for bucket, number in enumerate(times) if number]
         for node in nodes:
-            ledger = self.of(node)
-            ledger.sent += count
-            ledger.ok += count
+            counters = self.of(node)
+            counters.sent += count
+            counters.ok += count
             for bucket, number in hit:
-                ledger.latency[bucket] += number
+                counters.latency[bucket] += number
 
     def asked(self, dues: tuple[Due, ...] | Any_) -> None:
-        """A request has left that calls for these replies; one that calls for none, or for any, belongs to no node."""
+        """Count a request that expects these replies; one without reply, or for any reply, belongs to no node."""
         if dues is ANY or not dues:
             self.other["sent"] += 1
             return
@@ -63,25 +63,25 @@ class Statistics:
             self.of(due.node).sent += 1
 
     def retried(self, dues: tuple[Due, ...] | Any_) -> None:
-        """A request that calls for these replies is sent again."""
+        """Count a request that is sent again."""
         for due in () if dues is ANY else dues:
             self.of(due.node).retries += 1
 
     def answered(self, dues: Iterable[Due], seconds: float) -> None:
-        """A good reply of each of these, all of them after this time."""
+        """Count a valid reply of each of these, after so many seconds."""
         bucket = bucket_of(seconds)
         nodes = self._nodes
         for due in dues:
-            ledger = nodes[due.node]
-            ledger.ok += 1
-            ledger.latency[bucket] += 1
+            counters = nodes[due.node]
+            counters.ok += 1
+            counters.latency[bucket] += 1
 
     def of(self, node: int) -> NodeStatistics:
-        """This node's ledger, a new one at its first exchange."""
-        ledger = self._nodes.get(node)
-        if ledger is None:
-            ledger = self._nodes[node] = NodeStatistics()
-        return ledger
+        """The counters of this node."""
+        counters = self._nodes.get(node)
+        if counters is None:
+            counters = self._nodes[node] = NodeStatistics()
+        return counters
 
 
 def bucket_of(seconds: float) -> int:

@@ -21,7 +21,7 @@ from typing import Final, Protocol
 
 from motorbus.bus.engine import Engine
 from motorbus.bus.stop_rounds import run_rounds
-from motorbus.bus.stop_socket import PATIENCE, StopOutcome, asked_by, client_name, listening
+from motorbus.bus.stop_socket import STOP_TIMEOUT, StopOutcome, asked_by, client_name, listening
 from motorbus.bus.turn import Turn
 from motorbus.core.operation import Rank
 from motorbus.errors import LinkError, LinkLost
@@ -84,7 +84,7 @@ class EmergencyStop:
                         advice="end processes that hold many threads; nothing was sent",
                     ) from error
                 self._thread = thread
-                self._ready.wait(PATIENCE)
+                self._ready.wait(STOP_TIMEOUT)
                 atexit.register(self.close)
 
     def move(self, path: Path | None) -> None:
@@ -117,7 +117,7 @@ class EmergencyStop:
         request = StopRequest()
         self._requests.append(request)
         self.trigger()
-        request.done.wait(PATIENCE)
+        request.done.wait(STOP_TIMEOUT)
         silent = tuple(sorted(self.bus.engine.positions.nodes))
         return request.outcome or StopOutcome((), silent, 0, "nothing: the stop thread did not answer")
 
@@ -136,7 +136,7 @@ class EmergencyStop:
             engine.positions.sent(request)
             with contextlib.suppress(LinkError):
                 bus.link.write(request.request)
-        if bus.turn.acquire(Rank.STOP, PATIENCE):
+        if bus.turn.acquire(Rank.STOP, STOP_TIMEOUT):
             return self._stop_with_turn(by)
         engine.stopped()
         silent = tuple(sorted(engine.positions.nodes))
@@ -168,7 +168,7 @@ class EmergencyStop:
             while not ended:
                 try:
                     ended = self._wait(ready, ear, listener)
-                except Exception:  # the next request must be heard
+                except Exception:  # the thread must serve the next request
                     ended = self._closed
             for key in list(ready.get_map().values()):
                 if key.fileobj not in (ear, listener) and isinstance(key.fileobj, socket.socket):
@@ -211,11 +211,11 @@ class EmergencyStop:
     def close(self) -> None:
         """End the thread when a stop that has begun is over. Nothing else is sent."""
         self._closed = True
-        if self._starting.acquire(timeout=PATIENCE):
+        if self._starting.acquire(timeout=STOP_TIMEOUT):
             self._starting.release()
         atexit.unregister(self.close)
         self._wake(END)
         if self._thread is not None:
-            self._thread.join(PATIENCE)
+            self._thread.join(STOP_TIMEOUT)
         for end in self._pair or ():
             end.close()

@@ -79,7 +79,7 @@ def _frames_for(
 
 
 def _run_round(wire: Wire, frames: Iterable[Exchange[Answer]], acknowledged: list[int]) -> None:
-    """Send each request once, and those that become possible when a node has told its position."""
+    """Send each request once, and those that become possible when a node has reported its position."""
     engine, begun = wire.engine, wire.now()
     jobs: list[RequestJob] = []
     limit = _submit(wire, frames, jobs, begun + ROUND_TIME)

@@ -18,7 +18,7 @@ from motorbus.link.lock import program_name
 
 COMMAND_SHOWN: Final = 60
 """Characters of a command line in the message of the stop that it asked for."""
-PATIENCE: Final = 5.0
+STOP_TIMEOUT: Final = 5.0
 """s that a caller waits for the outcome of a stop."""
 
 
@@ -63,7 +63,7 @@ def listening(path: Path | None, now: Callable[[], Path | None]) -> Iterator[soc
         try:
             path.unlink(missing_ok=True)
             listener.bind(str(path))
-            path.chmod(0o600)  # before `listen`, until which nobody can connect
+            path.chmod(0o600)  # before `listen`, which lets clients connect
             listener.listen(4)
         except OSError:  # a full disk must not take the stop away from this process
             yield None
@@ -74,7 +74,7 @@ def listening(path: Path | None, now: Callable[[], Path | None]) -> Iterator[soc
             (now() or path).unlink(missing_ok=True)
 
 
-def request_estop(path: Path, timeout: float = PATIENCE) -> StopOutcome:
+def request_estop(path: Path, timeout: float = STOP_TIMEOUT) -> StopOutcome:
     """Ask the process that serves this socket for an emergency stop, and wait for its outcome.
 
     Raises PortNotFound when no process serves it, LinkError when the process does not answer in time.

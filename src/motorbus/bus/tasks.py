@@ -25,7 +25,7 @@ from motorbus.core.operation import (
     Together,
     outcome,
 )
-from motorbus.errors import RequestError
+from motorbus.errors import MotorbusError, RequestError
 
 T = TypeVar("T")
 Notify = Callable[[object], None]
@@ -132,6 +132,21 @@ class TaskTree(Generic[T]):
             raise error
         value: T = self.root.value
         return value
+
+    def outcome(self) -> Any:
+        """What the procedure returned, or its MotorbusError; raises any other error."""
+        error = self.error()
+        if error is None or isinstance(error, MotorbusError):
+            return self.root.value if error is None else error
+        raise error
+
+    def foreign_error(self) -> BaseException | None:
+        """The error that ended the procedure, once, if it is no MotorbusError: it ends other procedures, too."""
+        error = self.root.error
+        if self.cancellation is not None or isinstance(error, MotorbusError | None):
+            return None
+        self.cancellation = error
+        return error
 
     def error(self) -> BaseException | None:
         """What `result` raises. Errors of the clean-up are notes of the cancellation."""

@@ -1,7 +1,7 @@
-"""What went over the wire, for whoever wants to watch, at no cost to the bus.
+"""Records of what went over the wire, for subscribers.
 
-A subscriber has a bounded queue: when it does not keep up, the oldest records are dropped and counted, so a slow
-reader can never hold up a motor. One that fails, as it writes to a disk that is full, gets no more records.
+A subscription is a bounded queue: when it is full, the oldest record is dropped and counted, so a slow reader never
+holds up the bus. A subscription whose `put` raises gets no more records.
 """
 
 from __future__ import annotations
@@ -60,15 +60,15 @@ class Feed(Generic[R]):
         return subscription
 
     def add(self, subscription: Subscription[R]) -> None:
-        """Hand every record to this one too; a subclass may deal with each at once instead of keeping it."""
+        """Send every record to this subscription; a subclass may process each at once."""
         self.subscriptions = (*self.subscriptions, subscription)
 
     def unsubscribe(self, subscription: Subscription[R]) -> None:
-        """No more records for this one."""
+        """Send this subscription no more records."""
         self.subscriptions = tuple(s for s in self.subscriptions if s is not subscription)
 
     def put(self, record: R) -> None:
-        """Hand one record to every subscription; one that fails has failed for itself, and not for the bus."""
+        """Hand one record to every subscription, and remove one that raises."""
         for subscription in self.subscriptions:
             try:
                 subscription.put(record)

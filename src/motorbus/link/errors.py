@@ -104,7 +104,7 @@ def lost(port: str, reason: object) -> LinkLost:
     return LinkLost(
         f"{port} is gone: {text}",
         cause="the adapter was unplugged or lost its power, or the server of the port ended",
-        advice="check the other end, then open the bus anew",  # the bus removes the second half where it reconnects
+        advice="check the other end",
     )
 
 

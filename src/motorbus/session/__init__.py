@@ -12,7 +12,8 @@ is opened by its file, see `robot`.
 from __future__ import annotations
 
 from motorbus.session.address import Address, parse_address, parse_ids
-from motorbus.session.buses import LOG, open, open_async, simulate
+from motorbus.session.buses import open, open_async, simulate
+from motorbus.session.echo import LOG
 from motorbus.session.keeping import journal_of, unfinished
 from motorbus.session.opening import Opening, lock_name, prepare
 

@@ -1,4 +1,4 @@
-"""An open bus for asyncio, which is imported when somebody asks for one: most programs block and need none of it."""
+"""An open bus for asyncio, in a module of its own: a blocking program does not import asyncio."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from typing import Self
 
 from motorbus.bus.aio import AsyncBus
 from motorbus.errors import MotorbusError
-from motorbus.session.buses import LOG, echo_test, tell_echo
+from motorbus.session.echo import LOG, echo_test, tell_echo
 
 
 class OpenAsyncBus(AsyncBus):
-    """An async bus that finds out about echo when its `async with` is entered."""
+    """An async bus that tests for echo when its `async with` is entered."""
 
     async def __aenter__(self) -> Self:
         test = echo_test(self)
@@ -19,7 +19,7 @@ class OpenAsyncBus(AsyncBus):
                 await self.run(test)
             except MotorbusError as silence:
                 LOG.debug("echo test: %s", silence.summary)
-            except BaseException:  # cancelled: whoever is not let in is not shown out either
+            except BaseException:  # cancelled: `__aexit__` is not called
                 await self.close()
                 raise
             tell_echo(self)

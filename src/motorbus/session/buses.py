@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from motorbus import families
 from motorbus.bus.base import BaseBus
 from motorbus.bus.blocking import Bus
-from motorbus.core.operation import Exchange
 from motorbus.errors import MotorbusError
 from motorbus.journal import BusJournal
 from motorbus.link.base import Link
@@ -22,6 +21,7 @@ from motorbus.link.reconnect import Reconnecting, reconnecting
 from motorbus.link.url import open_link
 from motorbus.motion.safety import Gate
 from motorbus.session.address import parse_address, parse_ids
+from motorbus.session.echo import LOG, echo_test, tell_echo
 from motorbus.session.keeping import kept_for
 from motorbus.session.opening import Opening, prepare, simulated
 from motorbus.simulation.named import Faults, Simulation, find
@@ -29,7 +29,6 @@ from motorbus.simulation.named import Faults, Simulation, find
 if TYPE_CHECKING:
     from motorbus.bus.aio import AsyncBus
 
-LOG = logging.getLogger("motorbus.session")
 logging.getLogger("motorbus").addHandler(
     logging.NullHandler()
 )  # silent until somebody asks; here, for nothing below logs
@@ -145,25 +144,9 @@ def _warn(bus: BaseBus, journal: BusJournal | None) -> None:
         bus.warnings += (warning,)
 
 
-def echo_test(bus: BaseBus) -> Exchange[Any] | None:
-    """What shows an echo, to be sent next; None where the family needs none. The warnings of the bus are told."""
-    for warning in bus.warnings:
-        LOG.warning("%s: %s", bus.link.name, warning)
-    test = bus.family.echo_test()
-    if test is not None:
-        bus.expect_echo(test)
-    return test
-
-
 def _settled(bus: BaseBus, run: Callable[[], object]) -> None:
     try:
         run()
     except MotorbusError as silence:
         LOG.debug("echo test: %s", silence.summary)
     tell_echo(bus)
-
-
-def tell_echo(bus: BaseBus) -> None:
-    """After the test: say that the adapter echoes, if it does."""
-    if bus.echoes:
-        LOG.warning("%s: the adapter echoes what is sent; the echo is taken off", bus.link.name)

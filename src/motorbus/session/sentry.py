@@ -18,7 +18,7 @@ from motorbus.errors import MotorbusError
 from motorbus.motion.body import Body
 from motorbus.motion.leaving import given_up, goes_on, moves, stopped_going_on
 from motorbus.motion.safety.lease import Lease, Standing
-from motorbus.session.buses import LOG
+from motorbus.session.echo import LOG
 
 AGAIN: Final = 0.5
 """s after which those are told once more who did not accept the stop."""
