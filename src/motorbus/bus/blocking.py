@@ -115,7 +115,9 @@ class Bus(BaseBus):
         self.turn.acquire(Rank.CONTROL)
         try:
             count = len(requests)
-            prepared = self.prepare(requests[-1]) if 1 <= count <= 2 else None
+            prepared = None
+            if 1 <= count <= 2 and isinstance(requests[-1], Exchange):
+                prepared = self.prepare(requests[-1])
             if prepared is None or (count == 2 and not self._may_join(requests[0])):
                 _check_requests(requests)
             else:
