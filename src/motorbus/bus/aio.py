@@ -51,7 +51,7 @@ class AsyncBus(BaseBus):
         job: RequestJob | None = None
         with self.turn:
             try:
-                prepared = self.prepare(request)
+                prepared = self.prepare(request) if self._direct is None else None
                 if prepared is not None:
                     self._direct = prepared, self.write(prepared), future
             except LinkError as error:
