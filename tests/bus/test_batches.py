@@ -12,7 +12,7 @@ import pytest
 
 import motorbus
 from motorbus import feetech
-from motorbus.bus.blocking import Bus, exchange_on
+from motorbus.bus.blocking import Bus, exchange_on, run_on
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.simulation.named import Simulation
 
@@ -126,3 +126,34 @@ def test_reads_of_tasks_on_a_real_clock_are_fresh_also_after_a_cancellation() ->
                 assert sum(found) > 100
 
     asyncio.run(main())
+
+
+def test_a_read_after_one_that_was_torn_off_is_fresh(
+    stack: ExitStack, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A handler of the program may raise while a reply is awaited; that reply then answers no later request."""
+    arm = Arm(stack)
+    servo, link = feetech.Servo(arm.bus, 1), arm.bus.link
+    for read in (servo.position, lambda: arm.bus.exchange(arm.batch())[1].values[1]):
+        for _ in range(3):
+            read()
+        with monkeypatch.context() as patched:
+            receive = link.read
+
+            def tear(until: float, receive: Any = receive) -> Any:
+                if until > link.now():
+                    raise KeyboardInterrupt
+                return receive(until)
+
+            patched.setattr(link, "read", tear)
+            with pytest.raises(KeyboardInterrupt):
+                read()
+        for place in (500, 700, 900):
+            arm.sim[1].raw_position = place
+            assert abs(read() - place * COUNT) < COUNT
+
+
+def test_virtual_and_real_time_do_not_mix(stack: ExitStack) -> None:
+    arms = [Arm(stack), Arm(stack, "real")]
+    with pytest.raises(RequestError, match="virtual time"):
+        run_on({arm.bus: arm.batch()[1] for arm in arms})

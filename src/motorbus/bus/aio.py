@@ -11,7 +11,7 @@ from threading import get_ident
 from typing import Any, Final, Generic, Self, TypeVar
 
 from motorbus.bus.attempt import Attempt
-from motorbus.bus.base import IDLE, BaseBus
+from motorbus.bus.base import IDLE, BaseBus, check_clocks
 from motorbus.bus.interrupts import DEFAULTS, SIGNALS
 from motorbus.bus.jobs import RequestJob
 from motorbus.bus.prepared import Prepared
@@ -51,7 +51,7 @@ class AsyncBus(BaseBus):
         job: RequestJob | None = None
         with self.turn:
             try:
-                prepared = self.prepare(request) if self._direct is None else None
+                prepared = self.prepare(request)
                 if prepared is not None:
                     self._direct = prepared, self.write(prepared), future
             except LinkError as error:
@@ -185,6 +185,7 @@ async def run_on(procedures: Mapping[AsyncBus, Runnable[Any]]) -> dict[AsyncBus,
 
     Any other error of one of them, and a cancellation, cancels all; it is raised when all have cleaned up.
     """
+    check_clocks(procedures)
     news = asyncio.Event()
     parts = [_Part(bus, procedure, None, news) for bus, procedure in procedures.items()]
     await _run_parts(parts)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 from pathlib import Path
 from threading import Condition
@@ -193,7 +193,7 @@ class BaseBus:
         prepared: Prepared | None = request.course
         if prepared is None or prepared.engine is not engine:
             return None
-        if not engine.ready and not engine.check_ready():
+        if engine.in_flight or (not engine.ready and not engine.check_ready()):
             return None
         single = prepared.single
         if single is not None and single.length == prepared.length:
@@ -409,6 +409,17 @@ class BaseBus:
         self.stopper.close()
         self._reconnects = False
         self.link.close()
+
+
+def check_clocks(buses: Iterable[BaseBus]) -> None:
+    """Raise RequestError if some of these buses use virtual time and some real time."""
+    virtual = {bus.link.virtual for bus in buses}
+    if len(virtual) > 1:
+        raise RequestError(
+            "buses in virtual time and buses in real time cannot work together",
+            cause="virtual time passes only while a program waits on simulated buses",
+            advice='simulate with clock="real"; nothing was sent',
+        )
 
 
 class _Arming:

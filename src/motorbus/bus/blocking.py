@@ -10,7 +10,7 @@ from threading import get_ident
 from typing import Any, Final, Generic, Self, TypeVar
 
 from motorbus.bus.attempt import Attempt
-from motorbus.bus.base import IDLE, BaseBus
+from motorbus.bus.base import IDLE, BaseBus, check_clocks
 from motorbus.bus.interrupts import ELSEWHERE, INTERRUPTS, MAIN, Interrupts, interrupts
 from motorbus.bus.jobs import RequestJob
 from motorbus.bus.positions import GATED
@@ -272,6 +272,7 @@ def run_on(procedures: Mapping[Bus, Runnable[Any]]) -> dict[BaseBus, Any]:
 
     Any other error of one of them, and a signal, cancels all; it is raised when all have cleaned up.
     """
+    check_clocks(procedures)
     with interrupts():
         parts = [_Part(bus, procedure, None) for bus, procedure in procedures.items()]
         _run_parts(parts)
