@@ -1,1 +1,1 @@
-"""Who talks when. One link, one bus: policy in `turns`, waiting in `pump` (blocking) and `aio` (async)."""
+"""The bus: one engine without I/O, a blocking and an asyncio bus around it, the emergency stop."""

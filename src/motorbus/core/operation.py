@@ -1,7 +1,7 @@
 """How work is said, so that it can be said once and run blocking or async.
 
 A driver function is a generator (an `Operation`) that yields *steps* and returns its answer. There are seven steps and
-no others. A step is a plain value: whoever runs the operation (`bus/pump.py`, `bus/aio.py`) decides when and how. One
+no others. A step is a plain value: the bus that runs the operation (`bus/tasks.py`) decides when and how. One
 that needs a single exchange returns the `Exchange` itself, which may be kept and run again.
 
 Each step is iterable so that `value = yield from step` has a type; the bare `yield` occurs in this file only.

@@ -1,7 +1,6 @@
 """Where the buses of one movement wait for each other: to agree how long it takes, and on the moment it starts.
 
-Each bus has a clock of its own and its own pump, so nobody can wait for another by an exchange. They look here every
-few milliseconds. What they agree on is a moment to come, so how often they look decides nothing.
+A procedure on one bus cannot wait for one on another bus by a request. So both look here every few milliseconds. What they agree on is a moment to come, so how often they look decides nothing.
 """
 
 from __future__ import annotations

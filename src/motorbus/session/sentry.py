@@ -42,7 +42,7 @@ class Sentry:
         self._posts = {name: _Post(lease.losses - lost) for name in body.buses}
 
     def start(self) -> None:
-        """From now on: in a thread for each bus where time is real, else carried along by whoever pumps."""
+        """From now on: in a thread for each bus where time is real, else stepped whenever the bus is used."""
         self._lease.watchers.append(self._wake)
         for name, bus in self._body.buses.items():
             post = self._posts[name]
@@ -114,7 +114,7 @@ class Sentry:
                     there = self._body.buses[bus]
                     BackgroundTask(there, partial(self._stopping, bus)).carried()
                 left = self._left(bus)
-            except Exception as error:  # not even the pump works: later once more
+            except Exception as error:  # the bus cannot be used: try again later
                 with suppress(Exception):  # nor may want of memory end this thread
                     self._failed(bus, self._lease.losses, self._body.axes.keys(), error)
             woken.wait(0.0 if self._over.is_set() else left)
