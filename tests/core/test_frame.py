@@ -1,4 +1,4 @@
-"""A frame of classic CAN: how it is shown, and how it stands in a run of bytes."""
+"""A CAN frame as text and as bytes."""
 
 from __future__ import annotations
 

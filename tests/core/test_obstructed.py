@@ -1,4 +1,4 @@
-"""A movement and the obstacles in its way: where it ends, when, and that it never gets beyond."""
+"""A movement with obstacles: where and when it ends, and that it never gets beyond."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.plant import Phase, Stretch, move, obstructed, rest, run
+from motorbus.core.plant import Phase, Stretch, move, obstructed
 
 places = st.floats(-50_000, 50_000)
 velocities = st.floats(-5_000, 5_000)
@@ -28,12 +28,6 @@ def test_a_movement_in_parts_of_one_direction() -> None:
     assert parts[-1] == Stretch(motion.done_at, inf, 100.0, 0.0, 0.0)
 
 
-def test_parts_that_are_over_are_left_out() -> None:
-    motion = move(0.0, 0.0, 1000.0, speed=100.0, acceleration=100.0)  # 1 s, 9 s and 1 s
-    assert [part.begin for part in motion.stretches(1.0)] == [1.0, 10.0, 11.0]
-    assert [part.end for part in run(0.0, 0.0, 5.0).stretches(99.0)] == [inf]
-
-
 def test_it_ends_at_the_obstacle_worked_out_by_hand() -> None:
     # 50 counts in the first second, then 100 counts/s: 250 is reached after 3 s, at once and at rest
     motion = obstructed(move(5.0, 0.0, 1000.0, speed=100.0, acceleration=100.0), -10.0, 250.0)
@@ -46,32 +40,11 @@ def test_it_ends_at_the_obstacle_worked_out_by_hand() -> None:
     )
 
 
-def test_within_a_ramp_the_moment_is_that_of_the_ramp() -> None:
-    motion = obstructed(move(0.0, 0.0, -1000.0, speed=100.0, acceleration=100.0), -12.5, 0.0)
-    assert motion.done_at == 0.5  # 12.5 = 100 / 2 * 0.5²
-    assert motion.goal == -12.5
-
-
-def test_a_wheel_is_stopped_for_good() -> None:
-    motion = obstructed(run(0.0, 0.0, 100.0), -inf, 300.0)
-    assert (motion.done_at, motion.goal, motion.cruise) == (3.0, 300.0, 0.0)
-
-
-def test_what_meets_nothing_is_given_back_as_it_is() -> None:
-    for motion in (rest(0.0, 5.0), move(0.0, 5.0, 100.0, speed=10.0), run(0.0, 5.0, -3.0)):
-        assert obstructed(motion, -inf, 100.0) is motion
-
-
 def test_standing_at_the_obstacle_only_the_way_back_is_free() -> None:
     into = obstructed(move(2.0, 100.0, 300.0, speed=10.0), 0.0, 100.0)
     assert (into.phases, into.goal) == ((), 100.0)
     away = move(2.0, 100.0, 50.0, speed=10.0)
     assert obstructed(away, 0.0, 100.0) is away
-
-
-def test_beyond_the_obstacle_it_does_not_go_farther() -> None:
-    motion = obstructed(move(0.0, 120.0, 300.0, speed=10.0, acceleration=5.0), 0.0, 100.0)
-    assert (motion.goal, motion.moving(0.0)) == (120.0, False)
 
 
 def test_an_overshoot_ends_where_the_obstacle_is() -> None:

@@ -1,4 +1,4 @@
-"""Steps are values; `yield from` gives each the type of its answer."""
+"""Steps are values; `yield from` gives each the type of its answer; `afterwards` always cleans up."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ import pytest
 
 from motorbus.core.operation import (
     Alone,
-    Answer,
-    CanFrame,
     Due,
     Exchange,
     Listen,
@@ -60,16 +58,6 @@ def test_every_step_yields_itself_and_returns_what_is_sent_in() -> None:
     assert end.value.value == "1 [2, 3] 4 None"
 
 
-def test_an_exchange_is_plain_data_with_a_reader() -> None:
-    exchange = number(7)
-    assert exchange.request == b"\x07"
-    assert exchange.replies == (Due(1, 1, 1),)
-    assert exchange.read is not None
-    assert not exchange.repeatable
-    assert not hasattr(exchange, "__dict__")
-    assert "07" in repr(exchange)
-
-
 def test_an_outcome_turns_our_errors_into_values_and_no_others() -> None:
     operation: Operation[int | MotorbusError] = outcome(number(1))
     next(operation)
@@ -80,11 +68,6 @@ def test_an_outcome_turns_our_errors_into_values_and_no_others() -> None:
     next(operation)
     with pytest.raises(KeyboardInterrupt):
         operation.throw(KeyboardInterrupt())
-
-
-def test_an_answer_without_reader_is_the_answer() -> None:
-    plain: Exchange[Answer] = Exchange(b"\x01", (Due(1, 1, 1),))
-    assert plain.read is None
 
 
 def guarded(log: list[str], fail: BaseException | None = None) -> Operation[int]:
@@ -144,10 +127,3 @@ def test_a_clean_up_that_fails_is_not_repeated_for_ever() -> None:
     with pytest.raises(NoReply):
         operation.throw(NoReply("silent"))
     assert log == ["lock"]
-
-
-def test_a_can_frame_is_written_as_candump_writes_it_and_lies_flat() -> None:
-    assert str(CanFrame(0x201, b"\x01\x30")) == "201#0130"
-    assert str(CanFrame(0x201, b"", extended=True)) == "00000201#"
-    assert CanFrame(0x201, b"\x01\x30").flat() == bytes.fromhex("00000201 02 0130")
-    assert CanFrame(0x201, b"", extended=True).flat() == bytes.fromhex("80000201 00")

@@ -1,8 +1,8 @@
-"""Spans that compete for bytes: the first one wins, and what is left is noise in pieces."""
+"""Of spans of bytes that overlap the first one wins; the bytes between are noise."""
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import pytest
@@ -52,14 +52,6 @@ def tiles(total: int, sound: list[tuple[int, int]], doubtful: list[tuple[int, in
     return list(zip(found.start.tolist(), found.size.tolist(), faults, strict=True))
 
 
-def test_what_is_between_is_noise() -> None:
-    assert tiles(20, [(3, 8), (8, 10)], []) == [
-        (0, 3, "framing"), (3, 5, ""), (8, 2, ""), (10, 10, "framing")
-    ]  # fmt: skip
-    assert tiles(5, [], []) == [(0, 5, "framing")]
-    assert tiles(5, [(0, 5)], []) == [(0, 5, "")]
-
-
 @pytest.mark.parametrize(
     ("doubtful", "told"),
     [
@@ -79,14 +71,6 @@ def test_doubt_ends_at_the_next_packet_and_never_begins_in_one(
     assert tiles(15, [(10, 15)], doubtful) == told
 
 
-def test_doubt_behind_a_packet_is_told() -> None:
-    assert tiles(9, [(0, 4)], [(4, 9)]) == [(0, 4, ""), (4, 5, "checksum")]
-
-
-def test_what_is_not_whole_makes_the_rest_noise() -> None:
-    assert tiles(12, [(0, 4), (6, 30), (8, 10)], [(7, 9)]) == [(0, 4, ""), (4, 8, "framing")]
-
-
 @pytest.mark.parametrize("extra", [-1, 0, 1, PIECE])
 def test_a_long_run_of_noise_comes_in_pieces(extra: int) -> None:
     total = 2 * PIECE + extra
@@ -95,16 +79,6 @@ def test_a_long_run_of_noise_comes_in_pieces(extra: int) -> None:
     assert sum(sizes[:-1]) == total
     assert set(sizes[:-2]) == {PIECE}
     assert 0 < sizes[-2] <= PIECE
-
-
-def test_one_number_is_said_of_all_packets() -> None:
-    none = np.zeros(0, int)
-    for total in (4, 6):
-        sound = np.array([0, 2]), np.array([2, 4])
-        found = tiled(np, total, sound, (none, none), lambda starts, _: (2, starts, 7))
-        assert found.kind.tolist() == [2, 2, 0][: total // 2]
-        assert found.code.tolist() == [7, 7, -1][: total // 2]
-        assert {column.dtype for column in found} == {np.dtype(np.int64)}
 
 
 @given(sizes=st.lists(st.sampled_from([1, 2, 3, 8, 8, 8, 21, 46]), max_size=9), times=st.integers(0, 90))
@@ -117,18 +91,3 @@ def test_bytes_are_cut_out_as_by_slices(sizes: list[int], times: int) -> None:
     assert cut == [data[at : at + size] for at, size in zip(starts.tolist(), many.tolist(), strict=True)]
     assert {type(one) for one in cut} <= {bytes}
     assert type(cut) is list
-
-
-def test_bytes_of_a_size_that_many_have_are_cut_out_together() -> None:
-    class Counting(bytes):
-        cuts = 0
-
-        def __getitem__(self, key: Any) -> Any:
-            Counting.cuts += 1
-            return super().__getitem__(key)
-
-    data = Counting(bytes(range(250)) * 8)
-    sizes = np.array([8] * 200 + [3, 7])
-    starts = np.cumsum(sizes) - sizes
-    assert cut_out(np, data, starts, sizes)[-3:] == [data[1592:1600], data[1600:1603], data[1603:1610]]
-    assert Counting.cuts == 2 + 3

@@ -1,4 +1,4 @@
-"""What people type becomes the API's unit exactly once, and what cannot be meant is refused in plain words."""
+"""Numbers with units as people write them, converted to the unit of the API and back."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.units import QUANTITIES, SCALES, parse, rate, raw, real, show, whole, written
+from motorbus.core.units import SCALES, parse, rate, raw, real, show, whole, written
 from motorbus.errors import RequestError
 
 
@@ -20,35 +20,20 @@ from motorbus.errors import RequestError
         ("1.2", "position", 1.2),
         ("1.2rad", "position", 1.2),
         ("0.25turn", "position", pi / 2),
-        ("2 turn", "position", 4 * pi),
         (" +.5 rad ", "position", 0.5),
-        ("1.", "position", 1.0),
-        ("1e-3", "position", 0.001),
-        ("90DEG", "position", pi / 2),
         ("30rpm", "velocity", pi),
         ("180 deg/s", "velocity", pi),
-        ("-2", "velocity", -2.0),
         ("1turn/s", "velocity", 2 * pi),
         ("10rad/s²", "acceleration", 10.0),
-        ("10rad/s^2", "acceleration", 10.0),
-        ("180deg/s2", "acceleration", pi),
         ("30 mm", "length", 0.03),
-        ("-1.5cm", "length", -0.015),
-        ("250um", "length", 0.00025),
         ("250 µm", "length", 0.00025),
-        ("0.2", "length", 0.2),
         ("50 mm/s", "linear velocity", 0.05),
-        ("600mm/min", "linear velocity", 0.01),
-        ("200 mm/s2", "linear acceleration", 0.2),
         ("1 m/s²", "linear acceleration", 1.0),
         ("150mA", "current", 0.15),
         ("7.4V", "voltage", 7.4),
         ("70°C", "temperature", 70.0),
         ("50ms", "time", 0.05),
-        ("20us", "time", 2e-5),
-        ("1min", "time", 60.0),
         ("80%", "load", 0.8),
-        ("0.8", "load", 0.8),
     ],
 )
 def test_a_number_with_or_without_a_unit(text: str, quantity: str, value: float) -> None:
@@ -59,24 +44,15 @@ def test_a_number_with_or_without_a_unit(text: str, quantity: str, value: float)
     ("text", "quantity", "says"),
     [
         ("", "position", "is empty"),
-        ("   ", "position", "is empty"),
         ("nan", "position", "is not a number"),
         ("inf", "position", "is not a number"),
-        ("-inf", "velocity", "is not a number"),
         ("1e999", "position", "too large"),
-        ("1e308turn", "position", "too large"),
         ("deg", "position", "is not a number"),
-        ("--5", "position", "is not a number"),
         ("90grad", "position", "'grad', which is not known"),
         ("30rpm", "position", "measures velocity and not position"),
-        ("90deg", "velocity", "measures position and not velocity"),
-        ("30 mm", "position", "measures length and not position"),
-        ("90 deg", "length", "measures position and not length"),
         ("50 mm/s", "velocity", "measures linear velocity and not velocity"),
-        ("3 inch", "length", "'inch', which is not known"),
         ("1,5", "position", "decimal comma"),
         ("100raw", "position", "raw value"),
-        ("1 2", "position", "'2', which is not known"),
         ("٣", "position", "is not a number"),
     ],
 )
@@ -96,28 +72,16 @@ def test_raw_only_when_the_text_says_so(text: str, value: int | None) -> None:
     assert raw(text) == value
 
 
-@pytest.mark.parametrize("text", ["raw", "1.5raw", "xraw", "0xraw"])
-def test_raw_that_is_no_whole_number_is_refused(text: str) -> None:
-    with pytest.raises(RequestError, match="not a raw value"):
-        raw(text)
-
-
 @pytest.mark.parametrize(
     ("value", "quantity", "text"),
     [
         (pi / 2, "position", "1.5708 rad (90.0°)"),
         (pi, "velocity", "3.142 rad/s (30.0 rpm)"),
-        (8.789, "acceleration", "8.79 rad/s²"),
         (0.0305, "length", "30.500 mm"),
-        (0.05, "linear velocity", "50.000 mm/s"),
-        (0.2, "linear acceleration", "200.000 mm/s²"),
         (0.15, "current", "0.150 A"),
         (7.4, "voltage", "7.4 V"),
-        (31.0, "temperature", "31 °C"),
         (0.294, "load", "29.4 %"),
-        (0.0, "time", "0 s"),
         (1.5, "time", "1.5 s"),
-        (-0.02, "time", "-20 ms"),
         (0.00016, "time", "160 µs"),
     ],
 )
@@ -125,23 +89,14 @@ def test_values_for_people(value: float, quantity: str, text: str) -> None:
     assert show(value, quantity) == text
 
 
-def test_every_unit_of_the_api_has_a_quantity_whose_unit_it_is() -> None:
-    for unit, quantity in QUANTITIES.items():
-        assert SCALES[quantity][unit] == 1.0
-
-
 @pytest.mark.parametrize(
     ("value", "quantity", "unit", "text"),
     [
         (pi / 2, "position", "deg", "90 deg"),
         (-pi, "position", "turn", "-0.5 turn"),
-        (200 * pi, "position", "deg", "36000 deg"),
-        (0.0, "position", "deg", "0 deg"),
         (1.25, "position", "rad", "1.25 rad"),
-        (-2.0, "position", "deg", "-2 rad"),
         (0.123456789012345, "length", "mm", "123.456789012345 mm"),
         (0.03, "length", "mm", "30 mm"),
-        (0.5, "load", "%", "50 %"),
     ],
 )
 def test_a_value_is_written_as_people_would(value: float, quantity: str, unit: str, text: str) -> None:
@@ -194,15 +149,3 @@ def test_what_is_no_rate_is_refused(text: str) -> None:
 def test_a_whole_number_is_decimal_or_says_its_base(text: str, value: int) -> None:
     assert whole(text) == value
     assert real(str(value)) == value
-
-
-@pytest.mark.parametrize("text", ["1_0", "0x1_0", "٣", "1.5", "", "seven", "007", "0x"])
-def test_what_is_no_whole_number_is_none(text: str) -> None:
-    with pytest.raises(ValueError, match="."):
-        whole(text)
-
-
-@pytest.mark.parametrize("text", ["1_0", "1_0.5", "٣", "", "seven", "0x10"])
-def test_what_is_no_number_is_none(text: str) -> None:
-    with pytest.raises(ValueError, match="."):
-        real(text)

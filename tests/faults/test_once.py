@@ -16,15 +16,15 @@ from motorbus.bus.policy import RETRIES
 from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown
 from motorbus.families.feetech import FAMILY, Servo, wire
-from motorbus.families.feetech.driver.exchanges import Block, acknowledged, read_block, write_block
+from motorbus.families.feetech.driver.exchanges import Block, acknowledged, write_block
 from motorbus.families.kst.driver.exchanges import order
 from motorbus.families.stepper.table import ORDERS
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.safety import Gate
+from tests.families.stepper.rig import Rig as StepperRig
 from tests.faults.test_stepper_single_faults import COMMANDS, ask
 from tests.support.catalogue.kst import NODE, KstRig
 from tests.support.rigs.feetech import Rig
-from tests.support.rigs.stepper import Rig as StepperRig
 from tests.support.single_faults import Struck
 
 
@@ -62,10 +62,6 @@ FEETECH_ONCE: dict[str, Callable[[Servo], Any]] = {
     "a calibration": lambda servo: acknowledged(servo, wire.calibrate(1)),
     "forgetting turns": lambda servo: acknowledged(servo, wire.clear_turns(1)),
 }
-FEETECH_AGAIN: dict[str, Callable[[Servo], Any]] = {
-    "a reading": lambda servo: read_block(servo, 56, 2, bytes),
-    "an absolute target": lambda servo: write_block(servo, Block(GOAL, GO)),
-}
 
 
 @pytest.mark.parametrize("what", FEETECH_ONCE)
@@ -75,18 +71,6 @@ def test_l18_feetech_says_once_what_would_do_more_when_said_twice(what: str) -> 
     line, error = said_by(rig, lambda: rig.bus.run(exchange))
     assert line.said.count(exchange.request) == 1
     assert isinstance(error, OutcomeUnknown)
-
-
-@pytest.mark.parametrize("what", FEETECH_AGAIN)
-def test_l18_feetech_says_again_what_does_no_more(what: str) -> None:
-    rig = Rig()
-    exchange = FEETECH_AGAIN[what](Servo(rig.bus, 1))
-    silent = Unanswered()
-    rig.put(silent)
-    with pytest.raises((NoReply, OutcomeUnknown)):
-        rig.bus.run(exchange)
-    assert silent.said[0] == exchange.request
-    assert len(silent.said) > 1, "it was asked again, by a probe first"
 
 
 class DeafTo(Unanswered):

@@ -11,13 +11,11 @@ from collections.abc import Iterable, Iterator
 
 import pytest
 
-from motorbus.families.feetech import wire
 from motorbus.link.base import Line, Side
-from motorbus.simulation.faults import Fault
 from tests.conftest import Figures, Rounds
 from tests.support.catalogue.feetech import KINDS, Kind, another_request
-from tests.support.rigs.feetech import Bytewise, Rig
-from tests.support.single_faults import EDGES, EVERY, LATE, Tally, every_fault, number_of, suffer
+from tests.support.rigs.feetech import Rig
+from tests.support.single_faults import EDGES, EVERY, Bytewise, Tally, every_fault, number_of, suffer
 
 ALL = [(model, name) for model, kinds in KINDS.items() for name in kinds]
 TO_HOST = [(model, name) for model, name in ALL if KINDS[model][name].back]
@@ -96,11 +94,6 @@ def test_l1_l2_every_fault_of_the_reading_that_is_used_most(rounds: Rounds) -> N
     assert tally.faults == number_of(8, len(values)) == 8 * (4 + len(values) - 1) + 9 * len(values)
 
 
-@pytest.mark.parametrize("name", ["ping", "read 15 bytes", "write 2 bytes"])
-def test_l1_l2_the_same_where_bytes_come_one_by_one(name: str) -> None:
-    suffered("sts3215", name, EDGES, Side.HOST, bytewise=True)
-
-
 def _both(kind: Kind) -> Iterator[tuple[Side, bool]]:
     yield Side.DEVICE, False
     if kind.back:
@@ -130,35 +123,3 @@ def test_l1_l5_a_write_that_is_read_back_is_never_called_done_when_it_is_not(rou
     )
     assert tally.false == 0
     assert tally.misled > 0, "the servo heard another request, and reading back told so"
-
-
-def test_l2_a_byte_too_many_can_make_another_request() -> None:
-    """A changed byte never gets past the sum. One too many can, behind the id, where it passes for a shorter length.
-
-    Tried with a READ of the position of each servo there can be: what three of them then hear is a REG WRITE of what
-    was the length. It waits, and nothing here says ACTION without having said what for.
-    """
-    others = []
-    for id in range(wire.MAX_ID + 1):
-        request = wire.read(id, 56, 2)
-        heard = [packet for byte in EVERY for packet in _heard(request[:3] + bytes((byte,)) + request[3:])]
-        others += [packet for packet in heard if packet != request]
-    assert len(others) == 3
-    assert {packet[4] for packet in others} == {wire.Instruction.REG_WRITE}
-
-
-def _heard(data: bytes) -> list[bytes]:
-    return [
-        packet.data
-        for packet in wire.Splitter("instruction").feed(data)
-        if isinstance(packet, wire.InstructionPacket)
-    ]
-
-
-def test_a_late_byte_is_later_than_its_exchange_waits() -> None:
-    """Or the fault would be none."""
-    rig = Rig()
-    fault = Fault(1, 0, "delay", seconds=LATE)
-    tally = suffer(rig, KINDS["sts3215"]["ping"].act, [fault])
-    assert tally.succeeded == 1
-    assert rig.bus.statistics.of(1).retries > 0

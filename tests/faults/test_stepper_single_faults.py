@@ -6,7 +6,7 @@ read until two readings agree, as a dump is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from itertools import chain
 from typing import NamedTuple
 
@@ -15,11 +15,11 @@ import pytest
 from motorbus.core.operation import Data
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.table import EDITS, ORDERS
-from motorbus.link.base import Delivery, Line, PerfectLine, Side
+from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.simulation.faults import Fault, FaultyLine
 from tests.conftest import Figures
-from tests.support.lines import BYTE
-from tests.support.rigs.stepper import KEPT, MOTIONS, STOPS, FalseWord, Rig
+from tests.families.stepper.rig import BYTE, KEPT, MOTIONS, STOPS, FalseWord, Rig
+from tests.support import single_faults
 
 EDGES = (0x00, 0x02, 0x5E, 0xEE, 0xFF)
 """Values that mean something somewhere in a reply."""
@@ -48,30 +48,9 @@ def length_of(name: str) -> int:
     return wire.DUMP_LENGTH if name == "read_project" else wire.REPLY_LENGTH
 
 
-class Bytewise:
-    """Hands over what another line delivers to the host as a wire of 9600 baud does."""
-
-    def __init__(self, line: Line) -> None:
-        self.line = line
-
-    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
-        return [piece for delivery in self.line.carry(sender, data, at) for piece in self._pieces(delivery)]
-
-    def _pieces(self, delivery: Delivery) -> list[Delivery]:
-        if delivery.to is Side.DEVICE or not isinstance(delivery.data, bytes):
-            return [delivery]
-        data = delivery.data
-        return [Delivery(delivery.at + n * BYTE, delivery.to, data[n : n + 1]) for n in range(len(data))]
-
-
-def every_fault(length: int, values: Iterable[int], places: range | None = None) -> Iterator[Fault]:
-    places = range(length + 1) if places is None else places
-    for byte in places:
-        if byte < length:
-            yield Fault(1, byte, "drop")
-            yield Fault(1, byte, "duplicate")
-            yield from (Fault(1, byte, "corrupt", value=value) for value in values if value)
-        yield from (Fault(1, byte, "insert", value=value) for value in values)
+def every_fault(length: int, values: Iterable[int], places: Iterable[int] | None = None) -> list[Fault]:
+    """All but the late bytes: a line at 9600 baud has no packets that a pause could part."""
+    return [one for one in single_faults.every_fault(length, values, places=places) if one.action != "delay"]
 
 
 class Tally(NamedTuple):
@@ -91,7 +70,7 @@ def suffer(name: str, faults: Iterable[Fault], *, bytewise: bool = False) -> Tal
     for fault in faults:
         total += 1
         line = FaultyLine([fault])
-        rig.link.line = Bytewise(line) if bytewise else line
+        rig.link.line = single_faults.Bytewise(line, BYTE) if bytewise else line
         try:
             succeeded += ask(rig, name)
         except FalseWord as told:
@@ -114,13 +93,6 @@ def test_single_byte_faults_with_telling_values(name: str) -> None:
         assert succeeded >= total - (name in UNNAMED), "what may be said again gets over any single fault"
     else:
         assert 0 < succeeded < total, "a byte too many in front does no harm"
-
-
-@pytest.mark.parametrize("name", ["read_input", "set_step_delay"])
-def test_every_fifth_single_byte_fault(name: str) -> None:
-    total, _, false = suffer(name, every_fault(6, range(0, 256, 5)))
-    assert false == []
-    assert total == 6 * (2 + 51) + 7 * 52
 
 
 @pytest.mark.parametrize("bytewise", [False, True])

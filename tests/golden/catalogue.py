@@ -6,7 +6,7 @@ from math import nan, tau
 from typing import Any
 
 from motorbus import stepper
-from tests.support.golden import Argument, Call, Case
+from tests.golden.recording import Argument, Call, Case
 
 MODELS = {
     "sts": "sts3215",

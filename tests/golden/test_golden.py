@@ -12,8 +12,16 @@ import pytest
 
 import motorbus
 from tests.golden.catalogue import CASES, EXCLUDED, VARIANTS
+from tests.golden.recording import (
+    DEVICE,
+    Case,
+    collapsed,
+    difference,
+    public_commands,
+    public_functions,
+    trace,
+)
 from tests.golden.traces import load
-from tests.support.golden import DEVICE, Case, collapsed, difference, public_commands, public_functions, trace
 
 recorded = cache(load)
 

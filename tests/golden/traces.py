@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.golden.catalogue import CASES
-from tests.support.golden import trace
+from tests.golden.recording import trace
 
 FOLDER = Path(__file__).parent
 

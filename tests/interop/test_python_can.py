@@ -20,7 +20,7 @@ import motorbus
 from motorbus import kst
 from tests.interop.can_bus import WAYS, CanBus, Way, can_bus
 from tests.interop.canopen_peer import MODULES
-from tests.support.vectors.kst import MANUAL
+from tests.protocol.kst.vectors import MANUAL
 
 SCRIPT = Path(__file__).resolve().parent / "python_can_client.py"
 FRAMES = {vector.id: str(vector.frame) for vector in MANUAL}

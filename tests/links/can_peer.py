@@ -35,55 +35,25 @@ class Mute(SlcanAdapter):
 class Picky(SlcanAdapter):
     """An slcan adapter that refuses some commands and keeps all of them."""
 
-    def __init__(self, *refused: bytes, strict: bool = False) -> None:
-        super().__init__(strict=strict)
-        self.refuses = refused
+    def __init__(self, *refused: bytes) -> None:
+        super().__init__()
+        self.refused = refused
+        self.refusals = b""
         self.commands: list[bytes] = []
 
     def feed(self, data: bytes, at: float = 0.0) -> list[CanFrame]:
         frames = []
         for line in data.split(b"\r")[:-1]:
             self.commands.append(line)
-            if line in self.refuses:
-                self._answer += b"\a"
+            if line in self.refused:
+                self.refusals += b"\a"
             else:
                 frames += super().feed(line + b"\r", at)
         return frames
 
-
-class NarrowLink:
-    """A link of bytes with `room` for so many bytes, to nothing, or to an adapter whose frames it keeps."""
-
-    latency = 0.0
-    warnings: tuple[str, ...] = ()
-
-    def __init__(self, room: int, adapter: SlcanAdapter | None = None) -> None:
-        self.room = room
-        self.adapter = adapter
-        self.frames: list[CanFrame] = []
-        self.written = b""
-        self.coming = b""
-
-    def wait(self, until: float) -> bool:
-        return True
-
-    def receive(self) -> bytes:
-        data, self.coming = self.coming, b""
-        return data
-
-    def send(self, data: bytes) -> int:
-        count = min(self.room, len(data))
-        self.room -= count
-        self.written += data[:count]
-        if self.adapter is not None:
-            self.frames += self.adapter.feed(data[:count])
-        return count
-
-    def fileno(self) -> None:
-        return None
-
-    def close(self) -> None:
-        pass
+    def take(self) -> bytes:
+        refusals, self.refusals = self.refusals, b""
+        return super().take() + refusals
 
 
 class Peer:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import serialx
 
 
@@ -21,31 +19,3 @@ def usb_port(**changes: object) -> serialx.SerialPortInfo:
         "interface_num": 0,
     }
     return serialx.SerialPortInfo(**{**about, **changes})  # type: ignore[arg-type]
-
-
-def fake_usb(root: Path) -> tuple[Path, Path]:
-    """The kernel's tree for one CDC adapter, and its device nodes."""
-    usb = root / "sys" / "devices" / "usb1" / "1-1"
-    interface = usb / "1-1:1.0"
-    interface.mkdir(parents=True)
-    (root / "sys" / "bus" / "usb").mkdir(parents=True)
-    for name, text in {
-        "idVendor": "0483",
-        "idProduct": "5740",
-        "bcdDevice": "0200",
-        "serial": "3669",
-        "manufacturer": "STM",
-        "product": "Virtual ComPort",
-    }.items():
-        (usb / name).write_text(f"{text}\n")
-    (interface / "bInterfaceNumber").write_text("00\n")
-    (interface / "subsystem").symlink_to(root / "sys" / "bus" / "usb")
-    (interface / "driver").mkdir()
-    terminal = root / "sys" / "class" / "tty" / "ttyACM3"
-    terminal.mkdir(parents=True)
-    (terminal / "device").symlink_to(interface)
-    by_id = root / "dev" / "serial" / "by-id"
-    by_id.mkdir(parents=True)
-    (root / "dev" / "ttyACM3").touch()
-    (by_id / "usb-STM_3669-if00").symlink_to("../../ttyACM3")
-    return root / "sys", root / "dev"

@@ -14,8 +14,8 @@ from motorbus.families.feetech import action_all, reg_write_all, sync_write_posi
 from motorbus.families.feetech.driver.jobs import SET_BAUD, SET_ID
 from motorbus.motion.safety.gate import Gate
 from motorbus.session.robot import Robot
+from tests.families.feetech.cuts import Cut, World
 from tests.safety.points import asks, known, sent
-from tests.support.cuts import Cut, World
 from tests.support.machines import Heard, listened, machine
 
 

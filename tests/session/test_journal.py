@@ -17,6 +17,7 @@ from motorbus.core.operation import ASKED, INTENT, OUTCOME, REACHED, Journal
 from motorbus.errors import LinkError, RequestError
 from motorbus.journal import BusJournal
 from motorbus.link.lock import journal_path, state_folder
+from motorbus.session.keeping import journal_of
 
 BUS = "feetech:/dev/ttyACM7"
 FACTS = {"node": 3, "new": 7, "rate": 1_000_000}
@@ -58,18 +59,6 @@ def test_a_change_is_unfinished_from_its_intent_to_its_outcome(path: Path, on_di
     assert path.exists() is on_disk
 
 
-def test_another_process_reads_what_was_recorded(path: Path) -> None:
-    begun(path)
-    change = BusJournal(BUS, path).unfinished()
-    assert change is not None
-    assert change.node == 3
-
-
-def test_asking_keeps_nothing(path: Path) -> None:
-    BusJournal(BUS, path)(record(ASKED))
-    assert not path.exists()
-
-
 @pytest.mark.parametrize("state", [ASKED, INTENT])
 def test_nothing_begins_while_another_change_is_unfinished(path: Path, state: str) -> None:
     kept = begun(path)
@@ -77,26 +66,6 @@ def test_nothing_begins_while_another_change_is_unfinished(path: Path, state: st
         kept(Journal("set_baud", state, {"node": 4}))
     assert f"motorbus recover {BUS}" in caught.value.advice
     assert len(lines(path)) == 2
-
-
-def test_a_change_may_say_itself_what_it_is(path: Path) -> None:
-    """The words of its family stand where its verb alone would tell nobody; anything but words is none."""
-    for said in ("the borrow of project 1 (for jog)", 7):
-        kept = BusJournal(BUS, path)
-        kept(Journal("jog", INTENT, {"node": 1, "what": said}))
-        what = said if isinstance(said, str) else "jog() of #1"
-        assert kept.warning().startswith(f"{what}, begun 20")
-        with pytest.raises(RequestError) as caught:
-            kept(Journal("home", ASKED, {"node": 1}))
-        assert caught.value.summary.startswith(f"{what}, begun 20")
-        kept.forget()
-
-
-def test_a_step_of_another_change_is_refused() -> None:
-    kept = begun(None)
-    with pytest.raises(RequestError, match="unfinished"):
-        kept(Journal("set_baud", OUTCOME, {"outcome": "new"}))
-    assert kept.unfinished() is not None
 
 
 def test_the_file_says_its_format_and_is_the_users_alone(path: Path) -> None:
@@ -113,11 +82,6 @@ def test_a_finished_change_makes_room_for_the_next(path: Path) -> None:
     kept(Journal("set_baud", INTENT, {"node": 4}))
     assert [one.get("change") for one in lines(path)] == [None, "set_baud"]
     assert not list(path.parent.glob("*.new"))
-
-
-def test_an_outcome_of_nothing_is_no_record(path: Path) -> None:
-    BusJournal(BUS, path)(record(OUTCOME, outcome="old"))
-    assert not path.exists()
 
 
 @pytest.mark.parametrize("cut", range(1, 60))
@@ -216,11 +180,6 @@ def test_every_unfinished_change_of_this_user_is_listed(path: Path) -> None:
     assert sorted(listed) == [BUS, "feetech:COM7"], "one that cannot be read hides no other"
 
 
-def test_the_journal_lies_beside_the_lock_of_its_port(path: Path) -> None:
-    assert path.parent == state_folder()
-    assert journal_path("socket://LOCALHOST:4000") == journal_path("socket://127.0.0.1:4000/")
-
-
 def test_a_record_whose_facts_are_others_belongs_to_another_change(path: Path) -> None:
     """Two changes of one program: the second must not end the first, whatever has come in between."""
     kept = begun(path)
@@ -250,26 +209,6 @@ def test_a_journal_with_odd_contents_is_borne_told_and_forgotten(path: Path, lin
     kept.forget()
     assert kept.unfinished() is None
     kept(record(INTENT))
-
-
-def test_a_first_record_says_which_device_it_is_about(path: Path) -> None:
-    """Nobody could end a change that begins with the word that somebody goes on."""
-    kept = BusJournal(BUS, path)
-    with pytest.raises(RequestError, match="nothing is known of its beginning"):
-        kept(Journal("set_id", "recovering", {}))
-    assert not path.exists()
-
-
-def test_what_was_reached_elsewhere_goes_along(path: Path) -> None:
-    kept = BusJournal(BUS, path)
-    kept(record("recovering", **FACTS, reached=[INTENT, "writing 7"]))
-    change = kept.unfinished()
-    assert change is not None
-    assert change.facts[REACHED] == [INTENT, "writing 7", "recovering"]
-    kept(record("recovering", **FACTS, reached=["of something else"]))
-    after = kept.unfinished()
-    assert after is not None
-    assert after.facts[REACHED] == [INTENT, "writing 7", "recovering", "recovering"]
 
 
 def test_a_file_is_found_by_the_name_that_the_bus_had(path: Path) -> None:
@@ -317,12 +256,15 @@ def test_nothing_of_a_simulated_bus_is_on_the_disk(path: Path) -> None:
     assert not list(state_folder().glob("*.journal"))
 
 
-def test_records_go_to_the_journal_whoever_listens() -> None:
-    with motorbus.simulate("feetech", ids="3") as simulation, motorbus.open(simulation.url) as bus:
-        heard: list[object] = []
-        operation = motorbus.feetech.driver.set_id(motorbus.feetech.Node(3), 7, among=[3])
-        bus.run(operation, report=heard.append)
-        assert isinstance(bus.journal, BusJournal)
-        assert b'"outcome": "new"' in bus.journal._content()
-    states = [event.state for event in heard if isinstance(event, Journal)]
-    assert states == [ASKED, ASKED, INTENT, "writing 7", "written 7", OUTCOME]
+def test_a_real_port_has_a_journal_whether_it_is_open_or_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    kept = journal_of("feetech:/dev/ttyACM0,baud=500000")
+    assert kept is not None
+    assert kept.unfinished() is None
+
+
+@pytest.mark.parametrize("address", ["feetech:sim,ids=1", "feetech:sim:arm", "kst:can://virtual/anything"])
+def test_what_is_no_port_of_its_own_has_none(address: str) -> None:
+    assert journal_of(address) is None

@@ -1,4 +1,4 @@
-"""What an address comes to before a port is touched, and the one name under which each port is locked."""
+"""What an address means before a port is touched, and the one name under which a port is locked."""
 
 from __future__ import annotations
 
@@ -59,25 +59,6 @@ def test_what_cannot_be_is_refused_without_touching_the_port(address: str, why: 
 
 
 @pytest.mark.parametrize(
-    ("address", "first", "advice"),
-    [
-        ("feetech:sim,bauds=3", "one of baud, ids, model, faults, ", "did you mean baud?"),
-        ("kst:sim,profil=kst", "one of bitrate, ids, model, faults, profile, ", "did you mean profile?"),
-        ("feetech:/dev/ttyACM0,latenci=0", "one of baud, estop_hold, latency, ", "did you mean latency?"),
-        ("stepper:/dev/ttyACM0,colour=red", "one of baud, motor, ", "take it out of the address"),
-    ],
-)
-def test_an_unknown_option_is_told_with_the_nearest_and_the_most_usual(
-    address: str, first: str, advice: str
-) -> None:
-    with pytest.raises(RequestError) as caught:
-        prepare(address, {})
-    assert caught.value.expected.startswith(first)
-    assert caught.value.expected.count(",") < 12
-    assert caught.value.advice == f"{advice}; nothing was opened"
-
-
-@pytest.mark.parametrize(
     ("bus", "name"),
     [
         ("feetech:/dev/ttyACM0,baud=500000", "/dev/ttyACM0"),
@@ -129,11 +110,6 @@ def test_a_port_that_is_lost_is_looked_for_unless_told_otherwise(
 ) -> None:
     opening = prepare(address, options)
     assert (opening.reconnect, opening.options) == (looked_for, {})
-
-
-def test_whether_it_is_looked_for_is_yes_or_no() -> None:
-    with pytest.raises(RequestError, match="reconnect=maybe: neither yes nor no"):
-        prepare("feetech:/dev/ttyACM0,reconnect=maybe", {})
 
 
 def test_simulated_devices_are_made_as_often_as_they_are_wanted() -> None:

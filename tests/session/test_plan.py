@@ -1,4 +1,4 @@
-"""What opening a machine takes is found out before any port is touched."""
+"""What a machine needs is checked before any port is touched."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from motorbus import LinkError, PortBusy, PortNotFound, RequestError
+from motorbus import LinkError, PortNotFound, RequestError
 from motorbus.families.feetech import FAMILY
 from motorbus.motion.machine import Machine
 from motorbus.session.plan import Plan, estop_options, loaded
-from tests.motion.machine.files import GOOD, UNOPENABLE, Broken, axis
+from tests.motion.machine.files import GOOD, UNOPENABLE, Broken
 from tests.support.machines import described, machine
 
 
@@ -44,11 +44,6 @@ def test_a_name_that_is_none_is_refused_with_those_there_are() -> None:
         Plan.of(made, "elbow")
 
 
-def test_a_machine_without_axes_cannot_be_opened() -> None:
-    with pytest.raises(RequestError, match="no axis"):
-        Plan.of(Machine.parse('format = 1\n[bus.arm]\naddress = "feetech:sim,ids=1"\n'))
-
-
 def test_an_address_that_cannot_be_is_refused_naming_its_bus() -> None:
     with pytest.raises(RequestError, match="^bus.can: .*unknown option 'colour'"):
         Plan.of(made_of("feetech:sim,ids=1", "kst:sim,colour=red"))
@@ -77,17 +72,6 @@ def test_two_buses_on_one_port_are_refused(tmp_path: Path) -> None:
         loaded(file)
 
 
-def test_simulators_that_are_made_anew_are_no_port() -> None:
-    assert Plan.of(made_of("feetech:sim,ids=1", "kst:sim,ids=0x25")).buses == ("arm", "can")
-
-
-def test_a_machine_by_hand_is_judged_too() -> None:
-    found = made_of("feetech:sim,ids=1", "kst:sim,ids=0x25")
-    twice = Machine(buses=found.buses, axes={"x": found.axes["a1"], "y": found.axes["a1"]})
-    with pytest.raises(RequestError, match="moves axis.x already"):
-        Plan.of(twice)
-
-
 def test_a_port_that_cannot_be_opened_is_told_with_its_bus() -> None:
     plan = Plan.of(made_of("feetech:/dev/ttyNOTHING", "kst:sim:nobody"))
     for opening in (plan.open, plan.open_async):
@@ -95,22 +79,6 @@ def test_a_port_that_cannot_be_opened_is_told_with_its_bus() -> None:
             opening("arm", None)
         with pytest.raises(PortNotFound, match=r"^bus\.can: "):
             opening("can", None)
-
-
-def test_a_port_that_is_taken_is_told_with_its_bus() -> None:
-    with machine(arm="1") as (made, _):
-        plan = Plan.of(made)
-        with plan.open("arm", None), pytest.raises(PortBusy, match=r"^bus\.arm: "):
-            plan.open("arm", None)
-
-
-def test_a_file_is_loaded_with_its_addresses_checked(tmp_path: Path) -> None:
-    file = tmp_path / "motorbus.toml"
-    file.write_text(described({"arm": "feetech:sim,ids=1"}, "1", "", False, {}, {}), encoding="utf-8")
-    assert list(loaded(file).axes) == ["a1"]
-    file.write_text(described({"arm": "feetech:sim,colour=red"}, "1", "", False, {}, {}), encoding="utf-8")
-    with pytest.raises(RequestError, match="motorbus.toml: .*colour"):
-        loaded(file)
 
 
 def test_a_good_file_is_loaded_with_ports_that_are_not_there(tmp_path: Path) -> None:
@@ -142,23 +110,6 @@ def test_a_file_is_loaded_without_what_only_another_bus_needs(
         Plan.of(loaded(file))
 
 
-def test_a_machine_by_hand_is_refused_for_an_id_that_no_device_has() -> None:
-    found = made_of("feetech:sim,ids=1", "kst:sim,ids=0x25")
-    wrong = Machine(buses=found.buses, axes={"x": axis(device="can#200"), "y": axis(device="arm#1")})
-    with pytest.raises(RequestError, match="^axis.x.device: 200 is not the id of a servo"):
-        Plan.of(wrong)
-    assert Plan.of(wrong, "y").buses == ("arm",)
-
-
-def test_what_a_machine_of_a_file_is_refused_for_names_the_file(tmp_path: Path) -> None:
-    file = tmp_path / "motorbus.toml"
-    file.write_text(GOOD.replace("#0x25", "#200"), encoding="utf-8")
-    with pytest.raises(RequestError) as caught:
-        Plan.of(Machine.load(file))
-    assert caught.value.summary.startswith(f"{file}: axis.slide.device: 200 is not")
-    assert str(caught.value).count(str(file)) == 1
-
-
 def test_whom_an_emergency_stop_is_to_hold_is_told_to_the_family() -> None:
     with machine(arm="1-4", can="0x25", axes={"a2": {"estop": "hold"}, "a4": {"estop": "hold"}}) as (made, _):
         assert estop_options(made, "arm") == {"estop_hold": "2+4"}
@@ -175,15 +126,6 @@ def test_whom_the_address_names_is_held_too() -> None:
     assert estop_options(Machine.parse(text), "arm") == {"estop_hold": "3+1"}
 
 
-def test_what_always_holds_needs_no_option() -> None:
-    with machine(arm="1", can="0x25", axes={"c1": {"estop": "hold"}, "a1": {"estop": "torque_off"}}) as (
-        made,
-        _,
-    ):
-        assert (estop_options(made, "can"), estop_options(made, "arm")) == ({}, {})
-        assert Plan.of(made).buses == ("arm", "can")
-
-
 @pytest.mark.parametrize(
     ("axis", "estop", "says"),
     [
@@ -198,14 +140,3 @@ def test_an_emergency_stop_that_a_device_does_not_have_is_refused(axis: str, est
         pytest.raises(RequestError, match=says),
     ):
         Plan.of(made)
-
-
-def test_a_port_that_does_not_exist_names_the_file_and_the_bus(tmp_path: Path) -> None:
-    file = tmp_path / "motorbus.toml"
-    file.write_text(GOOD.replace("/dev/ttyACM0", f"{tmp_path}/none"), encoding="utf-8")
-    plan = Plan.of(loaded(file), "left")
-    with pytest.raises(PortNotFound) as caught:
-        plan.open("arm", None)
-    assert caught.value.summary == f"{file}: bus.arm: {tmp_path}/none: there is no such port"
-    with pytest.raises(PortNotFound, match=f"^{file}: bus.arm: {tmp_path}/none: there is no such port"):
-        plan.open_async("arm", None)

@@ -1,4 +1,4 @@
-"""A machine by its file: opened whole or not at all, asked, led, and left."""
+"""A machine by its file is opened as a whole or not at all, and closed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import motorbus
 from motorbus import AsyncRobot, NoReply, PortNotFound, RequestError, Robot
 from motorbus.core.operation import INTENT, Journal, Progress
 from motorbus.motion.machine import Machine
-from tests.support.machines import Cut, machine
+from tests.support.machines import machine
 
 
 def broken(made: Machine, bus: str, address: str) -> Machine:
@@ -37,11 +37,6 @@ def test_a_robot_by_its_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         monkeypatch.chdir(tmp_path)
         with Robot.load(axes="can") as robot:
             assert list(robot.axes) == ["c1", "c2"]
-
-
-def test_the_names_are_exported() -> None:
-    assert motorbus.Robot is Robot
-    assert motorbus.AsyncRobot is AsyncRobot
 
 
 def test_a_bad_file_opens_nothing(tmp_path: Path) -> None:
@@ -69,16 +64,6 @@ def test_when_a_device_is_silent_all_buses_are_closed() -> None:
         sims["can"][0x25].plug()
         with Robot.of(made) as robot:
             assert len(robot.axes) == 3
-
-
-def test_an_interruption_while_loading_closes_all_buses() -> None:
-    for number in range(1, 4):
-        with machine(arm="1-2", can="0x25") as (made, sims):
-            sims["arm"].line = Cut(number)
-            with pytest.raises(KeyboardInterrupt):
-                Robot.of(made)
-            with Robot.of(made) as robot:
-                assert len(robot.axes) == 3
 
 
 def test_a_name_stands_for_one_axis() -> None:
@@ -192,24 +177,6 @@ def test_an_async_robot_that_was_not_entered_says_so() -> None:
     asyncio.run(main())
 
 
-def test_both_faces_have_the_same_verbs() -> None:
-    def verbs(kind: type) -> set[str]:
-        return {name for name in dir(kind) if not name.startswith("_")}
-
-    assert verbs(Robot) == verbs(AsyncRobot)
-    assert verbs(Robot) >= {
-        "load",
-        "of",
-        "positions",
-        "states",
-        "enable_torque",
-        "disable_torque",
-        "stop",
-        "hold",
-    }
-    assert verbs(Robot) >= {"home", "estop", "reset", "warnings", "simulated", "close"}
-
-
 def test_whoever_wants_to_know_is_told_how_it_was_left_while_it_can_be_asked() -> None:
     told: list[Any] = []
     error = RuntimeError("a bug")
@@ -223,20 +190,6 @@ def test_whoever_wants_to_know_is_told_how_it_was_left_while_it_can_be_asked() -
         assert sims["arm"][1].memory["torque_enable"] == 0
         robot.close()
         assert len(told) == 1
-
-
-def test_an_async_robot_tells_it_too_also_when_nothing_went_wrong() -> None:
-    async def main() -> None:
-        told: list[BaseException | None] = []
-        with machine(arm="1", exit="torque_off") as (made, sims):
-            async with AsyncRobot.of(made) as robot:
-                robot.when_left = lambda leaving, ended: told.append(ended)
-                await robot.enable_torque()
-                assert not told
-            assert told == [None]
-            assert sims["arm"][1].memory["torque_enable"] == 0
-
-    asyncio.run(main())
 
 
 def test_one_verb_moves_axes_of_all_families() -> None:

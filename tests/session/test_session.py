@@ -1,4 +1,4 @@
-"""The package as others use it: opening, refusing, and the examples of the README that concern buses."""
+"""The package as users call it: open, refuse, move, async, and the examples of the README."""
 
 from __future__ import annotations
 
@@ -10,13 +10,7 @@ import pytest
 
 import motorbus
 from motorbus.core.operation import Exchange
-from motorbus.errors import (
-    LimitExceeded,
-    NoReply,
-    PortBusy,
-    PortNotFound,
-    RequestError,
-)
+from motorbus.errors import LimitExceeded, NoReply, PortBusy, RequestError
 from tests.support.noisy_line import NoisyLine
 
 
@@ -35,13 +29,6 @@ from tests.support.noisy_line import NoisyLine
 def test_a_bad_address_opens_nothing(address: str, why: str) -> None:
     with pytest.raises(RequestError, match=why):
         motorbus.open(address)
-
-
-def test_a_port_that_is_not_there_says_so() -> None:
-    with pytest.raises(PortNotFound, match="ttyNOTHING"):
-        motorbus.open("feetech:/dev/ttyNOTHING")
-    with pytest.raises(PortNotFound, match="feetech:sim:nobody"):
-        motorbus.open("feetech:sim:nobody")
 
 
 def test_one_servo_from_open_to_torque_off() -> None:
@@ -116,10 +103,19 @@ def test_an_echoing_adapter_is_found_at_open_and_told(caplog: pytest.LogCaptureF
     assert "echoes" in caplog.text
 
 
-def test_without_echo_nothing_is_told(caplog: pytest.LogCaptureFixture) -> None:
-    with motorbus.simulate("feetech", ids="2") as sim, motorbus.open(sim.url) as bus:
-        assert not bus.echoes, "found out although node 1 is not there"
-    assert caplog.text == ""
+def test_a_broken_port_is_closed_again_when_opening_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    from motorbus.families.feetech import Feetech
+
+    def fail(self: Feetech) -> Exchange[Any]:
+        raise RuntimeError("bug")
+
+    with motorbus.simulate("feetech") as sim:
+        monkeypatch.setattr(Feetech, "echo_test", fail)
+        with pytest.raises(RuntimeError):
+            motorbus.open(sim.url)
+        monkeypatch.undo()
+        with motorbus.open(sim.url) as bus, pytest.raises(NoReply):
+            motorbus.feetech.Servo(bus, 9).position()
 
 
 def test_every_bus_has_the_gate() -> None:
@@ -135,25 +131,3 @@ def test_every_bus_has_the_gate() -> None:
             servo.enable_torque()
         bus.reset()
         servo.enable_torque()
-
-
-def test_events_reach_the_listener_given_at_open() -> None:
-    events: list[object] = []
-    with motorbus.simulate("feetech", ids="1-2") as sim, motorbus.open(sim.url, report=events.append) as bus:
-        bus.run(bus.family.scan((1, 2)))
-    assert any(type(event).__name__ == "Found" for event in events)
-
-
-def test_a_broken_port_is_closed_again_when_opening_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    from motorbus.families.feetech import Feetech
-
-    def fail(self: Feetech) -> Exchange[Any]:
-        raise RuntimeError("bug")
-
-    with motorbus.simulate("feetech") as sim:
-        monkeypatch.setattr(Feetech, "echo_test", fail)
-        with pytest.raises(RuntimeError):
-            motorbus.open(sim.url)
-        monkeypatch.undo()
-        with motorbus.open(sim.url) as bus, pytest.raises(NoReply):
-            motorbus.feetech.Servo(bus, 9).position()

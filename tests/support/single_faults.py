@@ -67,24 +67,39 @@ class Tally(NamedTuple):
 
 
 class Overheard:
-    """Carries as another line does; `said` is what the host has sent, `heard` what of it reached the device; `meant`
-    what the device has sent, `told` what of it reached the host."""
+    """Carries as another line does; `said` is what the host has sent, `heard` what of it reached the device."""
 
     def __init__(self, line: Line) -> None:
         self.line = line
         self.said: list[Data] = []
-        self.heard = self.meant = self.told = b""
+        self.heard = b""
 
     def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
         deliveries = self.line.carry(sender, data, at)
-        arrived = b"".join(one.data for one in deliveries if isinstance(one.data, bytes))
         if sender is Side.HOST:
             self.said.append(data)
-            self.heard += arrived
-        elif isinstance(data, bytes):
-            self.meant += data
-            self.told += arrived
+            self.heard += b"".join(one.data for one in deliveries if isinstance(one.data, bytes))
         return deliveries
+
+
+class Bytewise:
+    """Hands over what another line delivers to the host byte by byte, as a slow wire does: none overtakes another."""
+
+    def __init__(self, line: Line, gap: float = 1e-5) -> None:
+        self.line = line
+        self.gap = gap
+        self._last = 0.0
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        return [piece for delivery in self.line.carry(sender, data, at) for piece in self._pieces(delivery)]
+
+    def _pieces(self, delivery: Delivery) -> list[Delivery]:
+        if delivery.to is Side.DEVICE or not isinstance(delivery.data, bytes):
+            return [delivery]
+        bytes_ = [delivery.data[index : index + 1] for index in range(len(delivery.data))]
+        begin = max(delivery.at, self._last + self.gap)
+        self._last = begin + (len(bytes_) - 1) * self.gap
+        return [Delivery(begin + n * self.gap, delivery.to, byte) for n, byte in enumerate(bytes_)]
 
 
 def every_fault(

@@ -32,8 +32,6 @@ __all__ = ["AsyncBus", "Bus", "StopOutcome", "Subscription", "TraceRecord"]
 
 RETRIES = 2
 """How often a bus repeats a request that may be repeated."""
-EQUAL_RUN = 128
-"""Equal replies in a row of a node on CAN after which a bus sends a probe: they could all be one old reply."""
 BIT_TIMES = 33
 """Exchanges after which a CAN bus knows that its link takes bit time."""
 
@@ -62,11 +60,6 @@ def exclude_echo(bus: BaseBus) -> None:
     bus.engine.echo.exclude()
 
 
-def is_idle(bus: BaseBus) -> bool:
-    """Nothing is queued or in flight, and no thread holds the bus."""
-    return bus.engine.idle and not bus.turn.held
-
-
 def has_queued_motion(bus: BaseBus) -> bool:
     """Requests wait to be sent that move something or switch torque."""
     jobs = [job for job in bus.engine.queue if isinstance(job, RequestJob)]
@@ -86,11 +79,6 @@ def is_stopping(bus: BaseBus) -> bool:
 def set_rate(bus: BaseBus, rate: int) -> None:
     """Let the bus compute with this bit rate."""
     bus.engine.rate = rate
-
-
-def receiver_of(bus: BaseBus) -> object:
-    """The receiver of the family that cuts the incoming bytes into frames."""
-    return bus.engine.receiver
 
 
 def queue(bus: BaseBus, exchange: Exchange[Any]) -> RequestJob:

@@ -12,7 +12,7 @@ from motorbus.families.stepper import Program
 from motorbus.families.stepper.program import schema
 from tests.cli.conftest import Run
 from tests.cli.stepper.conftest import EXAMPLE
-from tests.support.vectors.stepper import DUMP_B
+from tests.protocol.stepper.vectors import DUMP_B
 
 
 def test_a_dump_becomes_a_file_and_comes_back(run: Run, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from motorbus.families.stepper import Behaviour, Program
 from motorbus.families.stepper.program.backups import Backup
 from tests.cli.conftest import Run
 from tests.cli.stepper.conftest import EXAMPLE
-from tests.support.vectors.stepper import DUMP_B
+from tests.protocol.stepper.vectors import DUMP_B
 
 
 def test_a_program_or_a_dump_by_its_suffix(tmp_path: Path) -> None:

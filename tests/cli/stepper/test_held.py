@@ -13,7 +13,7 @@ from motorbus.families.stepper.simulator import Controller as Simulated
 from motorbus.families.stepper.table import decode_image
 from tests.cli.conftest import Run
 from tests.cli.stepper.conftest import Line
-from tests.support.hosts.stepper import CLEAR, SAVE, SELECT, Host, frame, step
+from tests.simulators.stepper.host import CLEAR, SAVE, SELECT, Host, frame, step
 
 WRITTEN = [frame(SELECT, 2, 5), frame(3, 1, 0x10, 0, 0x5A), frame(3, 2, 0x88, 0x13)]
 LOOP = frame(0x7E, 4, 5, 2)

@@ -8,8 +8,8 @@ import pytest
 
 from tests.cli.conftest import Run
 from tests.cli.stepper.conftest import EXAMPLE
-from tests.support.stepper_projects import MOTOR, file
-from tests.support.vectors.stepper import DUMP_A, DUMP_B
+from tests.protocol.stepper.projects import MOTOR, file
+from tests.protocol.stepper.vectors import DUMP_A, DUMP_B
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from motorbus.families.stepper import FAMILY, wire
 from motorbus.families.stepper.table import decode_image
 from tests.cli.conftest import Run
 from tests.cli.stepper.conftest import EXAMPLE, Line
-from tests.support.vectors.stepper import DUMP_A, DUMP_B
+from tests.protocol.stepper.vectors import DUMP_A, DUMP_B
 
 READ = {1: wire.encode("read_project", project=1), 2: wire.encode("read_project", project=2)}
 KNOWN: dict[Data, bytes] = {READ[1]: DUMP_A, READ[2]: DUMP_B}

@@ -8,7 +8,7 @@ import pytest
 
 from tests.cli.conftest import Run
 from tests.cli.stepper.conftest import EXAMPLE
-from tests.support.stepper_projects import MOTOR, file
+from tests.protocol.stepper.projects import MOTOR, file
 
 
 def test_every_step_is_a_row(run: Run) -> None:

@@ -18,7 +18,7 @@ from motorbus.families.feetech.driver.placing import called
 from motorbus.journal import BusJournal
 from motorbus.link.memory import MemoryLink
 from motorbus.simulation.named import Simulation
-from tests.support.cuts import NEVER, OLD, VERBS, Cut, Doomed, World
+from tests.families.feetech.cuts import NEVER, OLD, VERBS, Cut, Doomed, World
 
 
 def sent(verb: str) -> int:

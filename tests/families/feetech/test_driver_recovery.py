@@ -17,7 +17,7 @@ from motorbus.families.feetech.driver import Node, recover
 from motorbus.families.feetech.driver.jobs import SET_BAUD, SET_ID, Job, Place
 from motorbus.families.feetech.simulator import effects
 from motorbus.simulation.named import Simulation
-from tests.support.cuts import VERBS, Cut, World, cuts
+from tests.families.feetech.cuts import VERBS, Cut, World, cuts
 
 RATE, SLOW = 1_000_000, 500_000
 

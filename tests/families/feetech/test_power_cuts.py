@@ -17,7 +17,7 @@ import pytest
 from motorbus.core.operation import INTENT
 from motorbus.errors import NoReply, RequestError
 from tests.conftest import Figures
-from tests.support.cuts import NEVER, OLD, VERBS, Cut, World, cuts
+from tests.families.feetech.cuts import NEVER, OLD, VERBS, Cut, World, cuts
 
 MODELS = ("sts3215", "scs0009", "scs215-2", "sm60-360m", "sm85blhv", "hls3925")
 TORN = ("old", "new", "erased")

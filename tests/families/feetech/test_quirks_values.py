@@ -15,7 +15,7 @@ from motorbus.families.feetech.driver.copying import copyable
 from motorbus.families.feetech.simulator.feedback import read
 from motorbus.families.feetech.table import TABLES
 from tests.families.feetech.quirk_bus import bench, instruction
-from tests.support.hosts.feetech import packet
+from tests.simulators.feetech.host import packet
 
 COUNT = 2 * 3.141592653589793 / 4096
 WRITE = 3

@@ -20,7 +20,7 @@ from motorbus.families.feetech.table import BAUD_CODES, BAUD_CODES_OF, CONTROL, 
 from motorbus.families.feetech.table import MODELS as NUMBERS
 from tests.families.feetech.maps import MODELS
 from tests.families.feetech.quirk_bus import Bench, bench
-from tests.support.hosts.feetech import (
+from tests.simulators.feetech.host import (
     ACTION,
     ALL,
     READ,

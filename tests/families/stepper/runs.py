@@ -14,7 +14,7 @@ from motorbus.families.stepper.table import Project, Step, decode_image, with_st
 from motorbus.link.base import Delivery, PerfectLine, Side
 from tests.families.stepper.bench import Bench
 from tests.protocol.stepper.execution.course import GEOMETRY
-from tests.support.vectors.stepper import DUMP_A, DUMP_B
+from tests.protocol.stepper.vectors import DUMP_A, DUMP_B
 
 READ_1 = "FF AA 3E 01 00 00 00 00 00 00 E8"
 START_1 = "FF AA 4E 01 00 00 00 00 00 00 F8"

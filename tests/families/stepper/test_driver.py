@@ -16,7 +16,7 @@ from motorbus.families.stepper.driver import Node, presence, vote
 from motorbus.families.stepper.driver.exchanges import command
 from motorbus.families.stepper.table import TABLE
 from tests.families.stepper.bench import Bench, Tampering, bench
-from tests.support.vectors.stepper import DUMP_A, DUMP_B
+from tests.protocol.stepper.vectors import DUMP_A, DUMP_B
 
 READ_1 = "FF AA 3E 01 00 00 00 00 00 00 E8"
 READ_2 = "FF AA 3E 02 00 00 00 00 00 00 E9"

@@ -23,7 +23,7 @@ from tests.families.stepper.written import (
     program,
     stored,
 )
-from tests.support.stepper_projects import projects
+from tests.protocol.stepper.projects import projects
 
 kinds = pytest.mark.parametrize("kind", KINDS, ids=named)
 READ_2 = "FF AA 3E 02 00 00 00 00 00 00 E9"

@@ -6,6 +6,8 @@ line echoes, and whatever is acknowledged then is forged.
 
 from __future__ import annotations
 
+from random import Random
+
 import pytest
 
 from motorbus.core.operation import Data
@@ -13,14 +15,13 @@ from motorbus.errors import MotorbusError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.table import ORDERS
 from motorbus.link.base import Delivery, Side
+from tests.families.stepper.rig import BYTE, MOTIONS, FalseWord, HeardLine, Rig
 from tests.faults.test_stepper_single_faults import ask
-from tests.support.lines import BYTE, Mischief
-from tests.support.rigs.stepper import MOTIONS, FalseWord, Rig
 
 OFF, FULL, SIX, LATE = "off", "full", "six", "late"
 
 
-class Echoing(Mischief):
+class Echoing(HeardLine):
     """Echoes as `mode` says, in pieces of so many bytes, at the moments at which a wire of 9600 baud has them.
 
     While `deaf` nothing reaches the controller. `pace` is whether the link takes its time and says so; else this line
@@ -28,8 +29,8 @@ class Echoing(Mischief):
     """
 
     def __init__(self, mode: str, *, piece: int = 1, pace: bool = True, deaf: bool = False) -> None:
-        super().__init__(1, 0.02, "unheard", "lost")
-        self.share = 0.0
+        super().__init__()
+        self.random = Random(1)
         self.mode = mode
         self.piece = piece
         self.pace = pace

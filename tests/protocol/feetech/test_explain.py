@@ -10,8 +10,8 @@ from motorbus.core.family import Explanation
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.explain import explain
 from tests.protocol.feetech.test_wire_stream import STREAMS
-from tests.support.vectors.common import Vector
-from tests.support.vectors.feetech import INVALID, REPLIES, REQUESTS, VALID, name_of
+from tests.protocol.feetech.vectors import INVALID, REPLIES, REQUESTS, VALID, name_of
+from tests.protocol.vectors import Vector
 
 
 def told(text: str) -> list[Explanation]:

@@ -13,7 +13,7 @@ from motorbus.core.operation import Effect
 from motorbus.errors import RequestError
 from motorbus.families.feetech.table import ALARM_BITS, STS
 from tests.families.feetech.maps import spread
-from tests.support.vectors.feetech import VALID
+from tests.protocol.feetech.vectors import VALID
 
 # address: name, bytes, sign bit (None: unsigned), lowest, highest, shipped
 ROWS: dict[int, tuple[str, int, int | None, int, int, int | None]] = {

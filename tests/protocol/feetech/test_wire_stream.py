@@ -19,8 +19,8 @@ from motorbus.core.family import Receiver
 from motorbus.core.operation import CanFrame, Noise, Reply
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.wire import stream
-from tests.support.vectors.common import Vector
-from tests.support.vectors.feetech import REPLIES, name_of
+from tests.protocol.feetech.vectors import REPLIES, name_of
+from tests.protocol.vectors import Vector
 
 Event = TypeVar("Event")
 HELD = 4096

@@ -10,8 +10,7 @@ import pytest
 from motorbus.core.operation import Noise, Reply
 from motorbus.errors import ChecksumError, RequestError
 from motorbus.families.feetech import wire
-from tests.support.vectors.common import Vector
-from tests.support.vectors.feetech import (
+from tests.protocol.feetech.vectors import (
     ALL,
     INVALID,
     MANUAL,
@@ -20,6 +19,7 @@ from tests.support.vectors.feetech import (
     VALID,
     name_of,
 )
+from tests.protocol.vectors import Vector
 
 # Each of these ends where the packet begins; the last three look like packets that would swallow it.
 BEFORE = [

@@ -6,7 +6,7 @@ should have been; `further` what the manual does not show. Sums of `further` wer
 
 from __future__ import annotations
 
-from tests.support.vectors.common import Vector, load
+from tests.protocol.vectors import Vector, load
 
 MANUAL = load("feetech", "manual")
 ALL = [*MANUAL, *load("feetech", "corrected"), *load("feetech", "further")]

@@ -12,7 +12,7 @@ from motorbus.families.kst import wire
 from motorbus.families.kst.explain import explain
 from motorbus.families.kst.table import PROFILES
 from tests.protocol.kst.test_wire import FRAMES
-from tests.support.vectors.kst import ALL, INVALID, MANUAL, VALID, Vector, name_of
+from tests.protocol.kst.vectors import ALL, INVALID, MANUAL, VALID, Vector, name_of
 
 KNOWN = st.sampled_from([vector.frame for vector in ALL])
 

@@ -8,7 +8,7 @@ import pytest
 
 from motorbus.core.operation import CanFrame, Noise, Notice, Reply
 from motorbus.families.kst import wire
-from tests.support.vectors.kst import (
+from tests.protocol.kst.vectors import (
     ALL,
     INVALID,
     MANUAL,

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from motorbus.core.family import Explanation
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.explain import explain
-from tests.support.vectors.common import Vector
-from tests.support.vectors.stepper import ALL, DUMP_A, DUMP_B, INVALID, VALID, name_of
+from tests.protocol.stepper.vectors import ALL, DUMP_A, DUMP_B, INVALID, VALID, name_of
+from tests.protocol.vectors import Vector
 
 KNOWN = st.sampled_from([vector.data for vector in ALL])
 

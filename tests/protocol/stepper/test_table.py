@@ -14,8 +14,8 @@ from motorbus.core.operation import Effect, Timeout
 from motorbus.core.units import QUANTITIES
 from motorbus.errors import RequestError
 from motorbus.families.stepper import table, wire
-from tests.support.vectors.common import Vector
-from tests.support.vectors.stepper import DUMPS, name_of
+from tests.protocol.stepper.vectors import DUMPS, name_of
+from tests.protocol.vectors import Vector
 
 # the manual's index and size of each parameter of a step: offset in its 20 bytes, size
 STEP_LAYOUT = {

@@ -10,8 +10,8 @@ from hypothesis import given
 from motorbus.errors import RequestError
 from motorbus.families.stepper import table, wire
 from motorbus.families.stepper.table import Edit, Project, amended, edited, edits, edits_between
-from tests.support.stepper_projects import projects
-from tests.support.vectors.stepper import DUMP_B
+from tests.protocol.stepper.projects import projects
+from tests.protocol.stepper.vectors import DUMP_B
 
 B = table.decode_image(DUMP_B[6:])
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from motorbus.errors import FramingError, RequestError
 from motorbus.families.stepper import wire
-from tests.support.vectors.stepper import DUMP_B
+from tests.protocol.stepper.vectors import DUMP_B
 
 COMMANDS = st.sampled_from(list(wire.COMMANDS.values()))
 

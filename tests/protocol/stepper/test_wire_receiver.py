@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from motorbus.core.operation import CanFrame, Event, Noise, Notice, Reply
 from motorbus.families.stepper import wire
-from tests.support.vectors.stepper import DUMP_B, REPLIES, behaviour
+from tests.protocol.stepper.vectors import DUMP_B, REPLIES, behaviour
 
 STREAMS = behaviour("streams")
 KINDS = {"reply": Reply, "notice": Notice, "noise": Noise}

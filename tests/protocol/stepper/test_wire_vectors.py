@@ -9,8 +9,7 @@ import pytest
 
 from motorbus.core.operation import Noise, Notice, Reply
 from motorbus.families.stepper import wire
-from tests.support.vectors.common import Vector
-from tests.support.vectors.stepper import (
+from tests.protocol.stepper.vectors import (
     ALL,
     DUMP_A,
     DUMP_B,
@@ -22,6 +21,7 @@ from tests.support.vectors.stepper import (
     VALID,
     name_of,
 )
+from tests.protocol.vectors import Vector
 
 PAIRS = [
     (request, reply)

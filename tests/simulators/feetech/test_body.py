@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motorbus.families.feetech.simulator.servo import Servo
-from tests.support.hosts.feetech import (
+from tests.simulators.feetech.host import (
     ALL,
     CALIBRATE,
     PING,

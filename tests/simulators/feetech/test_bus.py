@@ -9,7 +9,7 @@ import pytest
 from motorbus.core.operation import CanFrame
 from motorbus.errors import RequestError
 from motorbus.families.feetech.simulator import simulate
-from tests.support.hosts.feetech import (
+from tests.simulators.feetech.host import (
     ACTION,
     ALL,
     CALIBRATE,

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motorbus.families.feetech.simulator.collision import Received, Speech, heard, overlapping, received
-from tests.support.hosts.feetech import ALL, PING, READ, Host, packet
+from tests.simulators.feetech.host import ALL, PING, READ, Host, packet
 
 BIT = 1e-6
 

@@ -6,8 +6,8 @@ import pytest
 
 from motorbus.families.feetech.simulator.effects import concerned
 from motorbus.families.feetech.table import TABLES
+from tests.simulators.feetech.host import CALIBRATE, CLEAR_TURNS, RESTORE, Host, packet, word
 from tests.simulators.feetech.test_maps import LOCK, USUAL, host_of
-from tests.support.hosts.feetech import CALIBRATE, CLEAR_TURNS, RESTORE, Host, packet, word
 
 TORQUE, GOAL, VELOCITY, PRESENT = 40, 42, 46, 56
 ACK = ["FF FF 01 02 00 FC"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.support.hosts.feetech import Host
+from tests.simulators.feetech.host import Host
 
 
 def burdened(*torques: float) -> Host:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.support.hosts.feetech import READ, Host, packet, word
+from tests.simulators.feetech.host import READ, Host, packet, word
 
 
 def test_telemetry_at_rest_in_one_read() -> None:

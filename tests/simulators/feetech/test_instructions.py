@@ -7,8 +7,7 @@ import pytest
 from motorbus.families.feetech.simulator.instructions import OBEY
 from motorbus.families.feetech.table import TABLES
 from motorbus.families.feetech.wire import Instruction
-from tests.simulators.feetech.test_maps import LOCK, USUAL, host_of
-from tests.support.hosts.feetech import (
+from tests.simulators.feetech.host import (
     ACTION,
     ALL,
     PING,
@@ -20,6 +19,7 @@ from tests.support.hosts.feetech import (
     Host,
     packet,
 )
+from tests.simulators.feetech.test_maps import LOCK, USUAL, host_of
 
 ACK = ["FF FF 01 02 00 FC"]
 SCS = {"scs", "scs2"}

@@ -10,7 +10,7 @@ import pytest
 from motorbus.core.entry import Entry, Storage
 from motorbus.families.feetech.simulator.feedback import FEEDBACK
 from motorbus.families.feetech.table import TABLES, alarms
-from tests.support.hosts.feetech import ALL, READ, WRITE, Host, packet
+from tests.simulators.feetech.host import ALL, READ, WRITE, Host, packet
 
 USUAL = {
     "sts": "sts3215", "smbl": "sm85blhv", "smcl": "sm80-360m", "scs": "scs0009", "scs2": "scs215-2", "hls": "hls3925",

@@ -10,7 +10,7 @@ from motorbus.families.feetech.simulator import simulate
 from motorbus.families.feetech.simulator.model import MODELS, model, models
 from motorbus.families.feetech.table import CONTROL, TABLES, choose
 from motorbus.families.feetech.table import MODELS as NUMBERS
-from tests.support.hosts.feetech import READ, Host, packet
+from tests.simulators.feetech.host import READ, Host, packet
 
 
 def test_the_usual_model_and_the_same_in_capitals() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.support.hosts.feetech import (
+from tests.simulators.feetech.host import (
     Host,
     word,
 )

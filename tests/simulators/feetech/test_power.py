@@ -6,8 +6,8 @@ import pytest
 
 from motorbus.families.feetech.simulator.power import LOADED
 from motorbus.families.feetech.table import TABLES
+from tests.simulators.feetech.host import REG_WRITE, packet
 from tests.simulators.feetech.test_maps import LOCK, host_of
-from tests.support.hosts.feetech import REG_WRITE, packet
 
 PAIRS = [(name, row, source) for name in TABLES for row, source in LOADED.items() if row in TABLES[name]]
 

@@ -9,7 +9,7 @@ import pytest
 from motorbus.families.feetech.simulator.effort import Load
 from motorbus.families.feetech.simulator.protection import Watch, above
 from motorbus.families.feetech.simulator.servo import Servo
-from tests.support.hosts.feetech import REG_WRITE, Host, packet, word
+from tests.simulators.feetech.host import REG_WRITE, Host, packet, word
 
 POSITION, TORQUE, LIMIT, LOCK = 42, 40, 48, 55
 

@@ -8,7 +8,7 @@ import pytest
 
 from motorbus.errors import RequestError
 from motorbus.families.feetech.simulator import simulate
-from tests.support.hosts.feetech import (
+from tests.simulators.feetech.host import (
     ALL,
     BOOTLOADER,
     CALIBRATE,

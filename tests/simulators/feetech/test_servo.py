@@ -6,7 +6,7 @@ from math import inf
 
 import pytest
 
-from tests.support.hosts.feetech import (
+from tests.simulators.feetech.host import (
     ACTION,
     BOOTLOADER,
     CALIBRATE,

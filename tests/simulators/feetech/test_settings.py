@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from motorbus.families.feetech.table import CONTROL, TABLES, Mode
+from tests.simulators.feetech.host import READ, Host, big, packet, word
 from tests.simulators.feetech.test_maps import USUAL, host_of
-from tests.support.hosts.feetech import READ, Host, big, packet, word
 
 ALIKE = ("sts", "smbl", "smcl", "hls")
 """Maps with a mode register, little-endian, 4096 counts."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from tests.simulators.feetech.host import Host, word
 from tests.simulators.feetech.test_settings import LIMIT
-from tests.support.hosts.feetech import Host, word
 
 
 def test_servos_with_the_same_registers_share_what_they_ask_for_until_one_is_told_otherwise() -> None:

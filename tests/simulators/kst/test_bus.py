@@ -8,7 +8,7 @@ from motorbus.core.frame import Audience
 from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Data
 from motorbus.errors import RequestError
 from motorbus.families.kst.simulator import simulate
-from tests.support.hosts.kst import ERROR, Host
+from tests.simulators.kst.host import ERROR, Host
 
 READ = "4002600000000000"
 READ_ID = "4000300000000000"

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.support.hosts.kst import ERROR, Host
+from tests.simulators.kst.host import ERROR, Host
 
 READ = "4002600000000000"
 READ_ID = "4000300000000000"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tests.support.hosts.kst import Host
-from tests.support.vectors.kst import ALL, MANUAL, REQUESTS, Vector, name_of
+from tests.protocol.kst.vectors import ALL, MANUAL, REQUESTS, Vector, name_of
+from tests.simulators.kst.host import Host
 
 POSITIONS = {
     -900: "7CFC",

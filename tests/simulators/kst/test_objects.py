@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.support.hosts.kst import Host
+from tests.simulators.kst.host import Host
 
 READ = "4002600000000000"
 SAVE = "2210100173617665"

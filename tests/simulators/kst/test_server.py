@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motorbus.families.kst.simulator.servo import MAILBOX
-from tests.support.hosts.kst import Host
+from tests.simulators.kst.host import Host
 
 VERSION = "625#400A100000000000"
 FIRST, SECOND = "625#6000000000000000", "625#7000000000000000"

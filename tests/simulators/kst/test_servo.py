@@ -7,7 +7,7 @@ import json
 import pytest
 
 from motorbus.families.kst.simulator import simulate
-from tests.support.hosts.kst import Host
+from tests.simulators.kst.host import Host
 
 READ = "4002600000000000"
 MOVE = "2203600084030000"

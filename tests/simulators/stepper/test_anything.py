@@ -12,7 +12,7 @@ from motorbus.core.switches import options as options_of
 from motorbus.families.stepper import table, wire
 from motorbus.families.stepper.execution import Phase
 from motorbus.families.stepper.simulator import StepperBus, Switches, simulate
-from tests.support.stepper_projects import projects
+from tests.protocol.stepper.projects import projects
 
 HARMLESS = {
     "echo",

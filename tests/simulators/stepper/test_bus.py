@@ -8,7 +8,8 @@ from motorbus.core.operation import CanFrame
 from motorbus.errors import RequestError
 from motorbus.families.stepper.simulator import Change, simulate
 from motorbus.link.memory import MemoryLink
-from tests.support.hosts.stepper import (
+from tests.protocol.stepper.vectors import DUMP_A
+from tests.simulators.stepper.host import (
     DONE,
     FORWARD,
     READ,
@@ -20,7 +21,6 @@ from tests.support.hosts.stepper import (
     step,
     written,
 )
-from tests.support.vectors.stepper import DUMP_A
 
 
 def test_a_reply_begins_after_the_turnaround() -> None:

@@ -9,7 +9,9 @@ import pytest
 
 from motorbus.errors import RequestError
 from motorbus.families.stepper.table import TABLE, Project, Step, with_steps
-from tests.support.hosts.stepper import (
+from tests.protocol.stepper.vectors import DUMP_A, DUMP_B, MANUAL, REQUESTS, name_of
+from tests.protocol.vectors import Vector
+from tests.simulators.stepper.host import (
     CLEAR,
     DONE,
     FORWARD,
@@ -25,8 +27,6 @@ from tests.support.hosts.stepper import (
     step,
     written,
 )
-from tests.support.vectors.common import Vector
-from tests.support.vectors.stepper import DUMP_A, DUMP_B, MANUAL, REQUESTS, name_of
 
 EXAMPLES = [
     (request, reply)

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motorbus.families.stepper.simulator.ear import Ear
-from tests.support.hosts.stepper import STOP, STOP_PROJECT, frame
+from tests.simulators.stepper.host import STOP, STOP_PROJECT, frame
 
 GAP = 0.1
 

@@ -8,7 +8,8 @@ from motorbus.core.operation import Noise, Reply
 from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.simulator import Switches
-from tests.support.hosts.stepper import (
+from tests.protocol.stepper.vectors import DUMP_A
+from tests.simulators.stepper.host import (
     DONE,
     HOME,
     SAVE,
@@ -21,7 +22,6 @@ from tests.support.hosts.stepper import (
     step,
     written,
 )
-from tests.support.vectors.stepper import DUMP_A
 
 EDIT = step(1, distance=77)[0]
 EDITED = "FF AA 03 03 00 01"

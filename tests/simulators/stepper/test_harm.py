@@ -8,8 +8,8 @@ import pytest
 
 from motorbus.families.stepper.simulator.harm import Harm
 from motorbus.families.stepper.simulator.switches import Switches
-from tests.support.hosts.stepper import READ, STOP, STOP_PROJECT, frame
-from tests.support.vectors.stepper import DUMP_B
+from tests.protocol.stepper.vectors import DUMP_B
+from tests.simulators.stepper.host import READ, STOP, STOP_PROJECT, frame
 
 REPLY = bytes.fromhex("FFAA4E010000")
 

@@ -7,7 +7,7 @@ import pytest
 from motorbus.families.stepper.simulator.harm import Harm
 from motorbus.families.stepper.simulator.line import Line
 from motorbus.families.stepper.simulator.switches import Switches
-from tests.support.vectors.stepper import DUMP_B
+from tests.protocol.stepper.vectors import DUMP_B
 
 REPLY = bytes.fromhex("FFAA4E010000")
 NOTICE = b"\xee\xdd"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from motorbus.families.stepper.simulator.memory import EXAMPLE, Memory, Rows
 from motorbus.families.stepper.simulator.switches import Switches
 from motorbus.families.stepper.table import BLANK, TABLE, decode_image, encode_image
-from tests.support.vectors.stepper import DUMP_A
+from tests.protocol.stepper.vectors import DUMP_A
 
 
 def test_the_examples_of_the_manual_are_dump_a() -> None:

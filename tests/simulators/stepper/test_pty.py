@@ -19,9 +19,9 @@ from motorbus.families.stepper.simulator import simulate
 from motorbus.simulation.control import ControlSocket
 from motorbus.simulation.mount import Mount
 from motorbus.simulation.pty import PtyMaster
-from tests.support.hosts.stepper import READ, SAVE, SELECT, frame, step
+from tests.protocol.stepper.vectors import DUMP_A, FOLDER
+from tests.simulators.stepper.host import READ, SAVE, SELECT, frame, step
 from tests.support.mounts import asked, served
-from tests.support.vectors.stepper import DUMP_A, FOLDER
 
 CLIENT = Path(__file__).resolve().parents[2] / "interop" / "stepper_client.py"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motorbus.errors import RequestError
-from tests.support.hosts.stepper import (
+from tests.simulators.stepper.host import (
     CLEAR,
     DONE,
     FORWARD,

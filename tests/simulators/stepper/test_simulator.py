@@ -13,8 +13,8 @@ from motorbus.families.stepper.execution import Behaviour
 from motorbus.families.stepper.simulator import OPTIONS, Switches, simulate
 from motorbus.link.memory import MemoryLink
 from motorbus.simulation.control import obey
-from tests.support.hosts.stepper import START, STOP, frame
-from tests.support.vectors.stepper import DUMP_A
+from tests.protocol.stepper.vectors import DUMP_A
+from tests.simulators.stepper.host import START, STOP, frame
 
 
 def test_every_option_has_a_default_of_its_kind_and_can_be_said_in_text() -> None:

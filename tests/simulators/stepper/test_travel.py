@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.support.hosts.stepper import (
+from tests.simulators.stepper.host import (
     FORWARD,
     HOME,
     REVERSE,

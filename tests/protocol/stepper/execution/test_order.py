@@ -15,7 +15,7 @@ from motorbus.families.stepper import execution
 from motorbus.families.stepper.execution import Behaviour, Place
 from motorbus.families.stepper.table import Project, Step, with_steps
 from tests.protocol.stepper.execution import exact
-from tests.support.vectors.stepper import behaviour
+from tests.protocol.stepper.vectors import behaviour
 
 
 def looped(total: int, first: int, last: int, count: int, project_loop: int = 0) -> Project:

@@ -14,7 +14,7 @@ from motorbus.families.stepper import execution
 from motorbus.families.stepper.execution import Behaviour, Ramp, motion, still
 from motorbus.families.stepper.table import Project, Step
 from tests.protocol.stepper.execution import exact
-from tests.support.vectors.stepper import behaviour
+from tests.protocol.stepper.vectors import behaviour
 
 VECTORS = behaviour("motion")
 RAMPS = ("time", "pulse")

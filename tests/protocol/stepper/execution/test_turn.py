@@ -12,7 +12,7 @@ from motorbus.families.stepper.execution import Behaviour, Phase
 from motorbus.families.stepper.table import Project, Step, decode_image, with_steps
 from tests.protocol.stepper.execution import exact
 from tests.protocol.stepper.execution.course import Course, project, step
-from tests.support.vectors.stepper import DUMP_A, DUMP_B
+from tests.protocol.stepper.vectors import DUMP_A, DUMP_B
 
 ORDINARY = ["begins", "moved", "ended", "completed"]
 

@@ -13,7 +13,7 @@ from motorbus.families.stepper import wire
 from motorbus.families.stepper.program import Program
 from motorbus.families.stepper.program.backups import Backup, is_backup
 from motorbus.families.stepper.table import Project
-from tests.support.vectors.stepper import DUMP_A, DUMP_B
+from tests.protocol.stepper.vectors import DUMP_A, DUMP_B
 
 BOTH = Backup(dumps={2: DUMP_B, 1: DUMP_A}, made="2024-05-06T07:08:09Z", version="motorbus 1.2")
 TEXT = BOTH.text()

@@ -13,7 +13,7 @@ from motorbus.families.stepper.execution import Behaviour
 from motorbus.families.stepper.program import course, picture
 from motorbus.families.stepper.table import Project, Step, decode_image
 from tests.protocol.stepper.execution.course import project, step
-from tests.support.vectors.stepper import DUMP_B
+from tests.protocol.stepper.vectors import DUMP_B
 
 B = decode_image(DUMP_B[6:])
 

@@ -12,8 +12,8 @@ from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.program import dumps
 from motorbus.families.stepper.table import Project, decode_image, encode_image
-from tests.support.stepper_projects import projects
-from tests.support.vectors.stepper import DUMP_A, DUMP_B
+from tests.protocol.stepper.projects import projects
+from tests.protocol.stepper.vectors import DUMP_A, DUMP_B
 
 
 @pytest.mark.parametrize(

@@ -17,8 +17,8 @@ from motorbus.families.stepper.program.earliest import earliest
 from motorbus.families.stepper.table import Project, decode_image, with_steps
 from tests.families.stepper.behaviours import short_projects, switches
 from tests.protocol.stepper.execution.course import project, step
-from tests.support.stepper_projects import projects
-from tests.support.vectors.stepper import DUMP_A, DUMP_B
+from tests.protocol.stepper.projects import projects
+from tests.protocol.stepper.vectors import DUMP_A, DUMP_B
 
 LONGEST = 300.0
 

@@ -11,7 +11,7 @@ from motorbus.errors import RequestError
 from motorbus.families.stepper.program import Run, fit
 from motorbus.families.stepper.simulator import simulate
 from motorbus.families.stepper.table import Project, Step, with_steps
-from tests.support.hosts.stepper import START, frame
+from tests.simulators.stepper.host import START, frame
 
 MOTOR = Project(number=1, microsteps=8, step_angle=180, turn_distance=1)
 SHORT = Step(distance=1, start_frequency=50, acceleration=30, speed=100, delay=100)

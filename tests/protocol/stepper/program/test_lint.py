@@ -11,8 +11,8 @@ from hypothesis import given
 from motorbus.families.stepper.execution import Behaviour
 from motorbus.families.stepper.program import RULES, Conditions, Finding, lint, net_units
 from motorbus.families.stepper.table import Project, Step, decode_image, with_steps
-from tests.support.stepper_projects import projects
-from tests.support.vectors.stepper import DUMP_B
+from tests.protocol.stepper.projects import projects
+from tests.protocol.stepper.vectors import DUMP_B
 
 GOOD = Step(distance=1600, start_frequency=400, acceleration=50, speed=600)
 BACK = replace(GOOD, direction=1)

@@ -12,8 +12,8 @@ from motorbus.families.stepper import execution
 from motorbus.families.stepper.execution import Behaviour
 from motorbus.families.stepper.program import Estimate, duration, estimate, plan
 from motorbus.families.stepper.table import Project, Step, decode_image, with_steps
-from tests.support.stepper_projects import projects
-from tests.support.vectors.stepper import DUMP_A, DUMP_B
+from tests.protocol.stepper.projects import projects
+from tests.protocol.stepper.vectors import DUMP_A, DUMP_B
 
 B = decode_image(DUMP_B[6:])
 A = decode_image(DUMP_A[6:])

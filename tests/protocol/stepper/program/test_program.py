@@ -13,8 +13,8 @@ from motorbus.errors import RequestError
 from motorbus.families.stepper.execution import Behaviour
 from motorbus.families.stepper.program import Conditions, Program
 from motorbus.families.stepper.table import Project
-from tests.support.stepper_projects import MOTOR, file, projects
-from tests.support.vectors.stepper import DUMP_A, DUMP_B
+from tests.protocol.stepper.projects import MOTOR, file, projects
+from tests.protocol.stepper.vectors import DUMP_A, DUMP_B
 
 EXAMPLE = Path(__file__).resolve().parents[4] / "examples" / "pick_and_place.toml"
 

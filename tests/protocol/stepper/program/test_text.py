@@ -13,7 +13,7 @@ from motorbus.errors import RequestError
 from motorbus.families.stepper.program import text
 from motorbus.families.stepper.program.text import Source
 from motorbus.families.stepper.table import Project, Step
-from tests.support.stepper_projects import MOTOR, STEP, file, projects
+from tests.protocol.stepper.projects import MOTOR, STEP, file, projects
 
 
 def test_a_file_is_read() -> None:

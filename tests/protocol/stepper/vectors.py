@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from tests.support.vectors.common import VECTORS, Vector, load
+from tests.protocol.vectors import VECTORS, Vector, load
 
 FOLDER = VECTORS / "stepper"
 

@@ -12,7 +12,7 @@ import pytest
 
 from motorbus.core.operation import Data
 from motorbus.errors import MotorbusError, OutcomeUnknown, VerificationFailed
-from motorbus.families.feetech import Servo, sync_read, wire
+from motorbus.families.feetech import Servo, wire
 from motorbus.families.feetech.table import ALARM_BITS, alarms
 from motorbus.link.base import Delivery, PerfectLine, Side
 from tests.support.rigs.feetech import IDS, Rig
@@ -40,14 +40,6 @@ def write(rig: Rig, servo: Servo) -> None:
     assert held(rig, servo) == wanted
 
 
-def later(rig: Rig, servo: Servo) -> None:
-    wanted = goal_time(rig, servo)
-    servo.reg_write(goal_time=wanted)
-    assert rig.servos[1].pending is not None
-    servo.action()
-    assert held(rig, servo) == wanted
-
-
 def keep(rig: Rig, servo: Servo) -> None:
     """EEPROM, with its lock."""
     wanted = 40 + rig.count % 20
@@ -67,15 +59,6 @@ def telemetry(rig: Rig, servo: Servo) -> None:
     assert servo.telemetry().alarm == alarms(rig.servos[1].alarm)
 
 
-def group(rig: Rig, servo: Servo) -> None:
-    raw = rig.stir()
-    found = rig.bus.run(sync_read(["present_position"], [servo]))
-    assert servo.table is not None
-    assert found.errors == {}
-    assert found.values[1]["present_position"] == servo.table["present_position"].to_value(raw)
-    assert found.alarms[1] == alarms(rig.servos[1].alarm)
-
-
 def let_go(rig: Rig, servo: Servo) -> None:
     rig.servos[1].memory["torque_enable"] = 1
     servo.disable_torque()
@@ -86,9 +69,7 @@ ANSWERED: dict[str, Callable[[Rig, Servo], Any]] = {
     "ping": lambda rig, servo: servo.ping(),
     "read": position,
     "telemetry": telemetry,
-    "sync read": group,
     "write": write,
-    "reg write and action": later,
     "write that is kept": keep,
     "torque off": let_go,
 }

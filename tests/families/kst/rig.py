@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from random import Random
 
-from motorbus.core.can_bits import ERROR_BITS, bits
+from motorbus.core.can_bits import bits
 from motorbus.core.family import SimulatedNode
 from motorbus.core.operation import CanFrame, Data, Operation, Together
 from motorbus.errors import MotorbusError
@@ -71,17 +71,6 @@ class Rig:
         self.good = self.failed = self.wrong = 0
         self.errors: list[MotorbusError] = []
 
-    def read(self, node: int) -> bool:
-        """One position, judged; False when it failed honestly."""
-        before = self.servos.heard
-        try:
-            value = self.devices[node].position()
-        except MotorbusError as error:
-            self._fail(error)
-            return False
-        self._judge(before, value)
-        return True
-
     def reading(self, node: int, count: int) -> Operation[None]:
         """So many positions of one node, beside those of others."""
         operation = type(self.devices[node]).position.function
@@ -117,20 +106,15 @@ class Rig:
 class Mischief:
     """What can happen to a reply on CAN, by chance, the same for the same seed.
 
-    Damaged frames do not exist (the controller drops them), so: `lost`; `late` by `late_by`, and all that follows
-    held up, for devices and adapters are first-in first-out; `twice`, as CAN makes a copy, by a retransmission
-    directly behind the original; and replies to something else, in place of the true one or just before it. With
-    `copy_after` the copy comes that much later: CAN does not do that, an adapter might. After a fault, `rest` replies
-    are left alone. `fired` counts faults.
+    Damaged frames do not exist (the controller drops them), so: `lost`; `late`, and all that follows with it, as
+    devices and adapters keep the order; and replies to something else, in place of the true one or just before it.
+    After a fault, `rest` replies are left alone. `fired` counts faults.
     """
 
-    def __init__(
-        self, seed: int, probability: float, *kinds: str, copy_after: float = 0.0, rest: int = 0
-    ) -> None:
+    def __init__(self, seed: int, probability: float, *kinds: str, rest: int = 0) -> None:
         self.random = Random(seed)
         self.probability = probability
         self.kinds = kinds
-        self.copy_after = copy_after
         self.rest = rest
         self.resting = 0
         self.late_by = (0.001, 0.5)
@@ -160,13 +144,10 @@ class Mischief:
         return [Delivery(at, Side.HOST, frame) for at, frame in frames]
 
     def _struck(self, kind: str, frame: CanFrame, at: float) -> list[tuple[float, CanFrame]]:
-        behind = at + (ERROR_BITS + bits(frame)) * BIT
         if kind == "lost":
             return []
         if kind == "late":
             return [(at + self.random.uniform(*self.late_by), frame)]
-        if kind == "twice":
-            return [(at, frame), (behind + self.copy_after, frame)]
         name, _, place = kind.partition(" ")
         other = self._other(name, frame)
         return [(at, other)] if place == "instead" else [(at, other), (at + bits(frame) * BIT, frame)]

@@ -1,31 +1,29 @@
-"""A controller at the end of a line that lies, and an oracle that compares what is told with what it really did.
+"""A simulated stepper controller on a faulty line. Each call is compared with what the controller really did.
 
-What is asked is drawn by lot among everything a host asks of it. An acknowledgement is right when its request reached
-the controller unharmed during this very call and the controller is as that command leaves it; a value is right when it
-is the controller's own at that moment. Every call has to end by a moment that is worked out beforehand.
+An acknowledgement is right when its request reached the controller during this call and the controller is as that
+command leaves it; a value is right when the controller has it at that moment. Every call must end in time.
 """
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable
 from contextlib import suppress
 from random import Random
 from typing import Any
 
-from motorbus.core.operation import Exchange, Rank, Runnable
+from motorbus.core.operation import Data, Exchange, Rank, Runnable
 from motorbus.errors import MotorbusError
 from motorbus.families.stepper import FAMILY, Controller, wire
 from motorbus.families.stepper.driver import commands, goals
 from motorbus.families.stepper.driver.reading import READINGS, agreed, dump_once, read_input, readings
 from motorbus.families.stepper.execution import Phase
 from motorbus.families.stepper.simulator import simulate
-from motorbus.families.stepper.table import BLANK, EDITS, ORDERS, PARAMETERS, decode_image
-from motorbus.link.base import Line
+from motorbus.families.stepper.table import BLANK, ORDERS, PARAMETERS, decode_image
+from motorbus.link.base import Delivery, Line, PerfectLine, Side
 from motorbus.link.memory import MemoryLink
-from tests.support.lines import Mischief
 from tests.support.world import RETRIES, make_bus
 
+BYTE = 10 / 9600
+"""s for one byte on the wire."""
 PORTS = (1, 2, 3, 4, 5)
 ACTIVE = (2, 5)
 STOPS = ("stop_project", "stop_motor")
@@ -38,13 +36,20 @@ class FalseWord(AssertionError):
     """Something was told that is not so."""
 
 
-class Rig:
-    """One exchange after the other, each judged.
+class HeardLine(PerfectLine):
+    """A line without faults; `heard` are the requests that reached the controller."""
 
-    `right` and `failed` count what was told truly and what was said to have failed, by kind; `levels` are levels of an
-    input that a single reading had wrong, which nobody can see. `doubles` are projects that came wrong in the same way
-    twice, which nobody can see either; None: there may be none.
-    """
+    def __init__(self) -> None:
+        self.heard: list[Data] = []
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        if sender is Side.HOST:
+            self.heard.append(data)
+        return super().carry(sender, data, at)
+
+
+class Rig:
+    """One exchange after the other, each judged; `errors` are those of the last calls that failed."""
 
     def __init__(self, line: Line, seed: int, *, pace: bool = True, **options: Any) -> None:
         self.simulator = simulate((1,), **options)
@@ -54,17 +59,9 @@ class Rig:
         self.device = Controller(self.bus)
         self.there = self.simulator.nodes[1]
         self.random = Random(seed)
-        self.right: Counter[str] = Counter()
-        self.failed: Counter[str] = Counter()
-        self.levels = 0
-        self.doubles: int | None = None
-        self.longest = 0.0
         self.errors: list[MotorbusError] = []
-        self._asked = 0
         for port in ACTIVE:
             self.there.set_input(port, True)
-        if isinstance(line, Mischief):
-            line.cut = self.there.power_cycle
 
     def open(self) -> None:
         """Find out about echo, as opening a bus does."""
@@ -74,21 +71,6 @@ class Rig:
             self.bus.run(test)
 
     # -- what is asked ------------------------------------------------------------------------------------------------
-
-    def anything(self) -> bool:
-        """One call drawn by lot. True when it succeeded."""
-        lot = self.random.random()
-        if lot < 0.25:
-            return self.input()
-        if lot < 0.32:
-            return self.dump()
-        if lot < 0.62:
-            return self.edit(self.random.choice(EDITS))
-        if lot < 0.78:
-            return self.output()
-        if lot < 0.88:
-            return self.stop()
-        return self.motion(self.random.choice(MOTIONS)) if lot < 0.96 else self.keep(self.random.choice(KEPT))
 
     def input(self) -> bool:
         """An input, read until two readings agree; a single reading has one bit that nothing vouches for."""
@@ -101,7 +83,6 @@ class Rig:
             return seen[-1]
 
         done = self._judged("input", agreed(), 4 * _longest(read_input(self.device, port)))
-        self.levels += sum(level is not self._level(port) for level in seen)
         if done is not None and done is not self._level(port):
             raise FalseWord(f"input {port} was told to be {done}")
         return done is not None
@@ -122,9 +103,6 @@ class Rig:
         told = self._judged("dump", as_read(), READINGS * _longest(dump_once(self.device, 1)))
         true.append(self.there.store.image(project))
         if told is not None and told[wire.REPLY_LENGTH :] not in true:
-            if self.doubles is not None and len(seen) == 2:
-                self.doubles += 1
-                return True
             raise FalseWord(f"the dump of project {project} is not what it holds")
         return told is not None
 
@@ -173,16 +151,9 @@ class Rig:
             raise FalseWord(f"output {port} was acknowledged as {level} and is not")
         return True
 
-    def stop(self) -> bool:
-        """One of the two commands that stop, or the verb with both."""
-        return self.stop_by(self.random.choice((*STOPS, "stop")))
-
     def stop_by(self, name: str) -> bool:
-        """This one of them."""
-        if name == "stop":
-            done = self._judged(name, self.device_stop(), 12.0) is not None
-        else:
-            done = self._acknowledged(getattr(commands, name)(self.device), name)
+        """One of the two commands that stop."""
+        done = self._acknowledged(getattr(commands, name)(self.device), name)
         state = self.there.state
         if done and name != "stop_motor" and state.run is not None and state.phase not in UNMOVED:
             raise FalseWord(f"{name} was acknowledged and project {state.run.project.number} goes on")
@@ -217,7 +188,7 @@ class Rig:
 
     def _acknowledged(self, exchange: Exchange[None], name: str) -> bool:
         """Whether it was acknowledged; FalseWord when it was and the controller has not heard it meanwhile."""
-        heard = self.line.heard if isinstance(self.line, Mischief) else None
+        heard = self.line.heard if isinstance(self.line, HeardLine) else None
         before = len(heard) if heard is not None else 0
         done = self._judged(name, _sent(exchange), _longest(exchange))
         if done is not None and heard is not None and exchange.request not in heard[before:]:
@@ -230,20 +201,12 @@ class Rig:
         value = None
         try:
             value = self.bus.run(operation)
-            self.right[kind] += 1
         except MotorbusError as error:
-            self.failed[kind] += 1
             self.errors.append(error)
             del self.errors[:-20]
         took = self.link.now() - began
-        self.longest = max(self.longest, took)
         assert took <= at_most, f"{kind} took {took:.2f} s of {at_most:.2f}"
         return value
-
-    @property
-    def calls(self) -> int:
-        """How many there were."""
-        return sum(self.right.values()) + sum(self.failed.values())
 
     @property
     def tried_again(self) -> int:
@@ -263,6 +226,3 @@ def _longest(exchange: Exchange[Any]) -> float:
     each = [FAMILY.air_time(one, 9600) + FAMILY.turnaround(one) + 0.02 for one in (exchange, probe)]
     tries = 1 if exchange.rank is Rank.STOP else RETRIES + 2
     return tries * (sum(each) + 2 * quiet) + quiet
-
-
-Call = Callable[[Rig], bool]
