@@ -17,7 +17,7 @@ from motorbus.bus.jobs import RequestJob
 from motorbus.bus.prepared import Prepared
 from motorbus.bus.tasks import Notify, TaskTree
 from motorbus.core.operation import UNLIKE, Exchange, Runnable
-from motorbus.errors import LinkError
+from motorbus.errors import LinkError, LinkLost
 
 T = TypeVar("T")
 
@@ -32,6 +32,7 @@ class AsyncBus(BaseBus):
 
     _loop: asyncio.AbstractEventLoop | None = None
     _descriptor: int | None = None
+    _thread = 0
     _timer: asyncio.TimerHandle | None = None
     _direct: tuple[Prepared, Attempt, asyncio.Future[Any]] | None = None
     """The prepared request in flight that no other request has met, and what gets its value."""
@@ -94,11 +95,11 @@ class AsyncBus(BaseBus):
         descriptor = self.link.fileno()
         if loop is not self._loop or descriptor != self._descriptor:
             self._unwatch()
-            self._loop, self._descriptor = loop, descriptor
-            if descriptor is not None and descriptor >= 0:
+            self._loop, self._descriptor, self._thread = loop, descriptor, get_ident()
+            if descriptor is not None and descriptor >= 0 and self.engine.gone is None:
                 loop.add_reader(descriptor, self._look)
         seconds = self.engine.next_deadline() - self.now()
-        if self.engine.gone is not None:
+        if self.engine.gone is not None or self.engine.stopping:
             seconds = min(seconds, IDLE)
         elif descriptor is None and not (self.engine.idle and not self.engine.listeners):
             seconds = min(seconds, LOOK)
@@ -156,9 +157,33 @@ class AsyncBus(BaseBus):
             self._loop.remove_reader(self._descriptor)
         self._loop = self._descriptor = None
 
+    def _lost(self, error: LinkError) -> None:
+        super()._lost(error)
+        self._forget_descriptor()
+
+    def _reconnect(self) -> bool:
+        back = super()._reconnect()
+        self._forget_descriptor()
+        return back
+
+    def _forget_descriptor(self) -> None:
+        """The file behind the descriptor is not the same any more."""
+        loop = self._loop
+        if loop is not None and not loop.is_closed():
+            if get_ident() == self._thread:
+                self._unwatch()
+            else:
+                loop.call_soon_threadsafe(self._unwatch)
+
     async def close(self) -> None:
-        """Give the port back. Nothing is sent: devices keep doing what they were ordered."""
-        self._unwatch()
+        """Give the port back. Nothing is sent: devices keep doing what they were ordered. Calls that wait fail."""
+        error = LinkLost("the bus is closed", advice="open it again")
+        with self.turn:
+            self._unwatch()
+            direct, self._direct = self._direct, None
+            if direct is not None:
+                _fail(direct[2], error)
+            self.engine.lost(error)
         self._hang_up()
 
     async def __aenter__(self) -> Self:

@@ -13,9 +13,9 @@ from motorbus.bus import failures
 from motorbus.bus.attempt import Attempt
 from motorbus.bus.engine import Engine
 from motorbus.bus.interlock import Interlock
-from motorbus.bus.jobs import RateJob, RequestJob
+from motorbus.bus.jobs import RateJob, RequestJob, Since
 from motorbus.bus.policy import carry_out
-from motorbus.bus.positions import Reading
+from motorbus.bus.positions import GATED, Reading
 from motorbus.bus.prepared import Prepared
 from motorbus.bus.statistics import Statistics
 from motorbus.bus.stop import EmergencyStop
@@ -94,7 +94,7 @@ class BaseBus:
     @property
     def waits_for_stop(self) -> bool:
         """An emergency stop in another thread needs the turn, and nothing is in flight."""
-        return self.engine.stopping and not self.engine.in_flight and not self.link.virtual
+        return self.engine.stopping and not self.engine.in_flight
 
     def check_thread(self) -> None:
         """Raise RequestError for a second thread on a simulated bus in virtual time; an emergency stop may."""
@@ -185,6 +185,13 @@ class BaseBus:
         if isinstance(self.link, Renewable) and self._reconnects:
             self.link.rest(min(until, self.link.now() + IDLE))
 
+    def job_for(self, request: Exchange[Any]) -> RequestJob:
+        """A job that a stop or a lost port from now on refuses, if the request moves something."""
+        job = RequestJob(request, losses=self.engine.losses)
+        if request.effect in GATED:
+            job.stops, job.latches = self.engine.positions.stops_for(request), self.engine.latches
+        return job
+
     # -- prepared requests -------------------------------------------------------------------------------------
 
     def prepare(self, request: Exchange[Any]) -> Prepared | None:
@@ -207,8 +214,10 @@ class BaseBus:
             return None
         return None if engine.paced and link.now() < engine.free_at else prepared
 
-    def write(self, prepared: Prepared, order: Exchange[Any] | None = None) -> Attempt:
-        """Write a prepared request; an `order` without reply goes in front of it. Raises what forbids the order."""
+    def write(
+        self, prepared: Prepared, order: Exchange[Any] | None = None, since: Since | None = None
+    ) -> Attempt:
+        """Write a prepared request; an order without reply goes in front of it. Raises what forbids the order."""
         engine, now = self.engine, self.link.now()
         attempt = prepared.attempt
         if attempt.ended:
@@ -216,7 +225,8 @@ class BaseBus:
         wire: Any = prepared.wire
         attempt.sent_at = now
         if order is not None:
-            wire, attempt.sent_at = self._write_order(order, now) + wire, engine.free_at
+            assert since is not None
+            wire, attempt.sent_at = self._write_order(order, since, now) + wire, engine.free_at
         attempt.deadline = attempt.sent_at + prepared.budget
         engine.in_flight[prepared.lane] = attempt
         if engine.trace.subscriptions:
@@ -224,10 +234,11 @@ class BaseBus:
         self.link.write(wire)
         return attempt
 
-    def _write_order(self, order: Exchange[Any], now: float) -> Any:
+    def _write_order(self, order: Exchange[Any], since: Since, now: float) -> Any:
         """Check and count an order that leaves with the next request; its data."""
         engine = self.engine
         engine.time = now
+        engine.check_since(order, since)
         engine.check(order)
         engine.positions.sent(order)
         engine.statistics.other["sent"] += 1

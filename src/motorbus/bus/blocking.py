@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Mapping, Sequence
 from math import inf
-from select import POLLIN, poll
 from threading import get_ident
 from typing import Any, Final, Generic, Self, TypeVar
 
 from motorbus.bus.attempt import Attempt
 from motorbus.bus.base import IDLE, BaseBus, check_clocks
 from motorbus.bus.interrupts import ELSEWHERE, INTERRUPTS, MAIN, Interrupts, interrupts
-from motorbus.bus.jobs import RequestJob
+from motorbus.bus.jobs import RequestJob, Since
 from motorbus.bus.positions import GATED
 from motorbus.bus.prepared import Prepared
 from motorbus.bus.tasks import Notify, TaskTree
 from motorbus.core.entry import shown
 from motorbus.core.operation import UNLIKE, Exchange, Operation, Rank, Runnable, Together
 from motorbus.errors import LinkError, MotorbusError, RequestError
+from motorbus.link.wait import wait_any
 
 T = TypeVar("T")
 
 LOOK: Final = 0.001
 """s between two looks at a link without descriptor, while several buses are waited for."""
+SHORT: Final = 0.02
+"""s of a wait for a notification, after which other threads may use the bus."""
+BRIEF: Final = 0.002
+"""s of a wait for the turn of a bus while this thread has that of another."""
 
 
 class Bus(BaseBus):
@@ -46,7 +51,7 @@ class Bus(BaseBus):
         if self.link.virtual:
             self.check_thread()
         signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
-        stops = self.engine.positions.stops_for(request) if request.effect in GATED else None
+        waiting = self.job_for(request) if request.effect else None
         signals.depth += 1
         try:
             turn.acquire(request.rank)
@@ -54,8 +59,7 @@ class Bus(BaseBus):
                 prepared = self.prepare(request)
                 if prepared is not None:
                     return self._receive(prepared, self.write(prepared))
-                job = RequestJob(request, losses=self.engine.losses)
-                job.stops = stops
+                job = waiting or RequestJob(request, losses=self.engine.losses)
                 self.engine.submit(job, self.link.now())
                 return self._finish(job)
             except LinkError as error:
@@ -79,15 +83,19 @@ class Bus(BaseBus):
         return self._finish(job)
 
     def _finish(self, job: RequestJob) -> Any:
-        while not job.done:
-            self.send()
-            if job.done:
-                break
-            if self.waits_for_stop:
-                self.turn.release()
-                self.turn.acquire(job.priority)
-            else:
-                self.receive(inf)
+        try:
+            while not job.done:
+                self.send()
+                if job.done:
+                    break
+                if self.waits_for_stop:
+                    self.turn.release()
+                    self.turn.acquire(job.priority)
+                else:
+                    self.receive(inf)
+        except BaseException:  # the caller does not wait any more
+            self.engine.cancel(job)
+            raise
         return job.result()
 
     def exchange(
@@ -101,28 +109,21 @@ class Bus(BaseBus):
         """
         return self.start(requests).result(tolerated)
 
-    def start(self, requests: Sequence[Exchange[Any]]) -> Pending:
+    def start(self, requests: Sequence[Exchange[Any]], timeout: float = -1.0) -> Pending:
         """Send a batch, see `exchange`; `Pending.result` gives its values.
 
-        A batch that cannot be sent at once is sent by `result`. Until then the calling thread has the bus, signals are
-        deferred, and the thread uses the bus for nothing else.
+        A batch that cannot be sent at once, or for which the bus is not free within `timeout` s (-1: no limit), is sent
+        by `result`. Until then the calling thread has the bus, signals are deferred, and the thread uses the bus for
+        nothing else.
         """
         if self.link.virtual:
             self.check_thread()
         signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
         pending = Pending(self, requests, signals)
         signals.depth += 1
-        self.turn.acquire(Rank.CONTROL)
         try:
-            count = len(requests)
-            prepared = None
-            if 1 <= count <= 2 and isinstance(requests[-1], Exchange):
-                prepared = self.prepare(requests[-1])
-            if prepared is None or (count == 2 and not self._may_join(requests[0])):
-                _check_requests(requests)
-            else:
-                self.write(prepared, requests[0] if count == 2 else None)
-                pending.prepared = prepared
+            if self.turn.acquire(Rank.CONTROL, timeout):
+                self._start(pending)
         except LinkError as error:
             self._lost(error)
             raise
@@ -130,6 +131,24 @@ class Bus(BaseBus):
             if pending.prepared is None:
                 pending.release()
         return pending
+
+    def _start(self, pending: Pending) -> None:
+        """Write a batch of a prepared request, and an order in front of it, if both may leave now."""
+        requests = pending.requests
+        _check_requests(requests)
+        count = len(requests)
+        if count != 1 and not (count == 2 and self._may_join(requests[0])):
+            return
+        prepared = self.prepare(requests[-1])
+        if prepared is None:
+            return
+        try:
+            self.write(prepared, None if count == 1 else requests[0], pending.since)
+        except LinkError:
+            raise
+        except MotorbusError:  # the order is refused: `result` says so
+            return
+        pending.prepared = prepared
 
     def _may_join(self, order: Exchange[Any]) -> bool:
         """This order may leave in one write with the next request."""
@@ -145,8 +164,7 @@ class Bus(BaseBus):
     def defer_signals(self) -> None:
         """Raise signals at the end of a request only, until this bus is closed; see `motorbus.bus.interrupts`."""
         if not self._defers_signals:
-            self._defers_signals = True
-            INTERRUPTS.install()
+            self._defers_signals = INTERRUPTS.install()
 
     def close(self) -> None:
         """Give the port back. Nothing is sent: devices keep doing what they were ordered."""
@@ -165,13 +183,15 @@ class Bus(BaseBus):
 class Pending:
     """A batch that was started. `prepared` is the request whose reply is awaited, None where nothing was sent yet."""
 
-    __slots__ = ("bus", "prepared", "requests", "signals")
+    __slots__ = ("bus", "ended", "prepared", "requests", "signals", "since")
 
     def __init__(self, bus: Bus, requests: Sequence[Exchange[Any]], signals: Interrupts) -> None:
         self.bus = bus
         self.requests = requests
         self.signals = signals
+        self.since = bus.engine.since()
         self.prepared: Prepared | None = None
+        self.ended = False
 
     def release(self) -> None:
         """Give the bus back; raise a signal that came meanwhile."""
@@ -184,8 +204,11 @@ class Pending:
     def result(self, tolerated: tuple[type[Exception], ...] = ()) -> list[Any]:
         """The values of all requests; an error of a `tolerated` type is the value of its request. Raises others."""
         prepared, bus = self.prepared, self.bus
+        if self.ended:
+            raise RequestError("result() was called before", advice="start the batch again")
+        self.ended = True
         if prepared is None:
-            return bus.run(carry_out_batch(self.requests, tolerated))
+            return run_here(bus, carry_out_batch(self.requests, tolerated), since=self.since)
         value: Any
         try:
             value = bus._receive(prepared, prepared.attempt)
@@ -230,19 +253,20 @@ def exchange_on(
         try:
             for bus, requests in batches.items():
                 try:
-                    pending.append(bus.start(requests))
+                    pending.append(bus.start(requests, -1.0 if not pending else BRIEF))
                 except MotorbusError as error:
                     found[bus] = error
-            unsent = [one for one in pending if one.prepared is None]
-            if unsent:
-                found |= run_on({one.bus: carry_out_batch(one.requests, tolerated) for one in unsent})
         finally:
-            for one in pending:
-                if one.prepared is not None:
-                    try:
-                        found[one.bus] = one.result(tolerated)
-                    except Exception as error:
-                        found[one.bus] = error
+            sent = [one for one in pending if one.prepared is not None]
+            for one in sent:
+                try:
+                    found[one.bus] = one.result(tolerated)
+                except Exception as error:
+                    found[one.bus] = error
+        unsent = [one for one in pending if one not in sent]
+        if unsent:
+            work = {one.bus: carry_out_batch(one.requests, tolerated) for one in unsent}
+            found |= run_on(work, {one.bus: one.since for one in unsent})
     for value in found.values():
         if isinstance(value, Exception) and not isinstance(value, MotorbusError):
             raise value
@@ -259,22 +283,27 @@ def _check_requests(requests: Sequence[Any]) -> None:
             )
 
 
-def run_here(bus: BaseBus, procedure: Runnable[T], report: Notify | None = None) -> T:
-    """Run a procedure in this thread, also on a bus of an event loop; see `Bus.run`."""
+def run_here(
+    bus: BaseBus, procedure: Runnable[T], report: Notify | None = None, *, since: Since | None = None
+) -> T:
+    """Run a procedure that was called at `since` (None: now) in this thread, also on a bus of an event loop."""
     with interrupts():
-        part = _Part(bus, procedure, report)
+        part = _Part(bus, procedure, report, since)
         _run_parts([part])
         return part.tree.result()
 
 
-def run_on(procedures: Mapping[Bus, Runnable[Any]]) -> dict[BaseBus, Any]:
+def run_on(
+    procedures: Mapping[Bus, Runnable[Any]], since: Mapping[Bus, Since] | None = None
+) -> dict[BaseBus, Any]:
     """Run a procedure on each bus at the same time: what each returned, or the MotorbusError that it raised.
 
     Any other error of one of them, and a signal, cancels all; it is raised when all have cleaned up.
     """
     check_clocks(procedures)
     with interrupts():
-        parts = [_Part(bus, procedure, None) for bus, procedure in procedures.items()]
+        moments = since or {}
+        parts = [_Part(bus, procedure, None, moments.get(bus)) for bus, procedure in procedures.items()]
         _run_parts(parts)
         return {part.bus: part.tree.outcome() for part in parts}
 
@@ -282,14 +311,22 @@ def run_on(procedures: Mapping[Bus, Runnable[Any]]) -> dict[BaseBus, Any]:
 class _Part(Generic[T]):
     """A procedure on one bus; `news` is set when its tree can go on."""
 
-    def __init__(self, bus: BaseBus, procedure: Runnable[T], report: Notify | None) -> None:
+    def __init__(
+        self, bus: BaseBus, procedure: Runnable[T], report: Notify | None, since: Since | None = None
+    ) -> None:
         bus.check_thread()
         self.bus = bus
         self.news = True
         self.sleeps = False
         self.holds_turn = False
+        self.cancellations: list[BaseException] = []
         self.tree: TaskTree[T] = TaskTree(
-            bus.engine, procedure, now=bus.link.now, report=bus.listener(report), settled=self._settled
+            bus.engine,
+            procedure,
+            now=bus.link.now,
+            report=bus.listener(report),
+            settled=self._settled,
+            since=since,
         )
 
     def _settled(self) -> None:
@@ -298,51 +335,48 @@ class _Part(Generic[T]):
             with self.bus.settled:
                 self.bus.settled.notify_all()
 
-    def take_turn(self) -> None:
-        if not self.holds_turn:
-            self.bus.turn.acquire()
-            self.holds_turn = True
+    def take_turn(self, timeout: float = -1.0) -> bool:
+        """Take the turn of the bus; False when it was not free within `timeout` s (-1: no limit)."""
+        self.holds_turn = self.holds_turn or self.bus.turn.acquire(timeout=timeout)
+        return self.holds_turn
 
     def release_turn(self) -> None:
         """Let other threads use the bus, unless a request is in flight or the bus is used exclusively."""
         engine = self.bus.engine
-        free = engine.idle and engine.exclusive is None and not engine.listeners
-        if self.holds_turn and (free or self.bus.waits_for_stop):
+        free = engine.idle and engine.exclusive is None and (not engine.listeners or self.bus.turn.wanted)
+        if self.holds_turn and (self.tree.root.finished or free or self.bus.waits_for_stop):
             self.holds_turn = False
             self.bus.turn.release()
 
-    def advance(self) -> bool:
-        """Step the tree and send; True when it has ended."""
+    def advance(self, timeout: float) -> bool:
+        """Step the tree and send; True when it has ended. Does nothing if the turn is not free within `timeout` s."""
         if self.tree.root.finished:
             return True
-        self.take_turn()
+        if not self.take_turn(timeout):
+            return False
+        while self.cancellations:
+            self.tree.cancel(self.cancellations.pop(0))
         while self.news and not self.tree.root.finished:
             self.news = False
             if not self.tree.advance():
                 self.bus.send()
+        if self.tree.root.finished:
+            self.release_turn()
         return self.tree.root.finished
-
-    @property
-    def only_sleeps(self) -> bool:
-        """It waits for nothing but a moment."""
-        return self.bus.engine.idle and not self.bus.engine.listeners
 
     def wait(self) -> None:
         """Wait until something comes, a deadline, or a moment that the tree waits for."""
         bus, moment = self.bus, self.tree.next_moment()
-        if bus.waits_for_stop:
-            self.release_turn()
-        elif self.only_sleeps and not bus.link.virtual:
-            self.release_turn()
+        if not self.holds_turn and not bus.waits_for_stop:
             self._sleep(min(moment - bus.link.now(), IDLE))
-        else:
-            bus.receive(moment)
+        elif self.holds_turn:
+            listens = bus.engine.idle and bus.engine.listeners and not bus.link.virtual
+            bus.receive(min(moment, bus.link.now() + SHORT) if listens else moment)
         self.news = True
 
     def _sleep(self, seconds: float) -> None:
         """Sleep, at most until a stop ends the sleeps of the tree."""
-        if self.holds_turn or seconds <= 0:
-            time.sleep(max(0.0, seconds))
+        if seconds <= 0:
             return
         with self.bus.settled:
             self.news, self.sleeps = False, True
@@ -358,28 +392,41 @@ def _run_parts(parts: Sequence[_Part[Any]]) -> None:
     try:
         while True:
             try:
-                going = [part for part in parts if not part.advance()]
+                going = [part for part in parts if not part.advance(_patience(part, parts))]
                 if not going:
                     return
                 for part in parts:
                     if (error := part.tree.foreign_error()) is not None:
                         raise error
+                for part in going:
+                    if part.bus.waits_for_stop or not part.bus.link.virtual:
+                        part.release_turn()
                 signals.waiting = all(part.bus.engine.idle for part in going)
-                signals.raise_pending()
+                if signals.pending is not None:
+                    signals.waiting = False
+                    signals.raise_pending()
                 _wait(going)
             except BaseException as error:
+                signals.waiting = False
                 for part in parts:
-                    if not part.tree.root.finished:
-                        part.take_turn()
-                        part.tree.cancel(error)
-                        part.news = True
+                    part.cancellations.append(error)
+                    part.news = True
             finally:
                 signals.waiting = False
     finally:
         for part in parts:
+            if not part.tree.root.finished:  # an error in the lines above
+                with part.bus.turn:
+                    part.tree.drop()
             if part.holds_turn:
                 part.holds_turn = False
                 part.bus.turn.release()
+
+
+def _patience(part: _Part[Any], parts: Sequence[_Part[Any]]) -> float:
+    """s to wait for the turn of a bus: without limit only while this thread has no other, so threads never block."""
+    others = any(other.holds_turn for other in parts if other is not part)
+    return BRIEF if others else -1.0
 
 
 def _wait(parts: Sequence[_Part[Any]]) -> None:
@@ -397,17 +444,20 @@ def _wait(parts: Sequence[_Part[Any]]) -> None:
 
 def _poll(parts: Sequence[_Part[Any]]) -> None:
     """One wait on the descriptors of all links, then take what has come."""
-    waiter, seconds = poll(), IDLE
+    descriptors, seconds = [], IDLE
     for part in parts:
-        part.release_turn()
         descriptor = part.bus.link.fileno()
-        if descriptor is None:
+        if descriptor is None or not part.holds_turn:
             seconds = min(seconds, LOOK)
         else:
-            waiter.register(descriptor, POLLIN)
+            descriptors.append(descriptor)
         moment = min(part.tree.next_moment(), part.bus.engine.next_deadline())
         seconds = min(seconds, max(0.0, moment - part.bus.link.now()))
-    waiter.poll(1000 * seconds)
+    if descriptors:
+        with contextlib.suppress(OSError, ValueError):  # closed or lost: `receive` says so
+            wait_any(descriptors, seconds)
+    else:
+        time.sleep(seconds)
     for part in parts:
         if part.holds_turn:
             part.bus.receive(-inf)

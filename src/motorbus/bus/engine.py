@@ -18,7 +18,7 @@ from motorbus.bus import failures
 from motorbus.bus.attempt import Attempt
 from motorbus.bus.echo import Echo
 from motorbus.bus.interlock import Interlock
-from motorbus.bus.jobs import ExclusiveJob, Job, RateJob, RequestJob, Send, Wait
+from motorbus.bus.jobs import ExclusiveJob, Job, RateJob, RequestJob, Send, Since, Wait
 from motorbus.bus.policy import carry_out
 from motorbus.bus.positions import GATED, LastPositions, is_stopped_by, moves
 from motorbus.bus.prepared import Prepared
@@ -171,6 +171,11 @@ class Engine:
             if self.latched and job.request.effect in GATED and job.priority is not Rank.STOP:
                 job.settle(error=failures.latched(self.latched_by))
                 return
+            if job.stops is not None:
+                if moves(job.request) and self.positions.stops_for(job.request) != job.stops:
+                    job.settle(error=failures.stopped())
+                    return
+                job.stops = None  # a later stop ends it in the queue
             if job.priority is Rank.STOP:
                 self._stop_waiting(job.request)
             if job.request.whole is not None and getattr(job.request.course, "engine", None) is not self:
@@ -296,6 +301,23 @@ class Engine:
             return step.until
         dues = step.request.replies
         return self.sync.of(dues[0].node).quiet_until if step.is_probe and dues and dues is not ANY else -inf
+
+    def since(self) -> Since:
+        """What has happened so far, for `check_since`."""
+        return Since(self.positions.stops_so_far(), self.latches, self.losses)
+
+    def check_since(self, request: Exchange[Any], since: Since) -> None:
+        """Raise the error for a motion request that was decided before a stop of its nodes, or a loss of the port."""
+        if not moves(request):
+            return
+        positions, (stops, latches, losses) = self.positions, since
+        stopped = stops[1] != positions.stop_total and (
+            positions.stops_for(request, stops) != positions.stops_for(request)
+        )
+        if stopped or latches != self.latches:
+            raise failures.stopped()
+        if losses != self.losses:
+            raise failures.outlived(request)
 
     def check(self, request: Exchange[Any], job: RequestJob | None = None) -> None:
         """Raise the error for which this request must not leave now. `job`: it has waited in the queue."""

@@ -41,15 +41,16 @@ class Interrupts:
         self._opened = 0
         self._first_at = 0.0
 
-    def install(self) -> None:
-        """Take over the default handlers, until `uninstall` was called as often."""
+    def install(self) -> bool:
+        """Take over the default handlers, until `uninstall` was called as often; False outside the main thread."""
         if current_thread() is not main_thread():
-            return
+            return False
         self._opened += 1
-        for number in SIGNALS if self._opened == 1 else ():
+        for number in SIGNALS:
             if (handler := signal.getsignal(number)) in DEFAULTS:
                 self._replaced[number] = handler
                 signal.signal(number, self._handle)
+        return True
 
     def uninstall(self) -> None:
         """Give the default handlers back when the last bus is closed."""

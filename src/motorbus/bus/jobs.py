@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from typing import Any, NamedTuple, TypeAlias
 
 from motorbus.core.operation import Answer, Exchange, Rank, Tune
+
+
+class Since(NamedTuple):
+    """What had happened on a bus when a caller decided: stops by node and in all, emergency stops, lost ports."""
+
+    stops: tuple[Mapping[int | None, int], int]
+    latches: int
+    losses: int
 
 
 class Send(NamedTuple):

@@ -23,6 +23,8 @@ ENDLESS: Final = ("velocity", "load", "current")
 """Quantities that a device obeys until another order comes."""
 
 Reading = tuple[Exchange[Any], Answer]
+Stops = tuple[Mapping[int | None, int], int]
+"""Number of stops by node (None: for all nodes), and of all."""
 
 
 class LastPositions(Mapping[int, Reading]):
@@ -128,10 +130,15 @@ class LastPositions(Mapping[int, Reading]):
         """Number of stops sent to this node, those for all nodes included."""
         return self._stops.get(node, 0) + self._stops.get(None, 0)
 
-    def stops_for(self, exchange: Exchange[Any]) -> int:
-        """Number of stops sent so far that end this request if it waits."""
+    def stops_for(self, exchange: Exchange[Any], since: Stops | None = None) -> int:
+        """Number of stops that end this request if it waits: those sent so far, or before `since` was taken."""
+        stops, total = since or (self._stops, self.stop_total)
         nodes = addressed(exchange)
-        return sum(map(self.stop_count, nodes)) if nodes else self.stop_total
+        return sum(stops.get(node, 0) + stops.get(None, 0) for node in nodes) if nodes else total
+
+    def stops_so_far(self) -> Stops:
+        """The stops sent so far, for `stops_for`."""
+        return dict(self._stops), self.stop_total
 
     def frames(self, now: float) -> Stop:
         """Requests that stop all known nodes; without positions where the family fails to use them."""

@@ -8,8 +8,8 @@ from typing import Any, Final, Generic, TypeVar
 
 from motorbus.bus import failures
 from motorbus.bus.engine import Engine
-from motorbus.bus.jobs import ExclusiveJob, Job, RateJob, RequestJob
-from motorbus.bus.positions import GATED
+from motorbus.bus.jobs import ExclusiveJob, Job, RateJob, RequestJob, Since
+from motorbus.bus.positions import GATED, Stops
 from motorbus.core.operation import (
     Alone,
     Closed,
@@ -72,7 +72,7 @@ class Task:
 
 
 class TaskTree(Generic[T]):
-    """Runs one procedure on the engine of one bus. `report` gets its events.
+    """Runs one procedure on the engine of one bus. `report` gets its events; it was called at `since`, else now.
 
     `settled` is called when something it waits for has ended, so that `advance` has something to do.
     """
@@ -85,13 +85,15 @@ class TaskTree(Generic[T]):
         now: Callable[[], float],
         report: Notify | None = None,
         settled: Callable[[], None] | None = None,
+        since: Since | None = None,
     ) -> None:
         self.engine = engine
         self.now = now
         self.report = report
         self.settled = settled
-        self.losses = engine.losses
-        self.latches = engine.latches
+        stops, self.latches, self.losses = since or engine.since()
+        self.stops: Stops | None = stops
+        """Before the first request of this procedure that moves or stops something."""
         self.cancellation: BaseException | None = None
         self.interruption: BaseException | None = None
         """Raised by one of several children, and no Exception: it cancels the others."""
@@ -264,6 +266,9 @@ class TaskTree(Generic[T]):
             return
         task.job = job = RequestJob(request, task.owner, self.settled, self.losses)
         job.latches = self.latches
+        if request.effect in GATED:
+            job.stops = self.engine.positions.stops_for(request, self.stops)
+            self.stops = None
         if self.now() >= self.deadline:
             job.settle(error=failures.abandoned())
         else:

@@ -59,7 +59,9 @@ class Turn:
         self.release()
 
     def release(self) -> None:
-        """Give it back, as often as it was taken."""
+        """Give it back, as often as it was taken; a thread that does not have it changes nothing."""
+        if self._owner != get_ident():
+            return
         self._depth -= 1
         if self._depth:
             return
@@ -76,10 +78,21 @@ class Turn:
         with self._guard:
             heappush(self._waiters, waiter)
             self._pass_on()
-        if bell.acquire(timeout=timeout):
-            return True
+        try:
+            if bell.acquire(timeout=timeout):
+                return True
+        except BaseException:  # a signal handler has raised
+            if self._withdraw(waiter):
+                self._lock.release()
+                with self._guard:
+                    self._pass_on()
+            raise
+        return self._withdraw(waiter)
+
+    def _withdraw(self, waiter: _Waiter) -> bool:
+        """Wait no more; True when the turn was given at the last moment."""
         with self._guard:
-            if waiter not in self._waiters:  # it was given at the last moment
+            if waiter not in self._waiters:
                 return True
             self._waiters.remove(waiter)
             heapify(self._waiters)

@@ -1,6 +1,7 @@
 """Where the buses of one movement wait for each other: to agree how long it takes, and on the moment it starts.
 
-A procedure on one bus cannot wait for one on another bus by a request. So both look here every few milliseconds. What they agree on is a moment to come, so how often they look decides nothing.
+A procedure on one bus cannot wait for one on another bus by a request. So both look here every few milliseconds. What
+they agree on is a moment to come, so how often they look decides nothing.
 """
 
 from __future__ import annotations
