@@ -1,0 +1,167 @@
+"""Buses that several threads, signals and event loops use: no call blocks for ever, and no stop is overtaken."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from typing import Any
+
+import pytest
+
+import motorbus
+from motorbus import feetech
+from motorbus.bus.blocking import exchange_on, run_on
+from motorbus.core.operation import Operation, Pause
+from motorbus.errors import Interrupted, LinkLost
+from tests.bus.test_batches import Arm
+
+LIMIT = 20.0
+"""s after which a call counts as blocked."""
+
+
+@pytest.fixture
+def arms() -> Iterator[list[Arm]]:
+    with ExitStack() as made:
+        yield [Arm(made, "real"), Arm(made, "real")]
+
+
+def started(work: Callable[[], object]) -> threading.Thread:
+    thread = threading.Thread(target=work, daemon=True)
+    thread.start()
+    return thread
+
+
+def reading(arm: Arm, times: int, pause: float = 0.0) -> Operation[None]:
+    for _ in range(times):
+        yield from arm.batch()[1]
+        yield Pause(pause)
+
+
+@pytest.mark.parametrize("kind", ["exchange", "run"])
+def test_threads_that_use_two_buses_in_any_order_do_not_block_each_other(arms: list[Arm], kind: str) -> None:
+    def work(order: list[Arm]) -> None:
+        for _ in range(30):
+            if kind == "exchange":
+                exchange_on({arm.bus: arm.batch() for arm in order})
+            else:
+                run_on({arm.bus: reading(arm, 3) for arm in order})
+
+    threads = [started(lambda order=order: work(order)) for order in (arms, arms[::-1])]  # type: ignore[misc]
+    for thread in threads:
+        thread.join(LIMIT)
+        assert not thread.is_alive()
+
+
+def test_a_bus_whose_procedure_has_ended_is_free_while_others_run(arms: list[Arm]) -> None:
+    first, second = arms
+    work = started(lambda: run_on({first.bus: reading(first, 1), second.bus: reading(second, 10, 0.2)}))
+    time.sleep(0.2)
+    begun = time.monotonic()
+    assert first.bus.estop().acknowledged == (1, 2, 3)
+    assert time.monotonic() - begun < 1.0
+    assert work.is_alive()
+    work.join(LIMIT)
+
+
+@pytest.mark.parametrize("kind", ["run", "exchange", "procedure"])
+def test_an_order_that_waited_for_the_bus_does_not_leave_after_a_torque_off(
+    arms: list[Arm], kind: str
+) -> None:
+    arm, errors = arms[0], []
+    order, read = arm.batch(1.0)
+    calls: dict[str, Callable[[], object]] = {
+        "run": lambda: arm.bus.run(order),
+        "exchange": lambda: arm.bus.exchange([order, read]),
+        "procedure": lambda: arm.bus.run(iter(order)),
+    }
+
+    def call() -> None:
+        try:
+            calls[kind]()
+        except Interrupted as error:
+            errors.append(error)
+
+    arm.bus.exchange(arm.batch(3.0))
+    with arm.bus.lock:
+        waiting = started(call)
+        time.sleep(0.1)
+        for node in (1, 2, 3):
+            feetech.Servo(arm.bus, node).disable_torque()
+    waiting.join(LIMIT)
+    assert len(errors) == 1
+    assert arm.sim[1].memory["torque_enable"] == 0
+
+
+@pytest.mark.parametrize("kind", ["run", "exchange"])
+def test_a_handler_that_raises_while_a_call_waits_for_the_bus_loses_nothing(
+    arms: list[Arm], kind: str
+) -> None:
+    arm, held, values = arms[0], threading.Event(), []
+    servo = feetech.Servo(arm.bus, 1)
+
+    def hold() -> None:
+        with arm.bus.lock:
+            held.set()
+            time.sleep(0.5)
+
+    def strike(number: int, frame: object) -> None:
+        raise TimeoutError
+
+    before = signal.signal(signal.SIGALRM, strike)
+    try:
+        holder = started(hold)
+        assert held.wait(LIMIT)
+        signal.setitimer(signal.ITIMER_REAL, 0.1)
+        with pytest.raises(TimeoutError):
+            servo.position() if kind == "run" else arm.bus.exchange(arm.batch())
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    holder.join(LIMIT)
+    other = started(lambda: values.append(servo.position()))
+    other.join(LIMIT)
+    assert len(values) == 1
+
+
+@pytest.mark.parametrize("where", ["request", "pause"])
+def test_a_second_signal_does_not_take_the_clean_up_away(arms: list[Arm], where: str) -> None:
+    arm, cleaned = arms[0], []
+
+    def work() -> Operation[None]:
+        try:
+            if where == "request":
+                yield from arm.batch()[1]
+                signal.raise_signal(signal.SIGINT)
+            while True:
+                yield Pause(0.5)
+        finally:
+            signal.raise_signal(signal.SIGINT)
+            yield from arm.batch()[1]
+            cleaned.append(True)
+
+    if where == "pause":
+        threading.Timer(0.2, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        arm.bus.run(work())
+    assert cleaned
+
+
+@pytest.mark.parametrize("call", ["position", "telemetry"])
+def test_closing_an_asyncio_bus_ends_the_calls_that_wait(call: str) -> None:
+    async def main() -> None:
+        with motorbus.simulate("feetech", clock="real") as sim:
+            async with motorbus.open_async(sim.url) as bus:
+                servo: Any = feetech.AsyncServo(bus, 1)
+                for _ in range(3):
+                    await servo.position()
+                sim.faults = "100%: delay 0.3"
+                task = asyncio.create_task(getattr(servo, call)())
+                await asyncio.sleep(0.003)
+            with pytest.raises(LinkLost, match="closed"):
+                await asyncio.wait_for(task, LIMIT)
+
+    asyncio.run(main())
