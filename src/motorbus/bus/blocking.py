@@ -318,7 +318,7 @@ class _Part(Generic[T]):
         self.bus = bus
         self.news = True
         self.sleeps = False
-        self.holds_turn = False
+        self.holds_turn = self.blocked = False
         self.cancellations: list[BaseException] = []
         self.tree: TaskTree[T] = TaskTree(
             bus.engine,
@@ -352,7 +352,8 @@ class _Part(Generic[T]):
         """Step the tree and send; True when it has ended. Does nothing if the turn is not free within `timeout` s."""
         if self.tree.root.finished:
             return True
-        if not self.take_turn(timeout):
+        self.blocked = not self.take_turn(timeout)
+        if self.blocked:
             return False
         while self.cancellations:
             self.tree.cancel(self.cancellations.pop(0))
@@ -447,9 +448,9 @@ def _poll(parts: Sequence[_Part[Any]]) -> None:
     descriptors, seconds = [], IDLE
     for part in parts:
         descriptor = part.bus.link.fileno()
-        if descriptor is None or not part.holds_turn:
+        if part.blocked or (part.holds_turn and descriptor is None):
             seconds = min(seconds, LOOK)
-        else:
+        elif part.holds_turn and descriptor is not None:
             descriptors.append(descriptor)
         moment = min(part.tree.next_moment(), part.bus.engine.next_deadline())
         seconds = min(seconds, max(0.0, moment - part.bus.link.now()))
