@@ -393,7 +393,7 @@ def _run_parts(parts: Sequence[_Part[Any]]) -> None:
     try:
         while True:
             try:
-                going = [part for part in parts if not part.advance(_patience(part, parts))]
+                going = [part for part in parts if not part.advance(_turn_timeout(part, parts))]
                 if not going:
                     return
                 for part in parts:
@@ -424,7 +424,7 @@ def _run_parts(parts: Sequence[_Part[Any]]) -> None:
                 part.bus.turn.release()
 
 
-def _patience(part: _Part[Any], parts: Sequence[_Part[Any]]) -> float:
+def _turn_timeout(part: _Part[Any], parts: Sequence[_Part[Any]]) -> float:
     """s to wait for the turn of a bus: without limit only while this thread has no other, so threads never block."""
     others = any(other.holds_turn for other in parts if other is not part)
     return BRIEF if others else -1.0

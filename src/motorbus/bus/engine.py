@@ -308,9 +308,10 @@ class Engine:
 
     def check_since(self, request: Exchange[Any], since: Since) -> None:
         """Raise the error for a motion request that was decided before a stop of its nodes, or a loss of the port."""
-        if not moves(request):
-            return
         positions, (stops, latches, losses) = self.positions, since
+        unchanged = stops[1] == positions.stop_total and latches == self.latches and losses == self.losses
+        if unchanged or not moves(request):
+            return
         stopped = stops[1] != positions.stop_total and (
             positions.stops_for(request, stops) != positions.stops_for(request)
         )

@@ -109,8 +109,9 @@ class LastPositions(Mapping[int, Reading]):
         ordered = exchange.ordered
         if exchange.rank is Rank.STOP:
             if exchange.effect in GATED:
-                self._stops.update(addressed(exchange) or (None,))
-                self.stop_total += 1
+                stops = self._stops.copy()  # `stops_so_far` gives the old one out
+                stops.update(addressed(exchange) or (None,))
+                self._stops, self.stop_total = stops, self.stop_total + 1
             return
         if ordered:
             self.add(ordered)
@@ -138,7 +139,7 @@ class LastPositions(Mapping[int, Reading]):
 
     def stops_so_far(self) -> Stops:
         """The stops sent so far, for `stops_for`."""
-        return dict(self._stops), self.stop_total
+        return self._stops, self.stop_total
 
     def frames(self, now: float) -> Stop:
         """Requests that stop all known nodes; without positions where the family fails to use them."""
