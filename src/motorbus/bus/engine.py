@@ -284,7 +284,7 @@ class Engine:
         self._remove(job)
         try:
             if step.is_probe:
-                self._check_speaks(request)
+                self._check_not_listening(request)
             else:
                 self.check(request, job)
         except MotorbusError as error:
@@ -322,16 +322,13 @@ class Engine:
 
     def check(self, request: Exchange[Any], job: RequestJob | None = None) -> None:
         """Raise the error for which this request must not leave now. `job`: it has waited in the queue."""
-        if self.listening:
-            raise failures.listen_only(request)
+        self._check_not_listening(request)
         if request.rank is Rank.STOP:
             return
         gated = request.effect in GATED
         if gated and self.latched:
             raise failures.latched(self.latched_by)
         if job is not None and moves(request):
-            if job.stops is not None and self.positions.stops_for(request) != job.stops:
-                raise failures.stopped()
             if job.latches is not None and job.latches != self.latches:
                 raise failures.stopped()
             if self.losses != job.losses:
@@ -343,7 +340,7 @@ class Engine:
                 raise error
             self.interlock.check(request, self.time)
 
-    def _check_speaks(self, request: Exchange[Any]) -> None:
+    def _check_not_listening(self, request: Exchange[Any]) -> None:
         if self.listening:
             raise failures.listen_only(request)
 

@@ -12,7 +12,7 @@ LOG = logging.getLogger("motorbus.session")
 
 
 def echo_test(bus: BaseBus) -> Exchange[Any] | None:
-    """What shows an echo, to be sent next; None where the family needs none. The warnings of the bus are told."""
+    """Log the warnings of the bus; return the request that shows an echo, None where the family needs none."""
     for warning in bus.warnings:
         LOG.warning("%s: %s", bus.link.name, warning)
     test = bus.family.echo_test()
