@@ -77,7 +77,7 @@ class AsyncBus(BaseBus):
         def settle() -> None:
             loop.call_soon_threadsafe(_complete, future, job)
 
-        job = RequestJob(request, settled=settle, losses=self.engine.losses)
+        job = RequestJob(request, settled=settle)
         return job
 
     def send(self) -> None:

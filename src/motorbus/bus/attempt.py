@@ -20,10 +20,11 @@ class Attempt:
     `job` is None for an attempt whose caller no longer waits. `excluded` are nodes of a group that this attempt does
     not wait for, or whose reply was damaged. `fault` is why the attempt failed, "" while it has not. `air` is its time
     on the wire, `competitors` the number of attempts on other lanes that its deadline allows for.
-    `ended`: it is not in flight any more.
+    `accepted` is what the caller gets. `ended`: it is not in flight any more.
     """
 
     __slots__ = (
+        "accepted",
         "air",
         "competitors",
         "complete",
@@ -63,6 +64,7 @@ class Attempt:
         self.surplus = False
         self.echo_excluded = False
         self.complete = False
+        self.accepted: Answer | None = None
         self.ended = False
 
     def take(self, reply: Reply) -> bool:

@@ -15,16 +15,15 @@ from motorbus.bus.engine import Engine
 from motorbus.bus.interlock import Interlock
 from motorbus.bus.jobs import RateJob, RequestJob, Since
 from motorbus.bus.policy import carry_out
-from motorbus.bus.positions import GATED, Reading
+from motorbus.bus.positions import Reading
 from motorbus.bus.prepared import Prepared
-from motorbus.bus.statistics import Statistics
 from motorbus.bus.stop import EmergencyStop
 from motorbus.bus.stop_socket import StopOutcome, asked_by
 from motorbus.bus.tasks import Notify, TaskTree
-from motorbus.bus.trace import Feed, TraceRecord
+from motorbus.bus.trace import TraceRecord
 from motorbus.bus.turn import Turn
 from motorbus.core.family import Family, Readdressed
-from motorbus.core.operation import UNLIKE, Data, Exchange, Journal, Notice, Runnable
+from motorbus.core.operation import UNLIKE, Data, Exchange, Journal, Runnable
 from motorbus.errors import LinkError, LinkLost, MotorbusError, RequestError
 from motorbus.link.base import Link, Renewable
 from motorbus.link.memory import MemoryLink
@@ -65,12 +64,22 @@ class BaseBus:
             listen_only=bool(getattr(link, "listen_only", False)),
         )
         self.engine.diagnosis = getattr(link, "trouble", str)
-        self.turn = Turn()
+        self.statistics = self.engine.statistics
+        self.trace = self.engine.trace
+        """Subscribe to every request and delivery."""
+        self.notices = self.engine.notices
+        """Subscribe to what devices send without a request."""
+        self.positions: Mapping[int, Reading] = self.engine.positions
+        """The last request that read a position and its reply, by node."""
+        self.lock = self.turn = Turn()
+        """Held while a request is in flight, or the state of this bus is read or changed as a whole."""
         self.settled = Condition()
         """Notified when something ends that a sleeping thread waits for."""
         self.stopper = EmergencyStop(self, stop_socket)
-        self.interlock = interlock
-        self._reconnects = isinstance(link, Renewable)
+        self.engine.interlock = interlock
+        self.engine.before_motion = self._start_stopper
+        self.reconnects = isinstance(link, Renewable)
+        """A lost port is opened again by the next request. May be set to False only."""
         self._on_reconnect: list[Callable[[], None]] = []
         self.background: list[TaskTree[Any]] = []
         """Procedures that are stepped whenever the bus is used; see `BackgroundTask`."""
@@ -80,12 +89,16 @@ class BaseBus:
     @property
     def interlock(self) -> Interlock | None:
         """What judges motion requests."""
-        return self._interlock
+        return self.engine.interlock
 
     @interlock.setter
     def interlock(self, interlock: Interlock | None) -> None:
-        self._interlock = interlock
-        self.engine.interlock = None if interlock is None else _Arming(self, interlock)
+        self.engine.interlock = interlock
+
+    def _start_stopper(self) -> None:
+        """A motion request is about to leave: from now on a thread can stop it."""
+        self.stopper.start()
+        self.engine.before_motion = None
 
     def now(self) -> float:
         """s on the clock of the link."""
@@ -148,7 +161,7 @@ class BaseBus:
 
     def _lost(self, error: LinkError) -> None:
         if isinstance(error, LinkLost):
-            error = failures.reconnecting(error) if self._reconnects else failures.final(error)
+            error = failures.reconnecting(error) if self.reconnects else failures.final(error)
         self.engine.lost(error)
 
     def _set_rate(self, job: RateJob) -> None:
@@ -165,7 +178,7 @@ class BaseBus:
     def _reconnect(self) -> bool:
         """Open the lost port again if it is there; False when it is not, and every request has failed."""
         link, engine = self.link, self.engine
-        if not self._reconnects or not isinstance(link, Renewable):
+        if not self.reconnects or not isinstance(link, Renewable):
             engine.lost(engine.gone or LinkLost("the port is gone"))
             return False
         try:
@@ -182,15 +195,8 @@ class BaseBus:
         return True
 
     def _wait_without_link(self, until: float) -> None:
-        if isinstance(self.link, Renewable) and self._reconnects:
+        if isinstance(self.link, Renewable) and self.reconnects:
             self.link.rest(min(until, self.link.now() + IDLE))
-
-    def job_for(self, request: Exchange[Any]) -> RequestJob:
-        """A job that a stop or a lost port from now on refuses, if the request moves something."""
-        job = RequestJob(request, losses=self.engine.losses)
-        if request.effect in GATED:
-            job.stops, job.latches = self.engine.positions.stops_for(request), self.engine.latches
-        return job
 
     # -- prepared requests -------------------------------------------------------------------------------------
 
@@ -207,7 +213,7 @@ class BaseBus:
             prepared = prepared.alternate
         if engine.sync.out_of_sync and not engine.sync.out_of_sync.isdisjoint(prepared.nodes):
             return None
-        if prepared.timing != engine.timing:
+        if prepared.rate != engine.rate or prepared.latency != engine.latency:
             engine.measure(prepared)
         if stale := link.read(-inf):  # it cannot answer what has not left
             engine.feed(stale, link.now())
@@ -238,8 +244,7 @@ class BaseBus:
         """Check and count an order that leaves with the next request; its data."""
         engine = self.engine
         engine.time = now
-        engine.check_since(order, since)
-        engine.check(order)
+        engine.check(order, since)
         engine.positions.sent(order)
         engine.statistics.other["sent"] += 1
         engine.free_at = now + engine.air_time(order)
@@ -291,21 +296,6 @@ class BaseBus:
         return deliver
 
     @property
-    def statistics(self) -> Statistics:
-        """Counts and latencies per node."""
-        return self.engine.statistics
-
-    @property
-    def trace(self) -> Feed[TraceRecord]:
-        """Subscribe to every request and delivery."""
-        return self.engine.trace
-
-    @property
-    def notices(self) -> Feed[Notice]:
-        """Subscribe to what devices send without a request."""
-        return self.engine.notices
-
-    @property
     def simulated(self) -> bool:
         """There is no real device behind this bus."""
         return self.link.simulated
@@ -324,16 +314,6 @@ class BaseBus:
     def latency(self, seconds: float) -> None:
         self.engine.latency = seconds
 
-    @property
-    def lock(self) -> Turn:
-        """Held while the state of this bus is read or changed as a whole. Keep it for microseconds only."""
-        return self.turn
-
-    @property
-    def positions(self) -> Mapping[int, Reading]:
-        """The last request that read a position and its reply, by node."""
-        return self.engine.positions
-
     def stop_count(self, node: int | None = None) -> int:
         """Number of stops sent to this node, those for all nodes included; None: of all stops sent on this bus."""
         positions = self.engine.positions
@@ -344,24 +324,13 @@ class BaseBus:
         """Number of times the port was lost."""
         return self.engine.losses
 
-    @property
-    def reconnects(self) -> bool:
-        """A lost port is opened again by the next request. Can be set to False only."""
-        return self._reconnects
-
-    @reconnects.setter
-    def reconnects(self, wanted: bool) -> None:
-        if wanted:
-            raise RequestError("a bus cannot begin to reconnect", advice="open it with reconnect=yes")
-        self._reconnects = False
-
     def on_reconnect(self, function: Callable[[], None]) -> None:
         """Call this function each time the lost port was opened again, before anything is sent."""
         self._on_reconnect.append(function)
 
     def required_reads(self, request: Exchange[Any]) -> Sequence[Runnable[Any]]:
         """The reads that the interlock needs before it can check this request."""
-        return () if self._interlock is None else self._interlock.required_reads(request)
+        return () if self.interlock is None else self.interlock.required_reads(request)
 
     def attach(self, gate: Any) -> None:
         """Let the gate see positions and stops of this bus, and ask it which reads a request requires first."""
@@ -418,7 +387,7 @@ class BaseBus:
     def _hang_up(self) -> None:
         """End the stop thread, then give the port back."""
         self.stopper.close()
-        self._reconnects = False
+        self.reconnects = False
         self.link.close()
 
 
@@ -431,18 +400,3 @@ def check_clocks(buses: Iterable[BaseBus]) -> None:
             cause="virtual time passes only while a program waits on simulated buses",
             advice='simulate with clock="real"; nothing was sent',
         )
-
-
-class _Arming:
-    """Starts the stop thread before the first request that passes the interlock leaves."""
-
-    def __init__(self, bus: BaseBus, interlock: Interlock) -> None:
-        self._bus = bus
-        self._interlock = interlock
-        self.required_reads = interlock.required_reads
-        self.stopped = interlock.stopped
-
-    def check(self, request: Exchange[Any], now: float) -> None:
-        self._interlock.check(request, now)
-        self._bus.stopper.start()
-        self._bus.engine.interlock = self._interlock

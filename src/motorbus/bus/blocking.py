@@ -51,7 +51,7 @@ class Bus(BaseBus):
         if self.link.virtual:
             self.check_thread()
         signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
-        waiting = self.job_for(request) if request.effect else None
+        since = self.engine.since() if request.effect else None
         signals.depth += 1
         try:
             turn.acquire(request.rank)
@@ -59,7 +59,7 @@ class Bus(BaseBus):
                 prepared = self.prepare(request)
                 if prepared is not None:
                     return self._receive(prepared, self.write(prepared))
-                job = waiting or RequestJob(request, losses=self.engine.losses)
+                job = RequestJob(request, since=since)
                 self.engine.submit(job, self.link.now())
                 return self._finish(job)
             except LinkError as error:
@@ -78,7 +78,7 @@ class Bus(BaseBus):
         value = self.accept(prepared, chunks, attempt.deadline)
         if value is not UNLIKE:
             return value
-        job = RequestJob(prepared.exchange, losses=self.engine.losses)
+        job = RequestJob(prepared.exchange)
         self.adopt(prepared, chunks, job)
         return self._finish(job)
 
@@ -154,9 +154,7 @@ class Bus(BaseBus):
         """This order may leave in one write with the next request."""
         if order.replies != ():
             return False
-        return (
-            order.effect not in GATED or self._interlock is None or not self._interlock.required_reads(order)
-        )
+        return order.effect not in GATED or self.interlock is None or not self.interlock.required_reads(order)
 
     def _needs_reads(self, request: Exchange[Any]) -> bool:
         return request.effect in GATED and bool(self.required_reads(request))

@@ -20,8 +20,8 @@ from motorbus.bus.echo import Echo
 from motorbus.bus.interlock import Interlock
 from motorbus.bus.jobs import ExclusiveJob, Job, RateJob, RequestJob, Send, Since, Wait
 from motorbus.bus.policy import carry_out
-from motorbus.bus.positions import GATED, LastPositions, is_stopped_by, moves
-from motorbus.bus.prepared import Prepared
+from motorbus.bus.positions import GATED, LastPositions, moves
+from motorbus.bus.prepared import Prepared, nodes_of
 from motorbus.bus.statistics import Statistics
 from motorbus.bus.sync import SyncTable
 from motorbus.bus.trace import Feed, TraceRecord
@@ -51,8 +51,6 @@ DIRECT: Final = 0.001
 """s; a link of less latency has no adapter that holds data back."""
 STOP_DELAY: Final = 0.003
 """s that a stop waits for the turn beyond the air time of what is in flight."""
-UNCOUNTED: Final = 64
-"""Prepared requests with replies that are not yet in the statistics."""
 
 
 class Engine:
@@ -75,11 +73,13 @@ class Engine:
         self.window = family.link.window
         self.paced = paced
         self.interlock = interlock
+        self.before_motion: Callable[[], None] | None = None
+        """Called before the first request leaves that the interlock has passed."""
         self.always_listening = self.listening = listen_only
         self.diagnosis: Callable[[], str] = str
         self.trace: Feed[TraceRecord] = Feed()
         self.notices: Feed[Notice] = Feed()
-        self.statistics = Statistics(self.count_prepared)
+        self.statistics = Statistics()
         self.sync = SyncTable(family)
         self.echo = Echo()
         self.receiver = family.receiver()
@@ -97,53 +97,34 @@ class Engine:
         self.loss: LinkLost | None = None
         """The last one; `gone` is None again when the port is back."""
         self.free_at = self.time = 0.0
-        self.timing = 0
-        self._rate, self._latency = rate, latency
+        self.rate = rate
+        """bit/s"""
+        self.latency = latency
+        """s that the adapter may hold data back; part of every deadline."""
         self._serial = count()
         self._unacknowledged: list[Attempt] = []
-        self._uncounted: list[Prepared] = []
         self.ready = False
         self.last: Prepared | None = None
         """The prepared request that was carried out last, if nothing else happened since."""
 
     @property
-    def rate(self) -> int:
-        """Bit rate (bit/s)."""
-        return self._rate
-
-    @rate.setter
-    def rate(self, rate: int) -> None:
-        self._rate = rate
-        self.timing += 1
-
-    @property
-    def latency(self) -> float:
-        """s that the adapter may hold data back; part of every deadline."""
-        return self._latency
-
-    @latency.setter
-    def latency(self, seconds: float) -> None:
-        self._latency = seconds
-        self.timing += 1
-
-    @property
     def quiet_time(self) -> float:
         """s of silence before a node out of sync is probed."""
-        return self.family.quiet_time(self._rate)
+        return self.family.quiet_time(self.rate)
 
     def air_time(self, request: Exchange[Any]) -> float:
         """s on the wire of this request and its replies."""
-        return self.family.air_time(request, self._rate)
+        return self.family.air_time(request, self.rate)
 
     def reply_timeout(self, request: Exchange[Any]) -> float:
         """s from the end of the air time to the deadline.
 
         A scan waits for what adapters hold back; where there is none, only as long as a device needs.
         """
-        if request.timeout is Timeout.SCAN and self._latency < DIRECT:
+        if request.timeout is Timeout.SCAN and self.latency < DIRECT:
             plain: Exchange[Answer] = Exchange(request.request, request.replies)
-            return min(self.family.turnaround(plain), self.family.turnaround(request)) + self._latency
-        return self.family.turnaround(request) + self._latency + MARGIN[request.timeout]
+            return min(self.family.turnaround(plain), self.family.turnaround(request)) + self.latency
+        return self.family.turnaround(request) + self.latency + MARGIN[request.timeout]
 
     @property
     def idle(self) -> bool:
@@ -168,16 +149,13 @@ class Engine:
         self.note_last()
         job.serial = next(self._serial)
         if isinstance(job, RequestJob):
-            if self.latched and job.request.effect in GATED and job.priority is not Rank.STOP:
-                job.settle(error=failures.latched(self.latched_by))
+            try:
+                self._check_stops(job.request, job.since)
+            except MotorbusError as error:
+                job.settle(error=error)
                 return
-            if job.stops is not None:
-                if moves(job.request) and self.positions.stops_for(job.request) != job.stops:
-                    job.settle(error=failures.stopped())
-                    return
-                job.stops = None  # a later stop ends it in the queue
             if job.priority is Rank.STOP:
-                self._stop_waiting(job.request)
+                self.positions.sent(job.request)
             if job.request.whole is not None and getattr(job.request.course, "engine", None) is not self:
                 job.request.course = self.prepare(job.request)
             job.policy = carry_out(self, job.request)
@@ -286,7 +264,7 @@ class Engine:
             if step.is_probe:
                 self._check_not_listening(request)
             else:
-                self.check(request, job)
+                self.check(request, job.since)
         except MotorbusError as error:
             job.settle(error=error)
             return None
@@ -303,42 +281,35 @@ class Engine:
         return self.sync.of(dues[0].node).quiet_until if step.is_probe and dues and dues is not ANY else -inf
 
     def since(self) -> Since:
-        """What has happened so far, for `check_since`."""
-        return Since(self.positions.stops_so_far(), self.latches, self.losses)
+        """What has happened so far, for `check`."""
+        return Since(self.positions.stops, self.latches, self.losses)
 
-    def check_since(self, request: Exchange[Any], since: Since) -> None:
-        """Raise the error for a motion request that was decided before a stop of its nodes, or a loss of the port."""
-        positions, (stops, latches, losses) = self.positions, since
-        unchanged = stops[1] == positions.stop_total and latches == self.latches and losses == self.losses
-        if unchanged or not moves(request):
-            return
-        stopped = stops[1] != positions.stop_total and (
-            positions.stops_for(request, stops) != positions.stops_for(request)
-        )
-        if stopped or latches != self.latches:
-            raise failures.stopped()
-        if losses != self.losses:
-            raise failures.outlived(request)
-
-    def check(self, request: Exchange[Any], job: RequestJob | None = None) -> None:
-        """Raise the error for which this request must not leave now. `job`: it has waited in the queue."""
+    def check(self, request: Exchange[Any], since: Since | None) -> None:
+        """Raise the error for which this request, which was decided at `since`, must not leave now."""
         self._check_not_listening(request)
         if request.rank is Rank.STOP:
             return
-        gated = request.effect in GATED
-        if gated and self.latched:
-            raise failures.latched(self.latched_by)
-        if job is not None and moves(request):
-            if job.latches is not None and job.latches != self.latches:
-                raise failures.stopped()
-            if self.losses != job.losses:
-                raise failures.outlived(request)
-        if gated or (request.later is not None and self.interlock is not None):
+        self._check_stops(request, since)
+        if request.effect in GATED or (request.later is not None and self.interlock is not None):
             if self.interlock is None:
                 raise failures.no_interlock(request)
             if request.refusal is not None and (error := request.refusal(self.positions.stop_count)):
                 raise error
             self.interlock.check(request, self.time)
+            if self.before_motion is not None:
+                self.before_motion()
+
+    def _check_stops(self, request: Exchange[Any], since: Since | None) -> None:
+        """Raise the error for a motion request while a stop is latched, or that a stop or a lost port has outdated."""
+        if request.effect not in GATED or request.rank is Rank.STOP:
+            return
+        if self.latched:
+            raise failures.latched(self.latched_by)
+        if since is not None and moves(request):
+            if since.latches != self.latches or self.positions.is_stopped(request, since.stops):
+                raise failures.stopped()
+            if since.losses != self.losses:
+                raise failures.outlived(request)
 
     def _check_not_listening(self, request: Exchange[Any]) -> None:
         if self.listening:
@@ -360,7 +331,7 @@ class Engine:
         else:
             self.free_at = start + air
             self._unacknowledged.append(attempt)
-        if request.effect or request.goals:
+        if (request.effect or request.goals) and request.rank is not Rank.STOP:
             self.positions.sent(request)
         if isinstance(request.request, bytes):
             self.echo.sent(request.request, attempt.is_probe or request is self.echo.test)
@@ -395,13 +366,6 @@ class Engine:
             if other.competitors < self.window - 1 and other.job is not None:
                 other.deadline += air
                 other.competitors += 1
-
-    def _stop_waiting(self, stop: Exchange[Any]) -> None:
-        """A stop is queued: requests that would move its nodes end, also one in flight that may be repeated."""
-        jobs = [*self.queue, *(attempt.job for attempt in self.in_flight.values())]
-        for job in jobs:
-            if isinstance(job, RequestJob) and is_stopped_by(stop, job.request):
-                self.cancel(job, failures.stopped())
 
     def rate_changed(self, job: RateJob, error: MotorbusError | None = None) -> None:
         """The link has the new rate, or has refused it."""
@@ -581,6 +545,7 @@ class Engine:
             self._fail(lane, attempt, now)
             return
         del self.in_flight[lane]
+        attempt.accepted = answer
         self._end_echo_test(attempt)
         if dues is ANY:
             if lane == EVERY_LANE:  # a node that obeyed an order to all must be stopped, too
@@ -638,26 +603,30 @@ class Engine:
 
     def prepare(self, request: Exchange[Any]) -> Prepared | None:
         """Prepare a request that is repeated; None where only the general path can carry it out."""
-        dues = request.replies
-        if request.whole is None or request.rank is Rank.STOP or request.effect or not dues or dues is ANY:
+        if request.whole is None or request.rank is Rank.STOP or request.effect or not request.replies:
             return None
-        for due in dues:
-            self.sync.of(due.node)
-        prepared = Prepared(self, request, request.whole, self.sync.nodes)
-        if request.other is not None:
-            other = request.other()
-            if other.whole is None:
+        prepared = self._prepare(request)
+        if request.other is not None and prepared is not None:
+            alternate = self._prepare(request.other())
+            if alternate is None:
                 return None
-            prepared.alternate = Prepared(self, other, other.whole, self.sync.nodes)
-            prepared.alternate.alternate = prepared.alternate.record = prepared
+            prepared.alternate = alternate
+            alternate.alternate = alternate.record = prepared
         request.course = prepared
         return prepared
+
+    def _prepare(self, request: Exchange[Any]) -> Prepared | None:
+        if request.whole is None or request.replies is ANY:
+            return None
+        nodes = nodes_of(request)
+        states = {node: self.sync.of(node) for node in nodes}
+        return Prepared(self, request, request.whole, states, self.statistics.group(nodes))
 
     def measure(self, prepared: Prepared) -> None:
         """Compute the time budget of a prepared request for the present rate and latency."""
         request = prepared.exchange
         prepared.budget = self.air_time(request) + self.reply_timeout(request)
-        prepared.timing = self.timing
+        prepared.rate, prepared.latency = self.rate, self.latency
 
     def accepted(self, prepared: Prepared, data: Data, at: float) -> None:
         """This is the complete reply to a prepared request that was sent alone."""
@@ -666,12 +635,9 @@ class Engine:
             self.note_last(record)
         if single is not None:
             single.length, single.asked_at = prepared.length, sent_at
-        record.latency[int(1e6 * (at - sent_at)).bit_length()] += 1
+        prepared.times[int(1e6 * (at - sent_at)).bit_length()] += 1
         record.data, record.at, record.source, record.kept = data, at, prepared, None
         record.orders = self.positions.orders
-        if not record.counted:
-            record.counted = True
-            self.count_later(record)
         del self.in_flight[prepared.lane]
 
     def note_last(self, record: Prepared | None = None) -> None:
@@ -681,21 +647,7 @@ class Engine:
             for state in last.states:
                 state.length, state.asked_at = last.source.length, last.source.attempt.sent_at
         if record is not None and record.tells_position:
-            self.positions.prepared.update(dict.fromkeys(record.nodes, record))
-
-    def count_later(self, prepared: Prepared) -> None:
-        """This prepared request has replies that are not in the statistics."""
-        if len(self._uncounted) >= UNCOUNTED:
-            self.count_prepared()
-        self._uncounted.append(prepared)
-
-    def count_prepared(self) -> None:
-        """Add the replies of prepared requests to the statistics."""
-        uncounted, self._uncounted = self._uncounted, []
-        for prepared in uncounted:
-            self.statistics.add(prepared.nodes, prepared.latency)
-            prepared.latency = [0] * len(prepared.latency)
-            prepared.counted = False
+            self.positions.latest.update(dict.fromkeys(record.nodes, record))
 
     # -- time, loss, stop --------------------------------------------------------------------------------------
 

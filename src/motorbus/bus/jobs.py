@@ -7,11 +7,14 @@ from typing import Any, NamedTuple, TypeAlias
 
 from motorbus.core.operation import Answer, Exchange, Rank, Tune
 
+Stops: TypeAlias = "Mapping[int | None, int]"
+"""Number of stops sent by node; None: for all nodes."""
+
 
 class Since(NamedTuple):
-    """What had happened on a bus when a caller decided: stops by node and in all, emergency stops, lost ports."""
+    """What had happened on a bus when a caller decided: stops, emergency stops, lost ports."""
 
-    stops: tuple[Mapping[int | None, int], int]
+    stops: Stops
     latches: int
     losses: int
 
@@ -42,15 +45,14 @@ Policy: TypeAlias = "Generator[Send | Wait, Any, Answer]"
 class Job:
     """Something that waits for the bus. `owner` has the bus to itself while `Engine.exclusive` is this owner.
 
-    `settled` is called once, when `done` is set. `losses` is the number of lost connections when its caller began.
+    `settled` is called once, when `done` is set.
     """
 
     priority: Rank
 
-    def __init__(self, owner: object, settled: Callable[[], None] | None, losses: int = 0) -> None:
+    def __init__(self, owner: object = None, settled: Callable[[], None] | None = None) -> None:
         self.owner = owner
         self.settled = settled
-        self.losses = losses
         self.serial = 0
         self.done = False
         self.value: Any = None
@@ -75,10 +77,9 @@ class Job:
 
 
 class RequestJob(Job):
-    """A request, over all its attempts.
+    """A request, over all its attempts; `step` is what its policy waits for.
 
-    `step` is what its policy waits for. `stops` is how many stops of its nodes had been sent when it was called,
-    `latches` how many emergency stops when its procedure began; None where none can come between.
+    A request that moves something is refused after a stop, or a loss of the port, that came after `since`.
     """
 
     def __init__(
@@ -86,15 +87,14 @@ class RequestJob(Job):
         request: Exchange[Any],
         owner: object = None,
         settled: Callable[[], None] | None = None,
-        losses: int = 0,
+        since: Since | None = None,
     ) -> None:
-        super().__init__(owner, settled, losses)
+        super().__init__(owner, settled)
         self.request = request
         self.priority = request.rank
+        self.since = since
         self.policy: Policy | None = None
         self.step: Send | Wait | None = None
-        self.stops: int | None = None
-        self.latches: int | None = None
 
 
 class RateJob(Job):

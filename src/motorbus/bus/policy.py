@@ -51,8 +51,8 @@ def carry_out(engine: Context, request: Exchange[Any]) -> Policy:
             continue
         sent = True
         fault = attempt.fault
-        if not fault:
-            return attempt.answer(min(engine.time, attempt.deadline))
+        if attempt.accepted is not None:
+            return attempt.accepted
         tries += 1
         if not _may_repeat(request, fault) or tries > RETRIES or engine.stopping:
             raise _error(engine, request, attempt, tries, sent)

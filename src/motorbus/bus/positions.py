@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Final
 
+from motorbus.bus.jobs import Stops
 from motorbus.bus.prepared import Prepared
 from motorbus.core.family import Family, Stop
 from motorbus.core.goal import Goal, Stays
@@ -23,46 +24,42 @@ ENDLESS: Final = ("velocity", "load", "current")
 """Quantities that a device obeys until another order comes."""
 
 Reading = tuple[Exchange[Any], Answer]
-Stops = tuple[Mapping[int | None, int], int]
-"""Number of stops by node (None: for all nodes), and of all."""
 
 
 class LastPositions(Mapping[int, Reading]):
-    """By node, the last request that read a position and its reply. `stop_total` counts all stops sent."""
+    """By node, the last request that read a position and its reply.
+
+    `rate` is the bit rate (bit/s) at which a node answered last. `orders` and `stop_total` count all orders and stops
+    sent. `latest` is the source of each reading. `nodes` and `stops` are replaced, never changed: the stop thread reads
+    them at any time.
+    """
 
     def __init__(self, family: Family, rate: int) -> None:
         self.family = family
         self.rate = rate
-        """Bit rate at which a node answered last."""
-        self.nodes: set[int] = set()
-        self.orders = 0
-        self.stop_total = 0
-        self.prepared: dict[int, Prepared] = {}
-        """By node, the prepared request whose replies are newer than `_readings`."""
-        self._readings: dict[int, tuple[Exchange[Any], Answer, int]] = {}
+        self.nodes: frozenset[int] = frozenset()
+        self.orders = self.stop_total = 0
+        self.stops: Stops = {}
+        self.latest: dict[int, Prepared | tuple[Exchange[Any], Answer, int]] = {}
         self._ordered: dict[tuple[int, ...], int] = {}  # by the nodes that an order was for (empty: all)
-        self._stops: Counter[int | None] = Counter()  # None: stops for all nodes
         self._accepted: Counter[int] = Counter()
         self._acknowledged: dict[int, Answer] = {}  # the reply to the last order of a node
         self._stop_replies: dict[int, set[Due]] = {}  # of a stop that takes several requests
-        self._frames: Stop | None = None
 
     # -- positions ---------------------------------------------------------------------------------------------
 
     def __getitem__(self, node: int) -> Reading:
-        exchange, answer, _ = self._reading(node)
-        return exchange, answer
+        return self._reading(node)[:2]
 
     def __iter__(self) -> Iterator[int]:
-        return iter({**self._readings, **self.prepared})
+        return iter(tuple(self.latest))
 
     def __len__(self) -> int:
-        return len({**self._readings, **self.prepared})
+        return len(self.latest)
 
     def _reading(self, node: int) -> tuple[Exchange[Any], Answer, int]:
-        if (prepared := self.prepared.get(node)) is not None:
-            return prepared.source.exchange, prepared.answer(), prepared.orders
-        return self._readings[node]
+        latest = self.latest[node]
+        return latest.reading() if isinstance(latest, Prepared) else latest
 
     def answered(self, nodes: Iterable[int], exchange: Exchange[Any], answer: Answer, rate: int) -> None:
         """These nodes answered this request."""
@@ -71,15 +68,12 @@ class LastPositions(Mapping[int, Reading]):
         if exchange.effect in GATED:
             self._acknowledged.update(dict.fromkeys(nodes, answer))
         if exchange.tells_position:
-            for node in nodes:
-                self.prepared.pop(node, None)
-                self._readings[node] = exchange, answer, self.orders
+            self.latest.update(dict.fromkeys(nodes, (exchange, answer, self.orders)))
 
     def add(self, nodes: Iterable[int]) -> None:
         """These nodes exist."""
         if not self.nodes.issuperset(nodes):
-            self.nodes.update(nodes)
-            self._frames = None
+            self.nodes = self.nodes.union(nodes)
 
     def fresh(self, now: float) -> dict[int, Answer | None]:
         """Every known node with its last position, None where it is older than `FRESH` or an order has left since."""
@@ -97,8 +91,7 @@ class LastPositions(Mapping[int, Reading]):
 
     def forget(self) -> None:
         """The devices may have restarted: no position or acknowledgement counts any more."""
-        self.prepared.clear()
-        self._readings.clear()
+        self.latest.clear()
         self._acknowledged.clear()
         self._stop_replies.clear()
 
@@ -106,49 +99,43 @@ class LastPositions(Mapping[int, Reading]):
 
     def sent(self, exchange: Exchange[Any]) -> None:
         """A request leaves that may move something, or stops it."""
-        ordered = exchange.ordered
         if exchange.rank is Rank.STOP:
             if exchange.effect in GATED:
-                stops = self._stops.copy()  # `stops_so_far` gives the old one out
+                stops = Counter(self.stops)
                 stops.update(addressed(exchange) or (None,))
-                self._stops, self.stop_total = stops, self.stop_total + 1
+                self.stops, self.stop_total = stops, self.stop_total + 1
             return
+        ordered = exchange.ordered
         if ordered:
             self.add(ordered)
         if exchange.effect in GATED:
-            self.moved(addressed(exchange) if exchange.replies else ordered)
+            self._moved(tuple(addressed(exchange) if exchange.replies else ordered))
 
-    def moved(self, nodes: Iterable[int]) -> None:
+    def _moved(self, nodes: tuple[int, ...]) -> None:
         """These nodes (empty: all) got an order: their last position and acknowledgement no longer count."""
         self.orders += 1
-        ordered = tuple(nodes)
-        self._ordered[ordered] = self.orders
+        self._ordered[nodes] = self.orders
         for replies in (self._acknowledged, self._stop_replies):
-            for node in (ordered or self.nodes) if replies else ():
+            for node in (nodes or self.nodes) if replies else ():
                 replies.pop(node, None)
 
     def stop_count(self, node: int) -> int:
         """Number of stops sent to this node, those for all nodes included."""
-        return self._stops.get(node, 0) + self._stops.get(None, 0)
+        return self.stops.get(node, 0) + self.stops.get(None, 0)
 
-    def stops_for(self, exchange: Exchange[Any], since: Stops | None = None) -> int:
-        """Number of stops that end this request if it waits: those sent so far, or before `since` was taken."""
-        stops, total = since or (self._stops, self.stop_total)
+    def is_stopped(self, exchange: Exchange[Any], before: Stops) -> bool:
+        """A stop for a node that this request addresses was sent since `stops` was `before`."""
+        if before is self.stops:
+            return False
         nodes = addressed(exchange)
-        return sum(stops.get(node, 0) + stops.get(None, 0) for node in nodes) if nodes else total
-
-    def stops_so_far(self) -> Stops:
-        """The stops sent so far, for `stops_for`."""
-        return self._stops, self.stop_total
+        return not nodes or any(before.get(node, 0) != self.stops.get(node, 0) for node in (*nodes, None))
 
     def frames(self, now: float) -> Stop:
         """Requests that stop all known nodes; without positions where the family fails to use them."""
-        if self._frames is None:
-            self._frames = self.family.stop(dict.fromkeys(sorted(self.nodes)))
         try:
             return self.family.stop(self.fresh(now))
         except Exception:  # the stop must go out
-            return self._frames
+            return self.family.stop(dict.fromkeys(sorted(self.nodes)))
 
     def accept(self, exchange: Exchange[Any], answer: Answer) -> None:
         """This request was answered and not refused: nodes that it stops have accepted a stop."""
@@ -179,14 +166,8 @@ class LastPositions(Mapping[int, Reading]):
     def _stop_reply_count(self, node: int) -> int:
         """Number of different replies that this node gives to the requests of a stop."""
         requests = self.family.stop(dict.fromkeys(sorted(self.nodes))).exchanges
-        dues = {
-            due
-            for request in requests
-            if request.effect in GATED and request.replies is not ANY
-            for due in request.replies
-            if due.node == node
-        }
-        return max(1, len(dues))
+        gated = [one.replies for one in requests if one.effect in GATED and one.replies is not ANY]
+        return max(1, len({due for dues in gated for due in dues if due.node == node}))
 
 
 def rests(goal: Goal) -> bool:
@@ -207,11 +188,3 @@ def addressed(exchange: Exchange[Any]) -> set[int]:
     if exchange.replies is not ANY:
         nodes.update(due.node for due in exchange.replies)
     return nodes
-
-
-def is_stopped_by(stop: Exchange[Any], exchange: Exchange[Any]) -> bool:
-    """This stop is for a node that the request would move or give torque."""
-    if stop.effect not in GATED or exchange.effect not in GATED or exchange.rank is Rank.STOP:
-        return False
-    stopped, ordered = addressed(stop), addressed(exchange)
-    return not stopped or not ordered or bool(stopped & ordered)

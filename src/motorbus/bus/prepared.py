@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import inf
 from typing import Any, Final
 
 from motorbus.bus.attempt import Attempt
-from motorbus.bus.statistics import BUCKETS
 from motorbus.bus.sync import NodeSync
 from motorbus.core.operation import ANY, Answer, CanFrame, Data, Exchange, Reply, Whole
 
@@ -15,10 +14,10 @@ from motorbus.core.operation import ANY, Answer, CanFrame, Data, Exchange, Reply
 class Prepared:
     """A request whose complete reply one function decodes. It belongs to one bus.
 
-    `budget` is s from the write to the deadline at `timing`, the version of rate and latency. `alternate` is the same
-    request with a reply of another length, itself where there is none. `record` is the one of the two that keeps the
-    last reply: `data`, which `source` asked for, its arrival `at` (s) and the number of `orders` sent before it, and
-    the replies by `latency` bucket that are not yet in the statistics.
+    `budget` is s from the write to the deadline, at this `rate` and `latency`. `alternate` is the same request with a
+    reply of another length, itself where there is none. `record` is the one of the two that keeps the last reply:
+    `data`, which `source` asked for, its arrival `at` (s) and the number of `orders` sent before it. `times` counts
+    replies by latency.
     """
 
     __slots__ = (
@@ -26,7 +25,6 @@ class Prepared:
         "at",
         "attempt",
         "budget",
-        "counted",
         "data",
         "decode",
         "engine",
@@ -37,17 +35,23 @@ class Prepared:
         "length",
         "nodes",
         "orders",
+        "rate",
         "record",
         "single",
         "source",
         "states",
         "tells_position",
-        "timing",
+        "times",
         "wire",
     )
 
     def __init__(
-        self, engine: object, exchange: Exchange[Any], decode: Whole[Any], nodes: Mapping[int, NodeSync]
+        self,
+        engine: object,
+        exchange: Exchange[Any],
+        decode: Whole[Any],
+        states: Mapping[int, NodeSync],
+        times: list[int],
     ) -> None:
         dues = exchange.replies
         assert dues is not ANY
@@ -56,27 +60,33 @@ class Prepared:
         self.wire: Final = exchange.request
         self.lane: Final = exchange.lane
         self.decode: Final = decode
-        self.nodes: Final = tuple(due.node for due in dues)
-        self.states: Final = [nodes[due.node] for due in dues]
+        self.nodes: Final = nodes_of(exchange)
+        self.states: Final = [states[node] for node in self.nodes]
         self.single: Final = self.states[0] if len(dues) == 1 else None
         self.length: Final = dues[0].length
         self.tells_position: Final = bool(exchange.tells_position)
+        self.times: Final = times
         self.alternate = self.record = self.source = self
         self.attempt = Attempt(exchange, None)
-        self.timing = -1
+        self.rate, self.latency = 0, 0.0
         self.budget = 0.0
         self.data: Data = b""
         self.at = -inf
         self.orders = 0
         self.kept: Answer | None = None
-        self.latency = [0] * BUCKETS
-        self.counted = False
 
-    def answer(self) -> Answer:
-        """The last reply, split into the replies of the nodes."""
+    def reading(self) -> tuple[Exchange[Any], Answer, int]:
+        """The request, its last reply, split into the replies of the nodes, and the orders sent before it."""
+        exchange = self.source.exchange
         if self.kept is None:
-            self.kept = Answer(split(self.source.exchange, self.data), (), self.at)
-        return self.kept
+            self.kept = Answer(split(exchange, self.data), (), self.at)
+        return exchange, self.kept, self.orders
+
+
+def nodes_of(exchange: Exchange[Any]) -> tuple[int, ...]:
+    """The nodes that answer this request, in the order expected."""
+    dues: Sequence[Any] = () if exchange.replies is ANY else exchange.replies
+    return tuple(due.node for due in dues)
 
 
 def split(exchange: Exchange[Any], data: Data) -> tuple[Reply, ...]:

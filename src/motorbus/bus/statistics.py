@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from motorbus.core.operation import ANY, Any_, Due
@@ -27,32 +27,32 @@ class NodeStatistics:
 
 
 class Statistics:
-    """The counters of all nodes; `other` counts what belongs to none: noise, foreign frames, notices, echoes.
+    """The counters of all nodes; `other` counts what belongs to none: noise, foreign frames, notices, echoes."""
 
-    `settle` is called before `nodes` is read; it adds the replies of prepared requests.
-    """
-
-    def __init__(self, settle: Callable[[], None] | None = None) -> None:
+    def __init__(self) -> None:
         self.other: Counter[str] = Counter()
         self._nodes: dict[int, NodeStatistics] = {}
-        self._settle = settle
+        self._groups: dict[tuple[int, ...], list[int]] = {}
 
     @property
     def nodes(self) -> dict[int, NodeStatistics]:
-        """The counters by node."""
-        if self._settle is not None:
-            self._settle()
-        return self._nodes
+        """The counters by node, as they are now."""
+        found = {
+            number: NodeStatistics(one.sent, one.ok, one.retries, one.errors.copy(), one.latency.copy())
+            for number, one in self._nodes.items()
+        }
+        for group, times in self._groups.items():
+            count = sum(times)
+            for number in group if count else ():
+                counters = found.setdefault(number, NodeStatistics())
+                counters.sent += count
+                counters.ok += count
+                counters.latency = [a + b for a, b in zip(counters.latency, times, strict=True)]
+        return found
 
-    def add(self, nodes: Sequence[int], times: Sequence[int]) -> None:
-        """Add answered requests of these nodes; `times` counts them by latency bucket."""
-        count, hit = sum(times), [(bucket, number) for bucket, number in enumerate(times) if number]
-        for node in nodes:
-            counters = self.of(node)
-            counters.sent += count
-            counters.ok += count
-            for bucket, number in hit:
-                counters.latency[bucket] += number
+    def group(self, nodes: tuple[int, ...]) -> list[int]:
+        """Requests that all of these nodes answered, by latency; prepared requests count here."""
+        return self._groups.setdefault(nodes, [0] * BUCKETS)
 
     def asked(self, dues: tuple[Due, ...] | Any_) -> None:
         """Count a request that expects these replies; one without reply, or for any reply, belongs to no node."""
@@ -69,21 +69,15 @@ class Statistics:
 
     def answered(self, dues: Iterable[Due], seconds: float) -> None:
         """Count a valid reply of each of these, after so many seconds."""
-        bucket = bucket_of(seconds)
-        nodes = self._nodes
+        bucket = min(int(seconds * 1e6).bit_length(), BUCKETS - 1)
         for due in dues:
-            counters = nodes[due.node]
+            counters = self.of(due.node)
             counters.ok += 1
             counters.latency[bucket] += 1
 
     def of(self, node: int) -> NodeStatistics:
-        """The counters of this node."""
+        """The counters of this node without those of prepared requests; to count in."""
         counters = self._nodes.get(node)
         if counters is None:
             counters = self._nodes[node] = NodeStatistics()
         return counters
-
-
-def bucket_of(seconds: float) -> int:
-    """The bucket of a reply that took so long."""
-    return min(int(seconds * 1e6).bit_length(), BUCKETS - 1)

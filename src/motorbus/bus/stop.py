@@ -14,16 +14,20 @@ import contextlib
 import json
 import os
 import socket
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as LateError
 from pathlib import Path
 from selectors import EVENT_READ, DefaultSelector
 from threading import Event, Lock, Thread
 from typing import Final, Protocol
 
 from motorbus.bus.engine import Engine
-from motorbus.bus.stop_rounds import run_rounds
+from motorbus.bus.jobs import RateJob
+from motorbus.bus.stop_rounds import stop_in_rounds
 from motorbus.bus.stop_socket import STOP_TIMEOUT, StopOutcome, asked_by, client_name, listening
+from motorbus.bus.tasks import TaskTree
 from motorbus.bus.turn import Turn
-from motorbus.core.operation import Rank
+from motorbus.core.operation import Rank, Tune
 from motorbus.errors import LinkError, LinkLost
 from motorbus.link.base import Link
 
@@ -44,14 +48,6 @@ class StoppableBus(Protocol):
     def receive(self, until: float) -> None: ...
 
 
-class StopRequest:
-    """A caller that waits for the outcome of a stop."""
-
-    def __init__(self) -> None:
-        self.outcome: StopOutcome | None = None
-        self.done = Event()
-
-
 class EmergencyStop:
     """The emergency stop of one bus."""
 
@@ -59,7 +55,7 @@ class EmergencyStop:
         self.bus = bus
         self.socket_path = socket_path
         self._pair: tuple[socket.socket, socket.socket] | None = None
-        self._requests: list[StopRequest] = []
+        self._requests: list[Future[StopOutcome]] = []
         self._ready = Event()
         self._starting = Lock()
         self._thread: Thread | None = None
@@ -109,17 +105,18 @@ class EmergencyStop:
         """Stop and wait for the outcome. Raises LinkLost when the bus is closed."""
         if self._closed:
             raise LinkLost("the bus is closed: no stop was sent", advice="open it again, or cut the power")
-        if not self.bus.link.virtual:
-            with contextlib.suppress(LinkError):
-                self.start()
+        with contextlib.suppress(LinkError):
+            self.start()
         if self._thread is None:
             return self.stop()
-        request = StopRequest()
+        request: Future[StopOutcome] = Future()
         self._requests.append(request)
         self.trigger()
-        request.done.wait(STOP_TIMEOUT)
-        silent = tuple(sorted(self.bus.engine.positions.nodes))
-        return request.outcome or StopOutcome((), silent, 0, "nothing: the stop thread did not answer")
+        try:
+            return request.result(STOP_TIMEOUT)
+        except LateError:
+            silent = tuple(sorted(self.bus.engine.positions.nodes))
+            return StopOutcome((), silent, 0, "nothing: the stop thread did not answer")
 
     def stop(self, client: str = "") -> StopOutcome:
         """Latch the engine and send the stop frames, in the calling thread."""
@@ -129,10 +126,8 @@ class EmergencyStop:
         if bus.turn.acquire(Rank.STOP, engine.stop_delay(bus.now())):
             return self._stop_with_turn(by)
         stop = engine.positions.frames(bus.now())
-        to_all = [
-            request for request in stop.exchanges if not request.replies
-        ]  # none of them disturbs a reply
-        for request in to_all or stop.exchanges:
+        disturbs_no_reply = [request for request in stop.exchanges if not request.replies]
+        for request in disturbs_no_reply or stop.exchanges:
             engine.positions.sent(request)
             with contextlib.suppress(LinkError):
                 bus.link.write(request.request)
@@ -143,12 +138,26 @@ class EmergencyStop:
         return StopOutcome((), silent, 1, f"{stop.promise}; sent once, no acknowledgement could be read")
 
     def _stop_with_turn(self, by: str) -> StopOutcome:
+        bus, engine = self.bus, self.bus.engine
         try:
-            self.bus.engine.latch(self.bus.now(), by)
-            return run_rounds(self.bus)
+            engine.latch(bus.now(), by)
+            self._restore_rate()
+            tree = TaskTree(engine, stop_in_rounds(engine, bus.now), now=bus.now)
+            while not tree.advance():
+                bus.send()
+                if not tree.advance():
+                    bus.receive(tree.next_moment())
+            return tree.result()
         finally:
-            self.bus.engine.stopped()
-            self.bus.turn.release()
+            engine.stopped()
+            bus.turn.release()
+
+    def _restore_rate(self) -> None:
+        """A scan may be trying another rate: the nodes are stopped at the rate at which they answered last."""
+        engine = self.bus.engine
+        if (engine.rate, engine.listening) != (engine.positions.rate, engine.always_listening):
+            engine.submit(RateJob(Tune(engine.positions.rate), urgent=True), self.bus.now())
+            self.bus.send()
 
     # -- the thread --------------------------------------------------------------------------------------------
 
@@ -156,10 +165,9 @@ class EmergencyStop:
         assert self._pair is not None
         ear = self._pair[0]
         with listening(self.socket_path, lambda: self.socket_path) as listener, DefaultSelector() as ready:
-            if listener is not None:
-                ready.register(listener, EVENT_READ)
             try:
-                ready.register(ear, EVENT_READ)
+                for end in (ear,) if listener is None else (ear, listener):
+                    ready.register(end, EVENT_READ)
             except ValueError:  # closed while it was started
                 return
             finally:
@@ -167,37 +175,24 @@ class EmergencyStop:
             ended = False
             while not ended:
                 try:
-                    ended = self._wait(ready, ear, listener)
+                    ends = [key.fileobj for key, _ in ready.select()]
+                    ended = ear in ends and self._serve_this_process(ear.recv(4096))
+                    if listener in ends and listener is not None:
+                        self._serve_client(listener.accept()[0])
                 except Exception:  # the thread must serve the next request
                     ended = self._closed
-            for key in list(ready.get_map().values()):
-                if key.fileobj not in (ear, listener) and isinstance(key.fileobj, socket.socket):
-                    key.fileobj.close()
 
-    def _wait(self, ready: DefaultSelector, ear: socket.socket, listener: socket.socket | None) -> bool:
-        """Serve the requests of this process first, then those of clients; True at the end."""
-        ends = [key.fileobj for key, _ in ready.select()]
-        if ear in ends:
-            words = ear.recv(4096)
-            if STOP in words:
-                self._stop_and_answer()
-            if END in words:
-                return True
-        for end in ends:
-            if end is listener and listener is not None:
-                with contextlib.suppress(OSError):
-                    ready.register(listener.accept()[0], EVENT_READ)
-            elif end is not ear and isinstance(end, socket.socket):
-                ready.unregister(end)
-                self._serve_client(end)
-        return False
+    def _serve_this_process(self, words: bytes) -> bool:
+        """Stop if that was requested; True at the end."""
+        if STOP in words:
+            self._stop_and_answer()
+        return END in words
 
     def _stop_and_answer(self, client: str = "") -> StopOutcome:
         requests, self._requests = self._requests, []
         outcome = self.stop(client)
         for request in requests:
-            request.outcome = outcome
-            request.done.set()
+            request.set_result(outcome)
         return outcome
 
     def _serve_client(self, client: socket.socket) -> None:

@@ -9,7 +9,7 @@ from typing import Any, Final, Generic, TypeVar
 from motorbus.bus import failures
 from motorbus.bus.engine import Engine
 from motorbus.bus.jobs import ExclusiveJob, Job, RateJob, RequestJob, Since
-from motorbus.bus.positions import GATED, Stops
+from motorbus.bus.positions import GATED
 from motorbus.core.operation import (
     Alone,
     Closed,
@@ -48,8 +48,9 @@ class Timer(Job):
     """Waits for a moment, or for a notification."""
 
     def __init__(self, settled: Callable[[], None] | None, until: float, losses: int) -> None:
-        super().__init__(None, settled, losses)
+        super().__init__(settled=settled)
         self.until = until
+        self.losses = losses
         self.listener: Callable[[Notice], None] | None = None
 
 
@@ -91,9 +92,9 @@ class TaskTree(Generic[T]):
         self.now = now
         self.report = report
         self.settled = settled
-        stops, self.latches, self.losses = since or engine.since()
-        self.stops: Stops | None = stops
-        """Before the first request of this procedure that moves or stops something."""
+        self.since = since or engine.since()
+        self.has_ordered = False
+        """It has sent a request that moves or stops something, so its own stops count no more."""
         self.cancellation: BaseException | None = None
         self.interruption: BaseException | None = None
         """Raised by one of several children, and no Exception: it cancels the others."""
@@ -230,7 +231,7 @@ class TaskTree(Generic[T]):
             task.joins_one = False
             task.children = [Task(procedure, task) for procedure in step.operations]
             if not task.children:
-                task.job = Job(None, None)
+                task.job = Job()
                 task.job.settle([])
         elif isinstance(step, Alone):
             child = Task(step.operation, task)
@@ -264,11 +265,11 @@ class TaskTree(Generic[T]):
             child.checked = True
             task.children, task.joins_one = [child], True
             return
-        task.job = job = RequestJob(request, task.owner, self.settled, self.losses)
-        job.latches = self.latches
-        if request.effect in GATED:
-            job.stops = self.engine.positions.stops_for(request, self.stops)
-            self.stops = None
+        since = self.since
+        if self.has_ordered:
+            since = since._replace(stops=self.engine.positions.stops)
+        self.has_ordered |= request.effect in GATED
+        task.job = job = RequestJob(request, task.owner, self.settled, since)
         if self.now() >= self.deadline:
             job.settle(error=failures.abandoned())
         else:
@@ -276,7 +277,7 @@ class TaskTree(Generic[T]):
 
     def _report(self, task: Task, event: object) -> None:
         """The report has been handed over before the next step; what it raises is raised in the task."""
-        task.job = Job(None, None)
+        task.job = Job()
         if self.report is None and isinstance(event, Journal):
             task.job.settle(error=_no_journal(event))
             return
