@@ -9,10 +9,11 @@ from motorbus.core.operation import Exchange
 
 
 class Check:
-    """An interlock that calls this function with each request."""
+    """An interlock that calls this function with each request; `stops` are the nodes of every stop."""
 
     def __init__(self, check: Callable[[Any], None]) -> None:
         self._check = check
+        self.stops: list[tuple[int, ...]] = []
 
     def check(self, request: Exchange[Any], now: float) -> None:
         self._check(request)
@@ -21,7 +22,7 @@ class Check:
         return ()
 
     def stopped(self, nodes: Sequence[int]) -> None:
-        pass
+        self.stops.append(tuple(nodes))
 
 
 ADMIT_ALL = Check(lambda request: None)

@@ -12,7 +12,8 @@ import pytest
 
 import motorbus
 from motorbus import feetech
-from motorbus.bus.blocking import Bus, exchange_on, run_on
+from motorbus.bus.blocking import Bus, exchange_on
+from motorbus.bus.running import run_on
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.simulation.named import Simulation
 

@@ -15,7 +15,8 @@ import pytest
 
 import motorbus
 from motorbus import feetech
-from motorbus.bus.blocking import exchange_on, run_on
+from motorbus.bus.blocking import exchange_on
+from motorbus.bus.running import run_on
 from motorbus.core.operation import Operation, Pause
 from motorbus.errors import Interrupted, LinkLost
 from tests.bus.test_batches import Arm

@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import socket
 import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +19,7 @@ from motorbus.errors import LinkError, LinkLost, PortNotFound
 from motorbus.families.feetech import FAMILY
 from motorbus.link.memory import MemoryLink
 from tests.bus.responder import Responder, memory_bus, position, write
-from tests.bus.script import ADMIT_ALL
+from tests.bus.script import ADMIT_ALL, Check
 
 TORQUE = 40
 
@@ -40,6 +42,24 @@ def test_a_stop_after_close_says_at_once_that_nothing_was_sent() -> None:
         with pytest.raises(LinkLost, match="no stop was sent"):
             bus.estop()
         assert torque_offs(responder) == []
+
+
+@pytest.mark.parametrize("turn_is_free", [True, False])
+def test_the_interlock_learns_of_every_stop_from_any_thread(turn_is_free: bool) -> None:
+    check = Check(lambda request: None)
+    bus, _ = memory_bus(virtual=False)
+    bus.interlock = check
+    known(bus, 1)
+    with ThreadPoolExecutor(1) as pool:
+        if not turn_is_free:
+            bus.turn.acquire()
+        outcome = pool.submit(bus.estop)
+        while not check.stops:
+            time.sleep(0.001)
+        bus.turn.release()
+        assert outcome.result().acknowledged == (1,)
+    assert set(check.stops) == {(), (1,)}
+    bus.close()
 
 
 def test_a_port_that_is_full_for_a_while_does_not_lose_the_stop() -> None:

@@ -10,7 +10,6 @@ from math import inf
 from threading import get_ident
 from typing import Any, Final, Generic, Self, TypeVar
 
-from motorbus.bus.attempt import Attempt
 from motorbus.bus.base import IDLE, BaseBus, check_clocks
 from motorbus.bus.interrupts import DEFAULTS, SIGNALS
 from motorbus.bus.jobs import RequestJob
@@ -34,8 +33,8 @@ class AsyncBus(BaseBus):
     _descriptor: int | None = None
     _thread = 0
     _timer: asyncio.TimerHandle | None = None
-    _direct: tuple[Prepared, Attempt, asyncio.Future[Any]] | None = None
-    """The prepared request in flight that no other request has met, and what gets its value."""
+    _direct: tuple[Prepared, _Call] | None = None
+    """The prepared request in flight that no other request has met."""
 
     async def run(self, procedure: Runnable[T], report: Notify | None = None) -> T:
         """Run a procedure as `Bus.run` does. A cancelled task cleans up, then raises CancelledError."""
@@ -47,44 +46,31 @@ class AsyncBus(BaseBus):
 
     async def _transact(self, request: Exchange[Any]) -> Any:
         """Carry out one request that changes nothing."""
-        loop = asyncio.get_running_loop()
-        future: asyncio.Future[Any] = loop.create_future()
-        job: RequestJob | None = None
+        call = _Call(request)
         with self.turn:
             try:
                 prepared = self.prepare(request)
                 if prepared is not None:
-                    self._direct = prepared, self.write(prepared), future
+                    self.write(prepared)
+                    self._direct = prepared, call
             except LinkError as error:
                 self._lost(error)
                 raise
             if prepared is None:
-                job = self._job(request, future)
-                self.engine.submit(job, self.link.now())
+                self.engine.submit(call, self.link.now())
                 self.send()
             self.watch()
         try:
-            return await future
+            return await call.future
         except asyncio.CancelledError:
-            if job is not None:
-                self.engine.cancel(job)
+            self.engine.cancel(call)
             raise
-
-    def _job(self, request: Exchange[Any], future: asyncio.Future[Any]) -> RequestJob:
-        """A job whose end completes this future, from any thread."""
-        loop = future.get_loop()
-
-        def settle() -> None:
-            loop.call_soon_threadsafe(_complete, future, job)
-
-        job = RequestJob(request, settled=settle)
-        return job
 
     def send(self) -> None:
         """As `BaseBus.send`; a prepared request in flight becomes an attempt like any other first."""
         if self._direct is not None:
-            (prepared, _, future), self._direct = self._direct, None
-            self.adopt(prepared, (), self._job(prepared.exchange, future))
+            (prepared, call), self._direct = self._direct, None
+            self.adopt(prepared, (), call)
         super().send()
 
     def watch(self) -> None:
@@ -126,28 +112,26 @@ class AsyncBus(BaseBus):
             if not self.engine.idle or self.engine.listeners:
                 self.watch()
 
-    def _look_for_reply(self, prepared: Prepared, attempt: Attempt, future: asyncio.Future[Any]) -> None:
+    def _look_for_reply(self, prepared: Prepared, call: _Call) -> None:
         """Take what has come for a prepared request; what is not its complete reply goes the general path."""
+        deadline = prepared.attempt.deadline
         try:
             chunks = self.link.read(-inf)
+            if not chunks and self.link.now() < deadline:
+                return
+            self._direct = None
+            value = self.accept(prepared, chunks, deadline)
+            if value is UNLIKE:
+                self.adopt(prepared, chunks, call)
+                self.send()
+            else:
+                call.settle(value)
         except LinkError as error:
             self._direct = None
             self._lost(error)
-            _fail(future, self.engine.gone or error)
-            return
-        if not chunks and self.link.now() < attempt.deadline:
-            return
-        self._direct = None
-        try:
-            value = self.accept(prepared, chunks, attempt.deadline)
+            call.settle(error=self.engine.gone or error)
         except Exception as error:
-            _fail(future, error)
-            return
-        if value is UNLIKE:
-            self.adopt(prepared, chunks, self._job(prepared.exchange, future))
-            self.send()
-        elif not future.done():
-            future.set_result(value)
+            call.settle(error=error)
 
     def _unwatch(self) -> None:
         if self._timer is not None:
@@ -182,7 +166,7 @@ class AsyncBus(BaseBus):
             self._unwatch()
             direct, self._direct = self._direct, None
             if direct is not None:
-                _fail(direct[2], error)
+                direct[1].settle(error=error)
             self.engine.lost(error)
         self._hang_up()
 
@@ -193,16 +177,28 @@ class AsyncBus(BaseBus):
         await self.close()
 
 
-def _complete(future: asyncio.Future[Any], job: RequestJob) -> None:
-    if job.error is not None:
-        _fail(future, job.error)
-    elif not future.done():
-        future.set_result(job.value)
+class _Call(RequestJob):
+    """A request whose value a task of the running loop awaits."""
 
+    def __init__(self, request: Exchange[Any]) -> None:
+        super().__init__(request, settled=self._settled)
+        self.loop = asyncio.get_running_loop()
+        self.thread = get_ident()
+        self.future: asyncio.Future[Any] = self.loop.create_future()
 
-def _fail(future: asyncio.Future[Any], error: BaseException) -> None:
-    if not future.done():
-        future.set_exception(error)
+    def _settled(self) -> None:
+        if get_ident() == self.thread:
+            self._complete()
+        else:  # the stop thread
+            self.loop.call_soon_threadsafe(self._complete)
+
+    def _complete(self) -> None:
+        if self.future.done():
+            return
+        if self.error is not None:
+            self.future.set_exception(self.error)
+        else:
+            self.future.set_result(self.value)
 
 
 async def run_on(procedures: Mapping[AsyncBus, Runnable[Any]]) -> dict[AsyncBus, Any]:

@@ -2,78 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass, field
 from math import inf
 from typing import Any
 
 from motorbus.bus.failures import FAULTS
 from motorbus.bus.jobs import RequestJob
-from motorbus.core.operation import ANY, Answer, Exchange, Rank, Reply
+from motorbus.core.operation import ANY, Answer, Due, Exchange, Reply
 
 NOISE_KEPT = 16
 """Pieces of noise kept for the error message."""
 
 
+@dataclass(slots=True, eq=False)
 class Attempt:
     """A request in flight, and what came for it.
 
     `job` is None for an attempt whose caller no longer waits. `excluded` are nodes of a group that this attempt does
     not wait for, or whose reply was damaged. `fault` is why the attempt failed, "" while it has not. `air` is its time
-    on the wire, `competitors` the number of attempts on other lanes that its deadline allows for.
-    `accepted` is what the caller gets. `ended`: it is not in flight any more.
+    on the wire (s), `competitors` the number of attempts on other lanes that its deadline allows for. `surplus`: more
+    came than was expected. `accepted` is what the caller gets. `ended`: it is not in flight any more.
     """
 
-    __slots__ = (
-        "accepted",
-        "air",
-        "competitors",
-        "complete",
-        "deadline",
-        "echo_excluded",
-        "ended",
-        "excluded",
-        "fault",
-        "is_probe",
-        "job",
-        "noise",
-        "replies",
-        "request",
-        "sent_at",
-        "surplus",
-    )
+    request: Exchange[Any]
+    job: RequestJob | None = None
+    excluded: tuple[int, ...] = ()
+    is_probe: bool = False
+    echo_excluded: bool = False
+    sent_at: float = 0.0
+    deadline: float = inf
+    air: float = 0.0
+    competitors: int = 0
+    replies: dict[int, Reply] = field(default_factory=dict)
+    noise: list[tuple[str, bytes]] = field(default_factory=list)
+    fault: str = ""
+    surplus: bool = False
+    complete: bool = False
+    accepted: Answer | None = None
+    ended: bool = False
 
-    def __init__(
-        self,
-        request: Exchange[Any],
-        job: RequestJob | None,
-        excluded: tuple[int, ...] = (),
-        *,
-        is_probe: bool = False,
-    ) -> None:
-        self.request = request
-        self.job = job
-        self.excluded = excluded
-        self.is_probe = is_probe
-        self.sent_at = 0.0
-        self.deadline = inf
-        self.air = 0.0
-        self.competitors = 0
-        self.replies: dict[int, Reply] = {}
-        self.noise: list[tuple[str, bytes]] = []
-        self.fault = ""
-        self.surplus = False
-        self.echo_excluded = False
-        self.complete = False
-        self.accepted: Answer | None = None
-        self.ended = False
+    @property
+    def dues(self) -> tuple[Due, ...]:
+        """The replies expected; none where any reply counts."""
+        return () if self.request.replies is ANY else self.request.replies
 
     def take(self, reply: Reply) -> bool:
         """Keep this reply if it is one of those expected."""
-        dues = self.request.replies
-        if dues is ANY:
+        if self.request.replies is ANY:
             self.replies[len(self.replies)] = reply
             return True
-        for index, due in enumerate(dues):
+        for index, due in enumerate(self.dues):
             if due.key == reply.key and due.length == len(reply.data) and index not in self.replies:
                 self.replies[index] = reply
                 self._check_complete()
@@ -89,26 +67,22 @@ class Attempt:
 
     def is_excluded(self, reply: Reply) -> bool:
         """An excluded node sent this reply: it came in spite of not being waited for."""
-        dues = self.request.replies
         kind = reply.key, len(reply.data)
-        return dues is not ANY and any(
-            due.node in self.excluded and (due.key, due.length) == kind for due in dues
-        )
+        return any(due.node in self.excluded and (due.key, due.length) == kind for due in self.dues)
 
     def take_noise(self, fault: str, data: bytes) -> None:
         """Noise before the first reply does no harm; behind a reply that reply may be shifted by a byte."""
         if self.complete:
             self.surplus = True
-        elif self.replies and self.request.replies is not ANY:
+        elif self.replies and self.dues:
             self.exclude(self.replies[max(self.replies)])
         self.noise.append((fault, data[:64]))
         del self.noise[:-NOISE_KEPT]
 
     def exclude(self, reply: Reply) -> None:
         """The node of this reply sent something unexpected: a group loses that node, a single request fails."""
-        dues = self.request.replies
-        if dues is not ANY and len(dues) > 1:
-            self.excluded += tuple(due.node for due in dues if due.key == reply.key)
+        if len(self.dues) > 1:
+            self.excluded += tuple(due.node for due in self.dues if due.key == reply.key)
             self._check_complete()
         else:
             self.fault = self.fault or "unexpected"
@@ -124,29 +98,12 @@ class Attempt:
 
     def answer(self, at: float) -> Answer:
         """The replies in the order expected; excluded nodes count as missing."""
-        dues = self.request.replies
-        if dues is ANY:
+        if self.request.replies is ANY:
             return Answer(tuple(self.replies.values()), (), at)
-        taken = [i for i, due in enumerate(dues) if i in self.replies and due.node not in self.excluded]
-        missing = tuple(due.node for i, due in enumerate(dues) if i not in taken)
+        taken = [i for i, due in enumerate(self.dues) if i in self.replies and due.node not in self.excluded]
+        missing = tuple(due.node for i, due in enumerate(self.dues) if i not in taken)
         return Answer(tuple(self.replies[i] for i in taken), missing, at)
 
     def received(self) -> bytes:
         """All that came, for the error message."""
         return b"".join([*(data for _, data in self.noise), *(reply.data for reply in self.replies.values())])
-
-    def only_replies(self, events: Sequence[object], sent: Sequence[bytes]) -> bool:
-        """Take these events if they are all replies expected, in order, none of them a copy of what was `sent`."""
-        dues = self.request.replies
-        if dues is ANY or self.request.rank is Rank.STOP or self.replies or self.excluded:
-            return False
-        if len(events) != len(dues):
-            return False
-        for event, due in zip(events, dues, strict=True):
-            if type(event) is not Reply or event.lane != self.request.lane or event.key != due.key:
-                return False
-            if len(event.data) != due.length or event.data in sent:
-                return False
-        self.replies = dict(enumerate(events))  # type: ignore[arg-type]  # all of them are replies
-        self.complete = True
-        return True

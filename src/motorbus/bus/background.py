@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
 from motorbus.bus.base import BaseBus
-from motorbus.bus.blocking import run_here
+from motorbus.bus.running import run_here
 from motorbus.bus.tasks import TaskTree
 from motorbus.core.operation import Operation
 

@@ -227,7 +227,7 @@ class BaseBus:
         engine, now = self.engine, self.link.now()
         attempt = prepared.attempt
         if attempt.ended:
-            attempt = prepared.attempt = Attempt(prepared.exchange, None)
+            attempt = prepared.attempt = Attempt(prepared.exchange)
         wire: Any = prepared.wire
         attempt.sent_at = now
         if order is not None:
@@ -260,17 +260,26 @@ class BaseBus:
         if at > deadline:  # the host was late
             at = deadline
         value = prepared.decode(chunks[0], at)
-        if value is not UNLIKE:
-            engine = self.engine
-            if engine.trace.subscriptions:
-                engine.trace.put(TraceRecord(at, "rx", chunks[0]))
-            engine.accepted(prepared, chunks[0], at)
+        if value is UNLIKE:
+            return value
+        engine, record, single = self.engine, prepared.record, prepared.single
+        if engine.trace.subscriptions:
+            engine.trace.put(TraceRecord(at, "rx", chunks[0]))
+        if engine.last is not record:
+            engine.note_last(record)
+        sent_at = prepared.attempt.sent_at
+        if single is not None:
+            single.length, single.asked_at = prepared.length, sent_at
+        prepared.times[int(1e6 * (at - sent_at)).bit_length()] += 1
+        record.data, record.at, record.source, record.kept = chunks[0], at, prepared, None
+        record.orders = engine.positions.orders
+        del engine.in_flight[prepared.lane]
         return value
 
     def adopt(self, prepared: Prepared, chunks: Sequence[Data], job: RequestJob) -> None:
         """The reply to a prepared request is in pieces, damaged or missing: its job goes the general path."""
         engine, attempt = self.engine, prepared.attempt
-        prepared.attempt = Attempt(prepared.exchange, None)
+        prepared.attempt = Attempt(prepared.exchange)
         job.policy = carry_out(engine, job.request)
         job.policy.send(None)  # up to the attempt that is in flight
         attempt.job = job

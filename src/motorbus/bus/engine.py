@@ -20,7 +20,7 @@ from motorbus.bus.echo import Echo
 from motorbus.bus.interlock import Interlock
 from motorbus.bus.jobs import ExclusiveJob, Job, RateJob, RequestJob, Send, Since, Wait
 from motorbus.bus.policy import carry_out
-from motorbus.bus.positions import GATED, LastPositions, moves
+from motorbus.bus.positions import GATED, LastPositions, addressed, moves
 from motorbus.bus.prepared import Prepared, nodes_of
 from motorbus.bus.statistics import Statistics
 from motorbus.bus.sync import SyncTable
@@ -155,7 +155,7 @@ class Engine:
                 job.settle(error=error)
                 return
             if job.priority is Rank.STOP:
-                self.positions.sent(job.request)
+                self.note_stop(job.request)
             if job.request.whole is not None and getattr(job.request.course, "engine", None) is not self:
                 job.request.course = self.prepare(job.request)
             job.policy = carry_out(self, job.request)
@@ -311,6 +311,12 @@ class Engine:
             if since.losses != self.losses:
                 raise failures.outlived(request)
 
+    def note_stop(self, request: Exchange[Any]) -> None:
+        """A request that stops something is about to leave; from any thread."""
+        self.positions.sent(request)
+        if self.interlock is not None and request.effect in GATED:
+            self.interlock.stopped(tuple(addressed(request)))
+
     def _check_not_listening(self, request: Exchange[Any]) -> None:
         if self.listening:
             raise failures.listen_only(request)
@@ -319,8 +325,7 @@ class Engine:
         """Record an attempt before its request is written."""
         request = attempt.request
         if self.receiver.held:  # it cannot belong to a reply to a request that has not left
-            for event in self.receiver.flush():
-                self._take(event, now)
+            self._take_all(self.receiver.flush(), now)
         start, air = max(now, self.free_at), self.air_time(request)
         attempt.sent_at = now
         if request.replies != ():
@@ -416,10 +421,6 @@ class Engine:
             self._fail_all_by_echo()
 
     def _take_all(self, events: Sequence[Event], now: float) -> None:
-        if len(self.in_flight) == 1:
-            (attempt,) = self.in_flight.values()
-            if attempt.only_replies(events, self.echo.recent):
-                return
         for event in events:
             self._take(event, now)
 
@@ -469,8 +470,8 @@ class Engine:
     def _take_unexpected(self, attempt: Attempt | None, reply: Reply, now: float) -> None:
         if self._is_late(reply) or self._take_for_all(reply):
             return
-        dues = () if attempt is None or attempt.request.replies is ANY else attempt.request.replies
-        if attempt is not None and not attempt.is_probe and any(due.key == reply.key for due in dues):
+        known = attempt is not None and not attempt.is_probe
+        if attempt is not None and known and any(due.key == reply.key for due in attempt.dues):
             attempt.exclude(reply)
             self.statistics.other["unexpected"] += 1
         else:
@@ -502,14 +503,9 @@ class Engine:
         for lane, attempt in list(self.in_flight.items()):
             if not attempt.complete:
                 continue
-            for event in self.receiver.flush():  # all replies are here, so what is held is surplus
-                self._take(event, now)
-            if self._may_be_echo(attempt) and not attempt.surplus and now < attempt.deadline:
-                continue
-            if attempt.fault or attempt.surplus:
-                self._fail(lane, attempt, now)
-            else:
-                self._accept(lane, attempt, now)
+            self._take_all(self.receiver.flush(), now)  # all replies are here, so what is held is surplus
+            if not self._may_be_echo(attempt) or attempt.surplus or now >= attempt.deadline:
+                self._end(lane, attempt, now)
 
     def _may_be_echo(self, attempt: Attempt) -> bool:
         """Whether echo is unknown and the reply is the beginning of the request: the rest of an echo may follow."""
@@ -525,72 +521,53 @@ class Engine:
             held = self.echo.give_up()
             if self.echo.broken:
                 self._echo_broke(now)
-            for event in [*(self.receiver.feed(held) if held else ()), *self.receiver.flush()]:
-                self._take(event, now)
-            if self.in_flight.get(lane) is not attempt:  # what was held has completed it
-                continue
-            dues = attempt.request.replies
-            sound = (attempt.complete or dues is ANY or len(dues) > 1) and not attempt.fault
-            if dues is ANY or (sound and not attempt.surplus):
-                self._accept(lane, attempt, now)
-            else:
-                self._fail(lane, attempt, now)
+            self._take_all([*(self.receiver.feed(held) if held else ()), *self.receiver.flush()], now)
+            if self.in_flight.get(lane) is attempt:  # what was held has not completed it
+                self._end(lane, attempt, now)
 
-    def _accept(self, lane: int, attempt: Attempt, now: float) -> None:
-        """The replies are accepted: their nodes are in sync, and their job continues."""
-        request, dues = attempt.request, attempt.request.replies
+    def _end(self, lane: int, attempt: Attempt, now: float) -> None:
+        """Accept the replies, or those of a group that came; the job continues with them or with the fault."""
+        request, dues = attempt.request, attempt.dues
+        single = request.replies is not ANY and len(dues) == 1
+        if (single and not attempt.complete) or (dues and (attempt.fault or attempt.surplus)):
+            attempt.fault = attempt.failure()
         answer = attempt.answer(min(now, attempt.deadline))
-        if attempt.is_probe and not (request.read is not None and request.read(answer)):
+        if attempt.is_probe and not attempt.fault and not (request.read is not None and request.read(answer)):
             attempt.fault = "unexpected"
-            self._fail(lane, attempt, now)
-            return
+        answered = [due for index, due in enumerate(dues) if self._is_answered(attempt, index, due, now)]
         del self.in_flight[lane]
-        attempt.accepted = answer
-        self._end_echo_test(attempt)
-        if dues is ANY:
-            if lane == EVERY_LANE:  # a node that obeyed an order to all must be stopped, too
-                self.positions.add([reply.lane for reply in answer.replies])
-        else:
-            answered = self._answered(attempt, dues, now)
-            if request.rank is not Rank.STOP:  # a request that the stop cut short may still be answered
-                for due in answered:
-                    self.sync.confirm(due, probe=attempt.is_probe)
-            self.statistics.answered(answered, now - attempt.sent_at)
-            self.positions.answered([due.node for due in answered], request, answer, self.rate)
-        self._continue(attempt)
-
-    def _answered(self, attempt: Attempt, dues: Sequence[Due], now: float) -> list[Due]:
-        """The nodes whose reply counts; the others are out of sync."""
-        answered = []
-        for index, due in enumerate(dues):
-            if index in attempt.replies and due.node not in attempt.excluded:
-                answered.append(due)
-                continue
-            node = self.sync.of(due.node)
-            if index not in attempt.replies:
-                self.sync.mark_owed(attempt.request.lane, due, now + self.quiet_time)
-            else:
-                node.quiet_until = now + self.quiet_time
-            self.statistics.of(due.node).errors[attempt.failure()] += 1
-        return answered
-
-    def _fail(self, lane: int, attempt: Attempt, now: float) -> None:
-        attempt.fault = attempt.failure()
-        for index, due in enumerate(attempt.request.replies):  # type: ignore[arg-type]  # ANY never fails
-            if index not in attempt.replies and attempt.request.rank is not Rank.STOP:
-                self.sync.mark_owed(lane, due, now + self.quiet_time)
-            else:
-                self.sync.of(due.node).quiet_until = now + self.quiet_time
-            self.statistics.of(due.node).errors[attempt.fault] += 1
-        if attempt.fault == "silence":
+        if attempt.fault in ("", "silence") or not dues:
             self._end_echo_test(attempt)
-        del self.in_flight[lane]
-        self._continue(attempt)
-
-    def _continue(self, attempt: Attempt) -> None:
+        if not attempt.fault or not dues:
+            attempt.accepted = answer
+            self._accept(attempt, answer, answered, now)
         attempt.ended = True
         if attempt.job is not None:
             self._resume(attempt.job, attempt)
+
+    def _is_answered(self, attempt: Attempt, index: int, due: Due, now: float) -> bool:
+        """Whether this reply counts; where it does not, its node is out of sync."""
+        if not attempt.fault and index in attempt.replies and due.node not in attempt.excluded:
+            return True
+        quiet_until = now + self.quiet_time
+        if index in attempt.replies or attempt.request.rank is Rank.STOP:
+            self.sync.of(due.node).quiet_until = quiet_until
+        else:
+            self.sync.mark_owed(attempt.request.lane, due, quiet_until)
+        self.statistics.of(due.node).errors[attempt.failure()] += 1
+        return False
+
+    def _accept(self, attempt: Attempt, answer: Answer, answered: Sequence[Due], now: float) -> None:
+        request = attempt.request
+        if request.replies is ANY:
+            if request.lane == EVERY_LANE:  # a node that obeyed an order to all must be stopped, too
+                self.positions.add([reply.lane for reply in answer.replies])
+            return
+        if request.rank is not Rank.STOP:  # a request that the stop cut short may still be answered
+            for due in answered:
+                self.sync.confirm(due, probe=attempt.is_probe)
+        self.statistics.answered(answered, now - attempt.sent_at)
+        self.positions.answered([due.node for due in answered], request, answer, self.rate)
 
     def _end_echo_test(self, attempt: Attempt) -> None:
         """The test of the echo has ended: only its reply came, or nothing at all."""
@@ -619,8 +596,8 @@ class Engine:
         if request.whole is None or request.replies is ANY:
             return None
         nodes = nodes_of(request)
-        states = {node: self.sync.of(node) for node in nodes}
-        return Prepared(self, request, request.whole, states, self.statistics.group(nodes))
+        states, times = [self.sync.of(node) for node in nodes], self.statistics.group(nodes)
+        return Prepared(self, request, request.whole, nodes, states, times, Attempt(request))
 
     def measure(self, prepared: Prepared) -> None:
         """Compute the time budget of a prepared request for the present rate and latency."""
@@ -628,25 +605,13 @@ class Engine:
         prepared.budget = self.air_time(request) + self.reply_timeout(request)
         prepared.rate, prepared.latency = self.rate, self.latency
 
-    def accepted(self, prepared: Prepared, data: Data, at: float) -> None:
-        """This is the complete reply to a prepared request that was sent alone."""
-        record, single, sent_at = prepared.record, prepared.single, prepared.attempt.sent_at
-        if self.last is not record:
-            self.note_last(record)
-        if single is not None:
-            single.length, single.asked_at = prepared.length, sent_at
-        prepared.times[int(1e6 * (at - sent_at)).bit_length()] += 1
-        record.data, record.at, record.source, record.kept = data, at, prepared, None
-        record.orders = self.positions.orders
-        del self.in_flight[prepared.lane]
-
     def note_last(self, record: Prepared | None = None) -> None:
         """Another request follows the last prepared one: note when its nodes were asked, and what they replied."""
         last, self.last = self.last, record
         if last is not None:
             for state in last.states:
                 state.length, state.asked_at = last.source.length, last.source.attempt.sent_at
-        if record is not None and record.tells_position:
+        if record is not None and record.exchange.tells_position:
             self.positions.latest.update(dict.fromkeys(record.nodes, record))
 
     # -- time, loss, stop --------------------------------------------------------------------------------------

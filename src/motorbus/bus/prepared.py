@@ -2,78 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from math import inf
-from typing import Any, Final
+from typing import Any
 
 from motorbus.bus.attempt import Attempt
 from motorbus.bus.sync import NodeSync
 from motorbus.core.operation import ANY, Answer, CanFrame, Data, Exchange, Reply, Whole
 
 
+@dataclass(slots=True, eq=False)
 class Prepared:
     """A request whose complete reply one function decodes. It belongs to one bus.
 
     `budget` is s from the write to the deadline, at this `rate` and `latency`. `alternate` is the same request with a
     reply of another length, itself where there is none. `record` is the one of the two that keeps the last reply:
     `data`, which `source` asked for, its arrival `at` (s) and the number of `orders` sent before it. `times` counts
-    replies by latency.
+    replies by latency. `single` is the state of its node, None for a group.
     """
 
-    __slots__ = (
-        "alternate",
-        "at",
-        "attempt",
-        "budget",
-        "data",
-        "decode",
-        "engine",
-        "exchange",
-        "kept",
-        "lane",
-        "latency",
-        "length",
-        "nodes",
-        "orders",
-        "rate",
-        "record",
-        "single",
-        "source",
-        "states",
-        "tells_position",
-        "times",
-        "wire",
-    )
+    engine: object
+    exchange: Exchange[Any]
+    decode: Whole[Any]
+    nodes: tuple[int, ...]
+    states: list[NodeSync]
+    times: list[int]
+    attempt: Attempt
+    wire: Data = field(init=False)
+    lane: int = field(init=False)
+    length: int = field(init=False)
+    single: NodeSync | None = field(init=False)
+    alternate: Prepared = field(init=False)
+    record: Prepared = field(init=False)
+    source: Prepared = field(init=False)
+    rate: int = 0
+    latency: float = 0.0
+    budget: float = 0.0
+    data: Data = b""
+    at: float = -inf
+    orders: int = 0
+    kept: Answer | None = None
 
-    def __init__(
-        self,
-        engine: object,
-        exchange: Exchange[Any],
-        decode: Whole[Any],
-        states: Mapping[int, NodeSync],
-        times: list[int],
-    ) -> None:
-        dues = exchange.replies
+    def __post_init__(self) -> None:
+        dues = self.exchange.replies
         assert dues is not ANY
-        self.engine: Final = engine
-        self.exchange: Final = exchange
-        self.wire: Final = exchange.request
-        self.lane: Final = exchange.lane
-        self.decode: Final = decode
-        self.nodes: Final = nodes_of(exchange)
-        self.states: Final = [states[node] for node in self.nodes]
-        self.single: Final = self.states[0] if len(dues) == 1 else None
-        self.length: Final = dues[0].length
-        self.tells_position: Final = bool(exchange.tells_position)
-        self.times: Final = times
+        self.wire, self.lane, self.length = self.exchange.request, self.exchange.lane, dues[0].length
+        self.single = self.states[0] if len(dues) == 1 else None
         self.alternate = self.record = self.source = self
-        self.attempt = Attempt(exchange, None)
-        self.rate, self.latency = 0, 0.0
-        self.budget = 0.0
-        self.data: Data = b""
-        self.at = -inf
-        self.orders = 0
-        self.kept: Answer | None = None
 
     def reading(self) -> tuple[Exchange[Any], Answer, int]:
         """The request, its last reply, split into the replies of the nodes, and the orders sent before it."""

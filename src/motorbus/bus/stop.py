@@ -128,7 +128,7 @@ class EmergencyStop:
         stop = engine.positions.frames(bus.now())
         disturbs_no_reply = [request for request in stop.exchanges if not request.replies]
         for request in disturbs_no_reply or stop.exchanges:
-            engine.positions.sent(request)
+            engine.note_stop(request)
             with contextlib.suppress(LinkError):
                 bus.link.write(request.request)
         if bus.turn.acquire(Rank.STOP, STOP_TIMEOUT):

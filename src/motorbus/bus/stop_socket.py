@@ -79,25 +79,15 @@ def request_estop(path: Path, timeout: float = STOP_TIMEOUT) -> StopOutcome:
 
     Raises PortNotFound when no process serves it, LinkError when the process does not answer in time.
     """
-    reply = _ask(path, _request(), timeout) or _ask(path, b"estop\n", timeout)  # as older versions know it
-    if not reply.endswith(b"\n"):
-        raise LinkError("the process that holds the bus ended without answering", received=reply)
-    outcome = json.loads(reply)
-    return StopOutcome(
-        tuple(outcome["acknowledged"]), tuple(outcome["silent"]), outcome["rounds"], outcome["promise"]
-    )
-
-
-def _ask(path: Path, request: bytes, timeout: float) -> bytes:
-    """Send one request to the process that serves this socket; its reply, b"" where it hangs up without one."""
+    reply = b""
     with socket.socket(socket.AF_UNIX) as client:
         client.settimeout(timeout)
         try:
             client.connect(str(path))
-            client.sendall(request)
-            return client.makefile("rb").readline()
+            client.sendall(_request())
+            reply = client.makefile("rb").readline()
         except (ConnectionResetError, BrokenPipeError):
-            return b""
+            pass
         except (FileNotFoundError, ConnectionRefusedError):
             raise PortNotFound(
                 "no motorbus process offers an emergency stop for this bus",
@@ -105,3 +95,9 @@ def _ask(path: Path, request: bytes, timeout: float) -> bytes:
             ) from None
         except OSError as error:
             raise LinkError(f"the process that holds the bus did not answer: {error}") from error
+    if not reply.endswith(b"\n"):
+        raise LinkError("the process that holds the bus ended without answering", received=reply)
+    outcome = json.loads(reply)
+    return StopOutcome(
+        tuple(outcome["acknowledged"]), tuple(outcome["silent"]), outcome["rounds"], outcome["promise"]
+    )

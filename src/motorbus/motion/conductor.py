@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TypeVar
 
-from motorbus.bus import aio, blocking
+from motorbus.bus import aio, running
 from motorbus.bus.aio import AsyncBus
 from motorbus.bus.blocking import Bus
 from motorbus.errors import MotorbusError
@@ -40,7 +40,7 @@ class Conductor:
     def _run(self, work: Abreast[T]) -> T:
         procedures = work.operations
         if len(procedures) != 1:
-            values = blocking.run_on({self._buses[name]: wanted for name, wanted in procedures.items()})
+            values = running.run_on({self._buses[name]: wanted for name, wanted in procedures.items()})
             return work.combine({name: values[self._buses[name]] for name in procedures})
         ((name, wanted),) = procedures.items()
         try:
