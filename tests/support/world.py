@@ -12,11 +12,10 @@ from functools import cache
 from typing import Any, Protocol, cast
 
 from motorbus.bus.aio import AsyncBus
-from motorbus.bus.attempt import Attempt
 from motorbus.bus.base import BaseBus
 from motorbus.bus.blocking import Bus
 from motorbus.bus.engine import Engine
-from motorbus.bus.jobs import RequestJob
+from motorbus.bus.jobs import Attempt, RequestJob
 from motorbus.bus.stop_socket import StopOutcome
 from motorbus.bus.trace import Subscription, TraceRecord
 from motorbus.core.entry import Entry, Table
@@ -107,7 +106,7 @@ class Tries:
 
     def answered(self, exchange: Exchange[Any], data: list[Data]) -> tuple[Any, str]:
         """The answer, None where it failed, and the kind of failure of what is missing: `silence`, `checksum` …"""
-        attempt = Attempt(exchange, None)
+        attempt = Attempt(exchange)
         self.engine.begin(attempt, 0.0)
         self.engine.feed(data, self.SOON)
         self.engine.expire(attempt.deadline)

@@ -10,10 +10,9 @@ from threading import Condition
 from typing import Any
 
 from motorbus.bus import failures
-from motorbus.bus.attempt import Attempt
 from motorbus.bus.engine import Engine
 from motorbus.bus.interlock import Interlock
-from motorbus.bus.jobs import RateJob, RequestJob, Since
+from motorbus.bus.jobs import Attempt, RateJob, RequestJob, Since
 from motorbus.bus.policy import carry_out
 from motorbus.bus.positions import Reading
 from motorbus.bus.prepared import Prepared

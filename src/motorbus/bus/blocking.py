@@ -7,10 +7,9 @@ from math import inf
 from threading import get_ident
 from typing import Any, Self, TypeVar
 
-from motorbus.bus.attempt import Attempt
 from motorbus.bus.base import BaseBus
 from motorbus.bus.interrupts import ELSEWHERE, INTERRUPTS, MAIN, Interrupts, interrupts
-from motorbus.bus.jobs import RequestJob
+from motorbus.bus.jobs import Attempt, RequestJob
 from motorbus.bus.positions import GATED
 from motorbus.bus.prepared import Prepared
 from motorbus.bus.running import BRIEF, run_here, run_on

@@ -15,10 +15,9 @@ from math import inf
 from typing import Any, Final, TypeVar
 
 from motorbus.bus import failures
-from motorbus.bus.attempt import Attempt
 from motorbus.bus.echo import Echo
 from motorbus.bus.interlock import Interlock
-from motorbus.bus.jobs import ExclusiveJob, Job, RateJob, RequestJob, Send, Since, Wait
+from motorbus.bus.jobs import Attempt, ExclusiveJob, Job, RateJob, RequestJob, Since, Wait
 from motorbus.bus.policy import carry_out
 from motorbus.bus.positions import GATED, LastPositions, addressed, moves
 from motorbus.bus.prepared import Prepared, nodes_of
@@ -245,40 +244,41 @@ class Engine:
             return None
         if self.paced and now < self.free_at:
             return None
-        if not isinstance(job.step, Send):
+        if not isinstance(job.step, Attempt):
             if job.step is not None and now < job.step.until:
                 return None
             self._resume(job)
-        if job.done or not isinstance(job.step, Send):
+        if job.done or not isinstance(job.step, Attempt):
             return None
-        step, request = job.step, job.step.request
-        if now < self._earliest(step):  # another request to this node has failed since the probe was chosen
+        attempt, request = job.step, job.step.request
+        if now < self._earliest(
+            attempt
+        ):  # another request to this node has failed since the probe was chosen
             return None
-        unprobed = step.is_probe or request.rank is Rank.STOP or request.timeout is Timeout.SCAN
+        unprobed = attempt.is_probe or request.rank is Rank.STOP or request.timeout is Timeout.SCAN
         doubtful = [] if unprobed else self.sync.doubtful(request)
-        if any(node not in step.excluded for node in doubtful):
+        if any(node not in attempt.excluded for node in doubtful):
             self._resume(job)
             return None
         self._remove(job)
         try:
-            if step.is_probe:
+            if attempt.is_probe:
                 self._check_not_listening(request)
             else:
                 self.check(request, job.since)
         except MotorbusError as error:
             job.settle(error=error)
             return None
-        attempt = Attempt(request, job, step.excluded, is_probe=step.is_probe)
-        attempt.echo_excluded = step.after_echo and self.echo.present is False
+        attempt.job = job
+        attempt.echo_excluded = attempt.after_echo and self.echo.present is False
         self.begin(attempt, now)
         return request.request
 
-    def _earliest(self, step: Send | Wait) -> float:
+    def _earliest(self, step: Attempt | Wait) -> float:
         """The moment (s) before which this step does nothing."""
         if isinstance(step, Wait):
             return step.until
-        dues = step.request.replies
-        return self.sync.of(dues[0].node).quiet_until if step.is_probe and dues and dues is not ANY else -inf
+        return self.sync.of(step.dues[0].node).quiet_until if step.is_probe else -inf
 
     def since(self) -> Since:
         """What has happened so far, for `check`."""

@@ -1,11 +1,17 @@
-"""What waits for the bus: a request, a change of the bit rate, or exclusive use."""
+"""What waits for the bus: a request with its attempts, a change of the bit rate, or exclusive use."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass, field
+from math import inf
 from typing import Any, NamedTuple, TypeAlias
 
-from motorbus.core.operation import Answer, Exchange, Rank, Tune
+from motorbus.bus.failures import FAULTS
+from motorbus.core.operation import ANY, Answer, Due, Exchange, Rank, Reply, Tune
+
+NOISE_KEPT = 16
+"""Pieces of noise kept for the error message."""
 
 Stops: TypeAlias = "Mapping[int | None, int]"
 """Number of stops sent by node; None: for all nodes."""
@@ -19,27 +25,14 @@ class Since(NamedTuple):
     losses: int
 
 
-class Send(NamedTuple):
-    """Step of a policy: send this request; the engine gives the finished attempt.
-
-    `excluded` are nodes of a group that are not waited for. `after_echo`: the last attempt failed by an echo, so this
-    one takes a reply that equals a request if a probe has excluded an echo since.
-    """
-
-    request: Exchange[Any]
-    excluded: tuple[int, ...] = ()
-    is_probe: bool = False
-    after_echo: bool = False
-
-
 class Wait(NamedTuple):
     """Step of a policy: do nothing before this moment (s)."""
 
     until: float
 
 
-Policy: TypeAlias = "Generator[Send | Wait, Any, Answer]"
-"""What is done for one request; it gets a finished `Attempt`, or None after a wait."""
+Policy: TypeAlias = "Generator[Attempt | Wait, Any, Answer]"
+"""What is done for one request: it yields attempts and gets each back when it has ended, or None after a wait."""
 
 
 class Job:
@@ -94,7 +87,7 @@ class RequestJob(Job):
         self.priority = request.rank
         self.since = since
         self.policy: Policy | None = None
-        self.step: Send | Wait | None = None
+        self.step: Attempt | Wait | None = None
 
 
 class RateJob(Job):
@@ -117,3 +110,100 @@ class ExclusiveJob(Job):
     """A wish to have the bus alone; it is settled when nothing else is in flight."""
 
     priority = Rank.POLL
+
+
+@dataclass(slots=True, eq=False)
+class Attempt:
+    """A request in flight, and what came for it.
+
+    `job` is None for an attempt whose caller no longer waits. `excluded` are nodes of a group that this attempt does
+    not wait for, or whose reply was damaged. `after_echo`: the attempt before met an echo. `echo_excluded`: a probe has
+    shown since that there is none, so a reply may equal a request. `air` is its time on the wire (s), `competitors` the
+    number of attempts on other lanes that its deadline allows for. `fault` is why it failed, "" while it has not;
+    `surplus`: more came than was expected. `accepted` is what the caller gets. `ended`: it is not in flight any more.
+    """
+
+    request: Exchange[Any]
+    job: RequestJob | None = None
+    excluded: tuple[int, ...] = ()
+    is_probe: bool = False
+    after_echo: bool = False
+    echo_excluded: bool = False
+    sent_at: float = 0.0
+    deadline: float = inf
+    air: float = 0.0
+    competitors: int = 0
+    replies: dict[int, Reply] = field(default_factory=dict)
+    noise: list[tuple[str, bytes]] = field(default_factory=list)
+    fault: str = ""
+    surplus: bool = False
+    complete: bool = False
+    accepted: Answer | None = None
+    ended: bool = False
+
+    @property
+    def dues(self) -> tuple[Due, ...]:
+        """The replies expected; none where any reply counts."""
+        return () if self.request.replies is ANY else self.request.replies
+
+    def take(self, reply: Reply) -> bool:
+        """Keep this reply if it is one of those expected."""
+        if self.request.replies is ANY:
+            self.replies[len(self.replies)] = reply
+            return True
+        for index, due in enumerate(self.dues):
+            if due.key == reply.key and due.length == len(reply.data) and index not in self.replies:
+                self.replies[index] = reply
+                self._check_complete()
+                return True
+        return False
+
+    def _check_complete(self) -> None:
+        """A group does not wait for excluded nodes."""
+        dues = self.request.replies
+        self.complete = dues is not ANY and all(
+            index in self.replies or due.node in self.excluded for index, due in enumerate(dues)
+        )
+
+    def is_excluded(self, reply: Reply) -> bool:
+        """An excluded node sent this reply: it came in spite of not being waited for."""
+        kind = reply.key, len(reply.data)
+        return any(due.node in self.excluded and (due.key, due.length) == kind for due in self.dues)
+
+    def take_noise(self, fault: str, data: bytes) -> None:
+        """Noise before the first reply does no harm; behind a reply that reply may be shifted by a byte."""
+        if self.complete:
+            self.surplus = True
+        elif self.replies and self.dues:
+            self.exclude(self.replies[max(self.replies)])
+        self.noise.append((fault, data[:64]))
+        del self.noise[:-NOISE_KEPT]
+
+    def exclude(self, reply: Reply) -> None:
+        """The node of this reply sent something unexpected: a group loses that node, a single request fails."""
+        if len(self.dues) > 1:
+            self.excluded += tuple(due.node for due in self.dues if due.key == reply.key)
+            self._check_complete()
+        else:
+            self.fault = self.fault or "unexpected"
+
+    def failure(self) -> str:
+        """The kind of fault of this attempt, a key of `FAULTS`."""
+        if self.fault or self.surplus:
+            return self.fault or "surplus"
+        kinds = [kind for kind, _ in self.noise]
+        if "checksum" in kinds:
+            return "checksum"
+        return kinds[0] if kinds and kinds[0] in FAULTS else "silence"
+
+    def answer(self, at: float) -> Answer:
+        """The replies in the order expected; excluded nodes count as missing."""
+        if self.request.replies is ANY:
+            return Answer(tuple(self.replies.values()), (), at)
+        taken = [i for i, due in enumerate(self.dues) if i in self.replies and due.node not in self.excluded]
+        missing = tuple(due.node for i, due in enumerate(self.dues) if i not in taken)
+        return Answer(tuple(self.replies[i] for i in taken), missing, at)
+
+    def received(self) -> bytes:
+        """All that came, for the error message."""
+        return b"".join([*(data for _, data in self.noise), *(reply.data for reply in self.replies.values())])

@@ -6,8 +6,7 @@ from collections.abc import Callable, Generator
 from typing import Any, Protocol
 
 from motorbus.bus import failures
-from motorbus.bus.attempt import Attempt
-from motorbus.bus.jobs import Policy, Send, Wait
+from motorbus.bus.jobs import Attempt, Policy, Wait
 from motorbus.bus.statistics import Statistics
 from motorbus.bus.sync import SyncTable
 from motorbus.core.operation import ANY, Exchange, Rank, Timeout
@@ -46,7 +45,9 @@ def carry_out(engine: Context, request: Exchange[Any]) -> Policy:
                 if len(request.replies) == 1:  # type: ignore[arg-type]  # never ANY here
                     raise _error(engine, request, failed, tries, sent)
                 excluded += (node,)
-        attempt: Attempt | None = yield Send(engine.alternate(request), excluded, after_echo=fault == "echo")
+        attempt: Attempt | None = yield Attempt(
+            engine.alternate(request), excluded=excluded, after_echo=fault == "echo"
+        )
         if attempt is None:  # a node has come out of sync before this could be sent
             continue
         sent = True
@@ -67,20 +68,20 @@ def _may_repeat(request: Exchange[Any], fault: str) -> bool:
 
 def _resync(
     engine: Context, request: Exchange[Any], node: int
-) -> Generator[Send | Wait, Attempt | None, tuple[Attempt | None, int]]:
+) -> Generator[Attempt | Wait, Attempt | None, tuple[Attempt | None, int]]:
     """Wait for the quiet time and probe this node; the probe that failed, None when the node is in sync, and how many.
 
     A group does not wait for a node that was silent lately.
     """
     state, group = engine.sync.of(node), len(request.replies) > 1  # type: ignore[arg-type]
     if group and state.silences and engine.time < state.probe_at:
-        return Attempt(request, None), 0
+        return Attempt(request), 0
     for tries in range(1, RETRIES + 2):
         while engine.time < state.quiet_until:  # another request may have moved it meanwhile
             yield Wait(state.quiet_until)
         if node not in engine.sync.out_of_sync:  # another request has probed it meanwhile
             return None, tries - 1
-        attempt = yield Send(engine.sync.next_probe(node), is_probe=True)
+        attempt = yield Attempt(engine.sync.next_probe(node), is_probe=True)
         assert attempt is not None
         if not attempt.fault:
             return None, 0

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import Any
 
-from motorbus.bus.attempt import Attempt
+from motorbus.bus.jobs import Attempt
 from motorbus.bus.sync import NodeSync
 from motorbus.core.operation import ANY, Answer, CanFrame, Data, Exchange, Reply, Whole
 
