@@ -9,7 +9,7 @@ from typing import Any, Self, TypeVar
 
 from motorbus.bus.base import BaseBus
 from motorbus.bus.interrupts import ELSEWHERE, INTERRUPTS, MAIN, Interrupts, interrupts
-from motorbus.bus.jobs import Attempt, RequestJob
+from motorbus.bus.jobs import Attempt, RequestJob, Since
 from motorbus.bus.positions import GATED
 from motorbus.bus.prepared import Prepared
 from motorbus.bus.running import BRIEF, run_here, run_on
@@ -41,7 +41,7 @@ class Bus(BaseBus):
         if self.link.virtual:
             self.check_thread()
         signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
-        since = self.engine.since() if request.effect else None
+        since = self.engine.since if request.effect else None
         signals.depth += 1
         try:
             turn.acquire(request.rank)
@@ -106,6 +106,7 @@ class Bus(BaseBus):
         by `result`. Until then the calling thread has the bus, signals are deferred, and the thread uses the bus for
         nothing else.
         """
+        _check_requests(requests)
         if self.link.virtual:
             self.check_thread()
         signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
@@ -113,7 +114,7 @@ class Bus(BaseBus):
         signals.depth += 1
         try:
             if self.turn.acquire(Rank.CONTROL, timeout):
-                self._start(pending)
+                pending.prepared = self._write_batch(requests, pending.since)
         except LinkError as error:
             self._lost(error)
             raise
@@ -122,23 +123,20 @@ class Bus(BaseBus):
                 pending.release()
         return pending
 
-    def _start(self, pending: Pending) -> None:
-        """Write a batch of a prepared request, and an order in front of it, if both may leave now."""
-        requests = pending.requests
-        _check_requests(requests)
-        count = len(requests)
-        if count != 1 and not (count == 2 and self._may_join(requests[0])):
-            return
+    def _write_batch(self, requests: Sequence[Exchange[Any]], since: Since) -> Prepared | None:
+        """Write a prepared request, and an order in front of it; None where they cannot leave now."""
+        order = requests[0] if len(requests) == 2 else None
+        if len(requests) > 2 or not requests or (order is not None and not self._may_join(order)):
+            return None
         prepared = self.prepare(requests[-1])
-        if prepared is None:
-            return
-        try:
-            self.write(prepared, None if count == 1 else requests[0], pending.since)
-        except LinkError:
-            raise
-        except MotorbusError:  # the order is refused: `result` says so
-            return
-        pending.prepared = prepared
+        if prepared is not None:
+            try:
+                self.write(prepared, order, since)
+            except LinkError:
+                raise
+            except MotorbusError:  # the order is refused: `result` says so
+                return None
+        return prepared
 
     def _may_join(self, order: Exchange[Any]) -> bool:
         """This order may leave in one write with the next request."""
@@ -177,7 +175,7 @@ class Pending:
         self.bus = bus
         self.requests = requests
         self.signals = signals
-        self.since = bus.engine.since()
+        self.since = bus.engine.since
         self.prepared: Prepared | None = None
         self.ended = False
 

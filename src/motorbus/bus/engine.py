@@ -100,6 +100,8 @@ class Engine:
         """bit/s"""
         self.latency = latency
         """s that the adapter may hold data back; part of every deadline."""
+        self.since = Since(self.positions.stops, self.latches, self.losses)
+        """What has happened so far. A caller keeps it for `check`."""
         self._serial = count()
         self._unacknowledged: list[Attempt] = []
         self.ready = False
@@ -262,10 +264,7 @@ class Engine:
             return None
         self._remove(job)
         try:
-            if attempt.is_probe:
-                self._check_not_listening(request)
-            else:
-                self.check(request, job.since)
+            self.check(request, job.since)
         except MotorbusError as error:
             job.settle(error=error)
             return None
@@ -280,13 +279,10 @@ class Engine:
             return step.until
         return self.sync.of(step.dues[0].node).quiet_until if step.is_probe else -inf
 
-    def since(self) -> Since:
-        """What has happened so far, for `check`."""
-        return Since(self.positions.stops, self.latches, self.losses)
-
     def check(self, request: Exchange[Any], since: Since | None) -> None:
         """Raise the error for which this request, which was decided at `since`, must not leave now."""
-        self._check_not_listening(request)
+        if self.listening:
+            raise failures.listen_only(request)
         if request.rank is Rank.STOP:
             return
         self._check_stops(request, since)
@@ -305,21 +301,22 @@ class Engine:
             return
         if self.latched:
             raise failures.latched(self.latched_by)
-        if since is not None and moves(request):
-            if since.latches != self.latches or self.positions.is_stopped(request, since.stops):
-                raise failures.stopped()
-            if since.losses != self.losses:
-                raise failures.outlived(request)
+        if since is None or since is self.since or not moves(request):
+            return
+        if since.latches != self.latches or self.positions.is_stopped(request, since.stops):
+            raise failures.stopped()
+        if since.losses != self.losses:
+            raise failures.outlived(request)
 
     def note_stop(self, request: Exchange[Any]) -> None:
         """A request that stops something is about to leave; from any thread."""
         self.positions.sent(request)
+        self._note_since()
         if self.interlock is not None and request.effect in GATED:
             self.interlock.stopped(tuple(addressed(request)))
 
-    def _check_not_listening(self, request: Exchange[Any]) -> None:
-        if self.listening:
-            raise failures.listen_only(request)
+    def _note_since(self) -> None:
+        self.since = Since(self.positions.stops, self.latches, self.losses)
 
     def begin(self, attempt: Attempt, now: float) -> None:
         """Record an attempt before its request is written."""
@@ -631,6 +628,7 @@ class Engine:
         self.latched_by = self.latched_by if self.latched else by
         self.latches += 1
         self.latched = self.stopping = True
+        self._note_since()
         self.ready = False
 
     def stop_delay(self, now: float) -> float:
@@ -691,6 +689,7 @@ class Engine:
         self.exclusive = None
         if isinstance(error, LinkLost):
             self.losses += self.gone is None
+            self._note_since()
             self.gone = self.loss = error
             self.positions.forget()
         for job in jobs:

@@ -98,26 +98,27 @@ class LastPositions(Mapping[int, Reading]):
     # -- orders and stops --------------------------------------------------------------------------------------
 
     def sent(self, exchange: Exchange[Any]) -> None:
-        """A request leaves that may move something, or stops it."""
+        """A request leaves that may move something, or stops it.
+
+        The last position and acknowledgement of the nodes of an order (none: all) count no longer.
+        """
         if exchange.rank is Rank.STOP:
             if exchange.effect in GATED:
                 stops = Counter(self.stops)
                 stops.update(addressed(exchange) or (None,))
                 self.stops, self.stop_total = stops, self.stop_total + 1
             return
-        ordered = exchange.ordered
-        if ordered:
-            self.add(ordered)
+        nodes = tuple(exchange.ordered)
+        if not self.nodes.issuperset(nodes):
+            self.add(nodes)
         if exchange.effect in GATED:
-            self._moved(tuple(addressed(exchange) if exchange.replies else ordered))
-
-    def _moved(self, nodes: tuple[int, ...]) -> None:
-        """These nodes (empty: all) got an order: their last position and acknowledgement no longer count."""
-        self.orders += 1
-        self._ordered[nodes] = self.orders
-        for replies in (self._acknowledged, self._stop_replies):
-            for node in (nodes or self.nodes) if replies else ():
-                replies.pop(node, None)
+            if exchange.replies:
+                nodes = tuple(addressed(exchange))
+            self.orders += 1
+            self._ordered[nodes] = self.orders
+            for replies in (self._acknowledged, self._stop_replies):
+                for node in (nodes or self.nodes) if replies else ():
+                    replies.pop(node, None)
 
     def stop_count(self, node: int) -> int:
         """Number of stops sent to this node, those for all nodes included."""

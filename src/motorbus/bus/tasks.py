@@ -92,7 +92,7 @@ class TaskTree(Generic[T]):
         self.now = now
         self.report = report
         self.settled = settled
-        self.since = since or engine.since()
+        self.since = since or engine.since
         self.has_ordered = False
         """It has sent a request that moves or stops something, so its own stops count no more."""
         self.cancellation: BaseException | None = None
