@@ -87,14 +87,13 @@ class Engine:
         self.queue: list[Job] = []
         self.listeners: list[Callable[[Notice], None]] = []
         self.end_sleeps: list[Callable[[BaseException], None]] = []
-        """Called with the error when an emergency stop is latched: procedures that sleep end."""
+        """Called with the error when an emergency stop is latched or the port is lost: procedures that sleep end."""
         self.exclusive: object = None
         self.latched = self.stopping = False
         self.latched_by = ""
         self.losses = self.latches = 0
         self.gone: LinkLost | None = None
-        self.loss: LinkLost | None = None
-        """The last one; `gone` is None again when the port is back."""
+        """Why there is no port; None again when it is back."""
         self.free_at = self.time = 0.0
         self.rate = rate
         """bit/s"""
@@ -688,10 +687,12 @@ class Engine:
         self._unacknowledged.clear()
         self.exclusive = None
         if isinstance(error, LinkLost):
-            self.losses += self.gone is None
+            is_new, self.gone = self.gone is None, error
+            self.losses += is_new
             self._note_since()
-            self.gone = self.loss = error
             self.positions.forget()
+            for end in tuple(self.end_sleeps) if is_new else ():
+                end(error)
         for job in jobs:
             if job is not None:
                 job.settle(error=error)

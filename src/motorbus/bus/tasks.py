@@ -47,10 +47,9 @@ READS: Final = 2
 class Timer(Job):
     """Waits for a moment, or for a notification."""
 
-    def __init__(self, settled: Callable[[], None] | None, until: float, losses: int) -> None:
+    def __init__(self, settled: Callable[[], None] | None, until: float) -> None:
         super().__init__(settled=settled)
         self.until = until
-        self.losses = losses
         self.listener: Callable[[Notice], None] | None = None
 
 
@@ -110,9 +109,7 @@ class TaskTree(Generic[T]):
         """Step every task that can go on; True when the procedure has ended."""
         now = self.now()
         for timer in tuple(self.timers):
-            if timer.losses != self.engine.losses:
-                self._end(timer, error=self.engine.loss)
-            elif timer.until <= now:
+            if timer.until <= now:
                 self._end(timer, None if timer.listener is not None else now)
         if now >= self.deadline:
             for task in self._waiting(self.root):
@@ -246,7 +243,7 @@ class TaskTree(Generic[T]):
         elif isinstance(step, Listen):
             self._listen(task, step)
         elif isinstance(step, Pause):
-            task.job = timer = Timer(self.settled, self.now() + step.seconds, self.engine.losses)
+            task.job = timer = Timer(self.settled, self.now() + step.seconds)
             self.timers.append(timer)
             if LONG_SLEEP <= step.seconds <= self.extension:
                 self.extension -= step.seconds
@@ -278,18 +275,17 @@ class TaskTree(Generic[T]):
     def _report(self, task: Task, event: object) -> None:
         """The report has been handed over before the next step; what it raises is raised in the task."""
         task.job = Job()
-        if self.report is None and isinstance(event, Journal):
-            task.job.settle(error=_no_journal(event))
-            return
         try:
             if self.report is not None:
                 self.report(event)
+            elif isinstance(event, Journal):
+                raise _no_journal(event)
         except Exception as error:
             task.job.settle(error=error)
         task.job.settle()
 
     def _listen(self, task: Task, step: Listen) -> None:
-        task.job = timer = Timer(self.settled, self.now() + step.until, self.engine.losses)
+        task.job = timer = Timer(self.settled, self.now() + step.until)
 
         def listen(notice: Notice) -> None:
             try:
@@ -325,10 +321,7 @@ class TaskTree(Generic[T]):
         if self.end_sleeps in self.engine.end_sleeps:
             self.engine.end_sleeps.remove(self.end_sleeps)
         for task in self._waiting(self.root):
-            if task.job is not None:
-                self.engine.cancel(task.job)
-            if isinstance(task.job, Timer) and task.job in self.timers:
-                self._end(task.job)
+            self._cancel_job(task)
             if task.claims:
                 self.engine.release(task.owner)
             task.finished = True
@@ -348,12 +341,15 @@ class TaskTree(Generic[T]):
             self._join(task)
         else:
             task.cancelled = True
-            if task.job is not None:
-                job, task.job = task.job, None
-                self.engine.cancel(job)
-                if isinstance(job, Timer) and job in self.timers:
-                    self._end(job)
+            self._cancel_job(task)
             self._resume(task, error=self.cancellation)
+
+    def _cancel_job(self, task: Task) -> None:
+        job, task.job = task.job, None
+        if isinstance(job, Timer) and job in self.timers:
+            self._end(job)
+        elif job is not None:
+            self.engine.cancel(job)
 
     def _waiting(self, task: Task) -> list[Task]:
         if task.finished:
