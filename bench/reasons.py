@@ -101,9 +101,7 @@ REASONS: Final[dict[str, dict[str, str]]] = {
         "loaded by": "something that the import runs needs one of them",
     },
     "15": {
-        "KST": "a run of equal answers ends in a probe, so that none is taken for a later one, and these frames "
-        "are not in the limit; nor are the first and last moments, in which the wire is not full yet, or not any "
-        "more",
+        "KST": "in the first and last moments the wire is not full",
     },
     "scale": {
         "line full": "each request is taken apart, obeyed and answered in Python; what that takes of a core is "

@@ -28,7 +28,7 @@ def share(found: Filled, slower: Filled) -> Row:
     """The row of what was measured at the two rates."""
     note = (
         f"{found.rate:.0f} of {found.limit:.0f} reads a second; at 500 kbit/s {slower.rate:.0f} of {slower.limit:.0f}, "
-        f"{slower.share:.1%}; what is missing are the probes in which each run of 128 equal answers ends"
+        f"{slower.share:.1%}"
     )
     of_all = 100 * found.share
     measure = "KST pipelined reads of 8 nodes at 1 Mbit/s, of the bit-exact limit, virtual time"
