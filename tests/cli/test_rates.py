@@ -9,7 +9,7 @@ import pytest
 
 from motorbus.cli import _COMMANDS
 from motorbus.cli.rates import check_rate
-from motorbus.core.units import GREATEST_RATE, LEAST_RATE
+from motorbus.core.units import MAX_RATE, MIN_RATE
 from tests.cli.conftest import Bench, Run
 from tests.support.machines import listened, said
 
@@ -47,5 +47,5 @@ def test_a_rate_that_cannot_be_is_one_error(command: str, rate: str, bench: Benc
 
 
 def test_every_other_rate_is_left_to_whoever_knows_the_bus() -> None:
-    check_rate(GREATEST_RATE)
-    check_rate(LEAST_RATE)
+    check_rate(MAX_RATE)
+    check_rate(MIN_RATE)

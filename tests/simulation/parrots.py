@@ -32,7 +32,7 @@ class Parrots:
     def audience(self, data: Data) -> Audience:
         assert isinstance(data, CanFrame)
         if data.id in self.others:
-            return Audience.NOBODY
+            return Audience.NONE
         return Audience.EVERYONE if data.id in self.calls else Audience.OURS
 
     @property

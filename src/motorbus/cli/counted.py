@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from motorbus.cli.exits import Exit
-from motorbus.core.capture import FAULTS, KINDS, NOBODY
+from motorbus.core.capture import ABSENT, FAULTS, KINDS
 from motorbus.errors import RequestError
 from motorbus.recorder import Decoder, Packets, decode
 from motorbus.recorder.bulk import can_decode
@@ -107,11 +107,11 @@ def _plain(column: Sequence[int]) -> Sequence[int]:
 
 
 def _facts(group: Group) -> dict[str, object]:
-    nobody = {name: None for name in ("node", "code") if getattr(group, name) == NOBODY}
+    nobody = {name: None for name in ("node", "code") if getattr(group, name) == ABSENT}
     return {**group._asdict(), **nobody}
 
 
 def _row(group: Group) -> tuple[object, ...]:
     kind = f"{group.kind}: {group.fault}" if group.fault else group.kind
-    node = "" if group.node == NOBODY else group.node
-    return kind, node, "" if group.code == NOBODY else f"0x{group.code:02X}", group.packets, group.bytes
+    node = "" if group.node == ABSENT else group.node
+    return kind, node, "" if group.code == ABSENT else f"0x{group.code:02X}", group.packets, group.bytes

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from motorbus.core.units import GREATEST_RATE, LEAST_RATE, parse
+from motorbus.core.units import MAX_RATE, MIN_RATE, parse
 from motorbus.errors import RequestError
 
 
 def check_rate(rate: float) -> None:
     """Raise RequestError for a rate (Hz) at which nobody can do anything. Nothing was sent."""
-    if not LEAST_RATE <= rate <= GREATEST_RATE:
+    if not MIN_RATE <= rate <= MAX_RATE:
         raise RequestError(
             f"--rate {rate:g}: it cannot be done so often",
-            expected=f"cycles per second: {LEAST_RATE:g} to {GREATEST_RATE:g}",
+            expected=f"cycles per second: {MIN_RATE:g} to {MAX_RATE:g}",
             advice="nothing was sent",
         )
 
@@ -35,9 +35,9 @@ def time_of(
 
 def check_smooth(smooth: float) -> None:
     """Raise RequestError for a frequency (Hz) by which nothing can be smoothed; 0 is for nothing. Nothing was sent."""
-    if smooth and not LEAST_RATE <= smooth <= GREATEST_RATE:
+    if smooth and not MIN_RATE <= smooth <= MAX_RATE:
         raise RequestError(
             f"--smooth {smooth:g}: nothing can be smoothed by that",
-            expected=f"Hz: {LEAST_RATE:g} to {GREATEST_RATE:g}, or 0 for nothing",
+            expected=f"Hz: {MIN_RATE:g} to {MAX_RATE:g}, or 0 for nothing",
             advice="nothing was sent",
         )

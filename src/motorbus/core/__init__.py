@@ -1,1 +1,1 @@
-"""The ground floor: values and pure functions every other floor is built of. No I/O, no clock, no threads."""
+"""Values and pure functions that all other packages use. No I/O, no clock, no threads."""

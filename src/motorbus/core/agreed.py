@@ -1,7 +1,8 @@
-"""A value that matters, on a wire whose check is weak: read until two readings in a row say the same.
+"""Read a value until two consecutive readings are equal.
 
-An 8-bit sum lets two damaged bytes in some hundred pass. That the next reading is damaged as well, passes as well and
-says the same is another matter. A value that changes all the time is never agreed on: this is for what stands still.
+For a wire with a weak check: an 8-bit sum accepts about one in some hundred packets with two damaged bytes. A second
+reading that is also damaged, also accepted and equal is improbable. A value that keeps changing never agrees, so the
+device must be at rest.
 """
 
 from __future__ import annotations
@@ -15,24 +16,24 @@ from motorbus.errors import VerificationFailed
 T = TypeVar("T")
 
 READINGS: Final = 8
-"""How often it is read at most."""
+"""Maximum number of readings."""
 
 
 def agreed(reading: Callable[[], Runnable[T]], *, node: int, what: str, most: int = READINGS) -> Operation[T]:
-    """What two readings in a row agree on; `reading` makes each, `what` is its name for people.
+    """Return the value on which two consecutive readings agree; `reading` makes each, `what` names it in errors.
 
-    Raises what a reading raises, and VerificationFailed when of `most` readings no two in a row are the same.
+    Raises the errors of a reading, and VerificationFailed if no two of `most` consecutive readings are equal.
     """
-    told: list[T] = []
+    values: list[T] = []
     for _ in range(most):
-        told.append((yield from reading()))
-        if len(told) > 1 and told[-2] == told[-1]:
-            return told[-1]
+        values.append((yield from reading()))
+        if len(values) > 1 and values[-2] == values[-1]:
+            return values[-1]
     raise VerificationFailed(
         f"node {node}: {most} readings of the {what}, and no two in a row are the same: the last two are "
-        f"{told[-2]} and {told[-1]}",
+        f"{values[-2]} and {values[-1]}",
         expected="two readings in a row that agree",
-        cause="it changes all the time, as where a shaft moves or shakes, or the line is very bad",
-        advice="let it come to rest; what moves is read without `confirmed`",
+        cause="the value changes all the time, as where a shaft moves or shakes, or the line is very bad",
+        advice="wait until the shaft is at rest; read a moving value without `confirmed`",
         node=node,
     )

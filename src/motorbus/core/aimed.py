@@ -1,8 +1,7 @@
-"""An order that a control loop gives again and again, every time with other goals.
+"""Goal requests that a control loop sends in every cycle, each time with other goals.
 
-Most of it is said by what it is for: who is ordered, by which registers, under which settings. That is its `Aim`, and
-the same every time. What its goals are in words is asked by whoever must look closely, and made only then; so an order
-costs hardly more than its bytes.
+`Aim` holds what these requests have in common. The `Goal` values of a request are computed when a caller first reads
+them, so that a request costs little more than its bytes.
 """
 
 from __future__ import annotations
@@ -14,11 +13,12 @@ from motorbus.core.operation import Answer, Effect, Exchange, Goal, Rank, Refusa
 
 
 class Aim:
-    """What all orders have in common that are made in one mould: the nodes they are for, how the goals are made of raw
-    values, and why one must not leave after all; see `Exchange`. They are all as long: `air` is a rate of the bus
-    (bit/s), and the time (s) that one of them took on the wire at that rate, once a bus has found that out."""
+    """The common part of goal requests: their nodes, the conversion of raw values to goals, and `refusal`.
 
-    __slots__ = ("air", "goals", "ordered", "refusal")
+    `refusal` is that of `Exchange`.
+    """
+
+    __slots__ = ("goals", "ordered", "refusal")
 
     def __init__(
         self, ordered: Sequence[int], goals: Callable[[Sequence[int]], tuple[Goal, ...]], refusal: Refusal
@@ -26,14 +26,12 @@ class Aim:
         self.ordered: Final = ordered
         self.goals: Final = goals
         self.refusal: Final = refusal
-        self.air: tuple[int | None, float] = None, 0.0  # None is the rate of no bus
 
 
 class Aimed(Exchange[None]):
-    """A request to several nodes that none of them answers, and that moves them; see `Exchange`.
+    """A request that moves several nodes and has no reply; see `Exchange`.
 
-    It is `sure`: each of its goals is a finite number within the limits that it brings, and none goes on without an
-    end.
+    It is `sure`: each goal is a finite number within the limits that it carries, and no goal is an endless motion.
     """
 
     __slots__ = ("_goals", "_raws", "aim")
@@ -41,7 +39,7 @@ class Aimed(Exchange[None]):
     aim: Aim
     refusal: Refusal  # type: ignore[misc]
     sure = True
-    replies = ()  # type: ignore[misc]  # the same of all, so it is said once
+    replies = ()  # type: ignore[misc]  # the same for all requests, so it is a class attribute
     lane = 0  # type: ignore[misc]
     rank = Rank.CONTROL  # type: ignore[misc]
     effect = Effect.MOTION  # type: ignore[misc]
@@ -61,21 +59,21 @@ class Aimed(Exchange[None]):
         self._goals: tuple[Goal, ...] | None = None
 
     def under(self, aim: Aim) -> Aimed:
-        """The same order under another aim."""
-        return Aimed(self.request, aim, self._raws)  # type: ignore[arg-type]  # bytes, as it was made of
+        """The same request with another aim."""
+        return Aimed(self.request, aim, self._raws)  # type: ignore[arg-type]  # always bytes here
 
     @staticmethod  # type: ignore[misc]
     def read(_: Answer) -> None:
-        """Nobody answers, so there is nothing to read."""
+        """There is no reply to read."""
 
     @property  # type: ignore[misc]
     def goals(self) -> tuple[Goal, ...]:
-        """What it orders, per node, for the gate."""
+        """The goal of each node, for the gate."""
         if self._goals is None:
             self._goals = self.aim.goals(self._raws)
         return self._goals
 
     @property
     def ordered(self) -> Sequence[int]:
-        """The nodes of its goals."""
+        """The nodes of the goals."""
         return self.aim.ordered

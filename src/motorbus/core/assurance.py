@@ -1,7 +1,7 @@
-"""What the devices of a family give to whoever relies on them, and what not: said by the family, in words for people.
+"""What a user can rely on in the devices of a family: texts for people, written once per family.
 
-Nobody can ask a device what happens when its host dies. It stands here, once for each family, for `motorbus safety` and
-for whoever judges a machine. A sentence says what is so, and `Given` how far one may rely on it.
+A device cannot be asked what it does when its host fails, so the family declares it. `motorbus safety` and reviewers of
+a machine use it. A text states a fact; `Given` states how far a user can rely on it.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 
 
 class Given(Enum):
-    """How far something may be relied on."""
+    """How far a user can rely on a property."""
 
     YES = "yes"
     PARTLY = "in part"
@@ -20,27 +20,27 @@ class Given(Enum):
 
 
 class Point(NamedTuple):
-    """One thing that somebody might rely on: how far it is given, and what is so."""
+    """One property: how far a user can rely on it, and the facts."""
 
     given: Given
     text: str
 
 
 class Assurance(NamedTuple):
-    """What each device of a family gives.
+    """The safety properties of each device of a family.
 
-    `measured`  it measures where it is, and tells
-    `limits`    it keeps limits of travel by itself
-    `stop`      what a stop means that it has accepted
-    `estops`    what an emergency stop means, by what it may do to an axis (see `LinkNeeds.stops`); by "" where that
-                cannot be chosen
-    `alone`     what it does when its host dies, or the cable breaks, while it is led or moves
-    `ends`      whether every motion ends by itself
-    `torque`    its torque can be switched off by the host
-    `restart`   a restart of it is noticed, so that it is not moved by goals from before
-    `strain`    it tells what its motor bears, so that the host can end what is too much
-    `watchdog`  it stops by itself when its host falls silent
-    `led`       it is led by small goals; otherwise it moves by a profile of its own
+    `measured`  the device measures and reports its position
+    `limits`    the device keeps travel limits by itself
+    `stop`      what an acknowledged stop means
+    `estops`    what an emergency stop means, by its action on an axis (see `LinkNeeds.stops`); key "" where the
+                action cannot be chosen
+    `alone`     what the device does in a loop or a move when its host fails or the cable breaks
+    `ends`      every motion ends by itself
+    `torque`    the host can switch torque off
+    `restart`   a restart is detected, so earlier goals do not move the device after it
+    `strain`    the device reports its load, so the host can end an overload
+    `watchdog`  the device stops by itself when its host falls silent
+    `led`       the device follows small goals of a loop; otherwise it moves by a profile of its own
     """
 
     measured: Point
@@ -56,16 +56,16 @@ class Assurance(NamedTuple):
     led: bool = False
 
     def points(self) -> Iterator[tuple[str, Point]]:
-        """Each with what it is about, in the order in which people read it."""
-        for name, about in ABOUT.items():
+        """Yield the title and the point of each property, in display order."""
+        for name, title in _TITLES.items():
             if name == "estops":
                 for policy, point in self.estops.items():
-                    yield f"{about}: {policy}" if policy else about, point
+                    yield f"{title}: {policy}" if policy else title, point
             else:
-                yield about, getattr(self, name)
+                yield title, getattr(self, name)
 
 
-ABOUT: Final[Mapping[str, str]] = {
+_TITLES: Final = {
     "measured": "measures its position",
     "limits": "limits of its own",
     "stop": "a stop",
@@ -77,4 +77,3 @@ ABOUT: Final[Mapping[str, str]] = {
     "strain": "load and heat",
     "watchdog": "watchdog in it",
 }
-"""What each point is about, in the words in which it is shown."""

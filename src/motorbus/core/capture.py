@@ -1,7 +1,7 @@
-"""What a recording of a line holds, packet by packet, and what a family says so that it can be found.
+"""Packets of a recorded line, and the decoders that a family provides for them.
 
-A recording is taken apart in two ways that give the same: by a `Cutter`, as the bytes come and cut anywhere, and by
-`Captures.bulk`, all of it at once in arrays. `recorder` turns both into `Packet`s; nothing here knows a family.
+A `Cutter` decodes a recording chunk by chunk, `Captures.bulk` the whole of it at once in arrays; both find the same
+packets. `recorder` makes `Packet`s of either result.
 """
 
 from __future__ import annotations
@@ -17,32 +17,32 @@ REPLY: Final = 2
 EITHER: Final = 3
 NOTICE: Final = 4
 KINDS: Final = ("noise", "request", "reply", "either", "notice")
-"""What a packet is; in columns by number. "either": it can be a request, its echo or a reply, and nothing tells."""
+"""Kinds of packets; columns hold the index. "either": a request, its echo or a reply, which cannot be decided."""
 FAULTS: Final = ("", "checksum", "framing", "foreign")
-"""Why bytes are noise, as `Noise.fault`; in columns by number. "" for a sound packet."""
+"""Why bytes are noise, as `Noise.fault`, or "" for a valid packet; columns hold the index."""
 WAYS: Final = ("", "rx", "tx")
-"""Which way bytes went: from the devices (rx), to them (tx), or nobody knows, and both may be among them ("")."""
-NOBODY: Final = -1
-"""The node, or the code, of what has none."""
+"""Direction of bytes: from the devices (rx), to them (tx), or unknown and possibly mixed ("")."""
+ABSENT: Final = -1
+"""Node or code of a packet that has none."""
 PIECE: Final = 1024
-"""Bytes: a longer run of noise is told in pieces of so many, the last one shorter."""
+"""Bytes; a longer run of noise is split into pieces of this length, the last one shorter."""
 
 Run: TypeAlias = "list[bytes] | Noise"
-"""Sound packets that follow one another, or what lies between two of them."""
-Told: TypeAlias = Callable[[], tuple[Sequence[int], Sequence[int], Sequence[int]]]
-"""Kinds (by number), nodes and codes of packets, worked out when somebody asks for them."""
+"""Consecutive valid packets, or the noise between two of them."""
+PacketFacts: TypeAlias = Callable[[], tuple[Sequence[int], Sequence[int], Sequence[int]]]
+"""Computes the kinds (indices), nodes and codes of packets."""
 
 
 class Packet(NamedTuple):
-    """One packet of a recording, or a run of bytes that belongs to none.
+    """One packet of a recording, or a run of noise.
 
-    `start`  so many bytes of the recording were before it; for CAN so many frames
-    `data`   the whole packet; a CAN frame as `CanFrame.flat()` says
+    `start`  offset in the recording: bytes, for CAN frames
+    `data`   the whole packet; a CAN frame as `CanFrame.flat()` serializes it
     `kind`   one of `KINDS`
-    `node`   which device it is from or for; -1 for noise, and where nothing tells
-    `code`   what it says, as the family counts that; -1 for noise
-    `fault`  "" for a sound packet, else why it is none
-    `at`     when it began, s on the clock of the recording; None where nothing was noted
+    `node`   its sender or receiver; -1 for noise, and where the packet does not tell
+    `code`   its content as a number of the family; -1 for noise
+    `fault`  "" for a valid packet, else one of `FAULTS`
+    `at`     start time, s on the clock of the recording; None where it was not recorded
     """
 
     start: int
@@ -55,7 +55,7 @@ class Packet(NamedTuple):
 
 
 class Columns(NamedTuple):
-    """The packets and the noise of a whole recording in order, as arrays with one element for each."""
+    """All packets and runs of noise of a recording in order: arrays with one element for each."""
 
     start: Any
     size: Any
@@ -66,25 +66,25 @@ class Columns(NamedTuple):
 
 
 class Cutter(Protocol):
-    """Finds the packets in what went one way; its events do not depend on how that is cut."""
+    """Finds packets in data of one direction. The result does not depend on the boundaries between chunks."""
 
     def feed(self, data: Data, /) -> list[Run]:
-        """Take bytes, or one CAN frame; give what is complete. Never raises."""
+        """Take bytes, or one CAN frame; return the runs that are complete. Never raises."""
 
     def flush(self) -> list[Run]:
-        """Nothing more comes: give what can be made of the rest."""
+        """Return the runs in the remaining data at the end of the recording."""
 
-    def tell(self, packets: list[bytes], /) -> Told:
-        """Who says these, which must be the next it has found, and what."""
+    def tell(self, packets: list[bytes], /) -> PacketFacts:
+        """Identify packets; call it with the packets in the order in which they were found."""
 
 
 class Captures(NamedTuple):
-    """How recordings of a family's line are taken apart.
+    """Decoders of a family for recordings of its line.
 
     `cutter`  makes a `Cutter` for one of `WAYS`
-    `bulk`    numpy, all bytes (or a list of all CAN frames) and one of `WAYS` -> `Columns`, the same as the cutter
-              finds; None where nothing is gained by it
-    `code`    what the code of a packet is, in words
+    `bulk`    (numpy, all bytes or a list of all CAN frames, one of `WAYS`) -> `Columns`, equal to the result of the
+              cutter; None where it would not be faster
+    `code`    the meaning of the code of a packet, in words
     """
 
     cutter: Callable[[str], Cutter]

@@ -1,7 +1,7 @@
-"""One typed row per register, object or parameter, and the row says everything.
+"""Registers, objects and parameters of a device: one typed row each, and tables of rows.
 
-Docs, completion, forms, recorder columns and the simulator's memory are derived from rows; a later model is an
-earlier table plus differences. Rows know how their bytes are made, never who sends them.
+Docs, completion, forms, recorder columns and the memory of simulators are derived from rows. The table of a later
+model is an earlier table with differences. A row encodes and decodes its value and sends nothing.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from motorbus.errors import RequestError
 
 Value: TypeAlias = int | float
 
-_SHOWN = 40  # characters of what somebody gave for a number
+_SHOWN = 40  # maximum characters of a refused value in an error
 
 
 def is_number(value: object) -> TypeGuard[int | float]:
-    """A finite number that can be reckoned with: not True, no text, and no int beyond what a float can be."""
+    """Whether this is a finite number: not a bool, and no int beyond the range of float."""
     try:
         return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
     except OverflowError:
@@ -30,7 +30,7 @@ def is_number(value: object) -> TypeGuard[int | float]:
 
 
 def shown(value: object) -> str:
-    """What somebody gave for a number, for reading eyes, however long it is."""
+    """Text of a refused value for an error, at most 40 characters and an ellipsis."""
     try:
         text = repr(value)
     except ValueError:  # Python refuses to print an int of more than 4300 digits
@@ -39,7 +39,7 @@ def shown(value: object) -> str:
 
 
 class Access(Enum):
-    """Who may do what with a row."""
+    """What the host can do with a row."""
 
     READ = "r"
     WRITE = "w"
@@ -47,7 +47,7 @@ class Access(Enum):
 
 
 class Storage(Enum):
-    """What a power cycle does to the value: EEPROM keeps it, RAM forgets it, FACTORY is the maker's own."""
+    """What a power cycle does to the value: EEPROM keeps it, RAM loses it; FACTORY is set by the maker."""
 
     EEPROM = "EEPROM"
     RAM = "RAM"
@@ -55,7 +55,7 @@ class Storage(Enum):
 
 
 class Coding(Enum):
-    """How a negative number is written; the sign bit of sign-magnitude is `Entry.sign_bit`."""
+    """Coding of negative numbers; the sign bit of sign-magnitude is `Entry.sign_bit`."""
 
     UNSIGNED = "unsigned"
     SIGN_MAGNITUDE = "sign-magnitude"
@@ -66,11 +66,11 @@ class Coding(Enum):
 class Entry:
     """One addressable value of a device.
 
-    `address` is the register number (or the CANopen index, then with `subindex`); `size` is in bytes; `low` and
-    `high` bound the raw value; value = raw * scale in `unit` (empty unit: a plain number). `choices` names single
-    values, `bits` names single bits. `default` is the shipped raw value, where known. `source` says where each
-    fact comes from; `conflict` who says what where sources disagree or none confirms it, and what was chosen (empty
-    where nothing is in doubt); `note` what else there is to know.
+    `address` is the register number, or the CANopen index with `subindex`; `size` is in bytes. `low` and `high` bound
+    the raw value; value = raw * scale in `unit` (empty unit: a plain number). `choices` names single values, `bits`
+    single bits. `default` is the raw value as shipped, where known. `source` names the source of each fact. `conflict`
+    lists what sources say where they disagree or none confirms it, and the choice made; empty without a doubt. `note`
+    holds other facts.
     """
 
     name: str
@@ -104,16 +104,21 @@ class Entry:
         return self.access is not Access.READ
 
     def encode(self, raw: int, given: str = "") -> bytes:
-        """Raw value -> bytes. Raises RequestError when it is outside the row's range or does not fit its coding.
+        """Raw value -> bytes. `given` is the value as the caller wrote it, for the error.
 
-        `given` is the value as the caller wrote it, for the error.
+        Raises RequestError for a raw value outside the range of the row.
         """
         if not self.low <= raw <= self.high:
             raise self.out_of_range(given or f"raw value {shown(raw)}", raw=not given)
-        return self._code(raw).to_bytes(self.size, "little" if self.order == "little" else "big")
+        code = raw
+        if self.coding is Coding.SIGN_MAGNITUDE and self.sign_bit is not None and raw < 0:
+            code = -raw | 1 << self.sign_bit
+        elif self.coding is not Coding.UNSIGNED and raw < 0:
+            code = raw & (1 << 8 * self.size) - 1
+        return code.to_bytes(self.size, "little" if self.order == "little" else "big")
 
     def out_of_range(self, given: str, *, raw: bool = False) -> RequestError:
-        """The error for a value outside the row's range."""
+        """The error for a value outside the range of the row."""
         bounds = f" {self.low}..{self.high}" if raw or not self.unit else ""
         return RequestError(
             f"{self.name}: {given} is out of range{bounds}",
@@ -122,18 +127,11 @@ class Entry:
         )
 
     def given(self, value: Value) -> str:
-        """A value in the row's unit, as an error shows it."""
+        """Text of a value in the unit of the row, for an error."""
         return f"{shown(value)} {self.unit}".rstrip()
 
-    def _code(self, raw: int) -> int:
-        if self.coding is Coding.UNSIGNED or raw >= 0:
-            return raw
-        if self.coding is Coding.SIGN_MAGNITUDE and self.sign_bit is not None:
-            return -raw | 1 << self.sign_bit
-        return raw & (1 << 8 * self.size) - 1
-
     def decode(self, data: bytes) -> int:
-        """Bytes -> raw value; a negative zero is 0. Any bytes of the right size have a raw value."""
+        """Bytes of the right size -> raw value; a negative zero gives 0."""
         code = int.from_bytes(data, "little" if self.order == "little" else "big")
         if self.coding is Coding.SIGN_MAGNITUDE and self.sign_bit is not None:
             magnitude = code & (1 << self.sign_bit) - 1
@@ -143,11 +141,14 @@ class Entry:
         return code
 
     def to_value(self, raw: int) -> Value:
-        """Raw value -> value in the row's unit (the raw number itself where the row has none)."""
+        """Raw value -> value in the unit of the row; the raw value itself where the row has no unit."""
         return raw * self.scale if self.unit else raw
 
     def to_raw(self, value: Value) -> int:
-        """Value in the row's unit -> nearest raw value. Raises RequestError when it is not a finite number."""
+        """Value in the unit of the row -> nearest raw value.
+
+        Raises RequestError for a value that is not finite, too large, or not whole where the row has no unit.
+        """
         if is_number(value) and not math.isfinite(value / self.scale):
             raise self.out_of_range(self.given(value))
         if not (isinstance(value, bool) or is_number(value)):
@@ -169,7 +170,7 @@ class Entry:
 
 
 class Table(Mapping[str, Entry]):
-    """All rows of one register map, by name and by address. Never changed after it is made."""
+    """All rows of one register map, by name and by address. Immutable."""
 
     def __init__(self, name: str, entries: Iterable[Entry], *, title: str = "") -> None:
         self.name = name
@@ -183,7 +184,12 @@ class Table(Mapping[str, Entry]):
         try:
             return self._by_name[name]
         except KeyError:
-            raise self._unknown(name) from None
+            near = get_close_matches(name, self._by_name, n=3)
+            raise RequestError(
+                f"table {self.name} has no register {name!r}",
+                expected=f"perhaps {', '.join(near)}" if near else "",
+                advice="`motorbus info BUS#ID --registers` lists them; nothing was sent",
+            ) from None
 
     def __contains__(self, name: object) -> bool:
         return name in self._by_name
@@ -194,20 +200,12 @@ class Table(Mapping[str, Entry]):
     def __len__(self) -> int:
         return len(self._by_name)
 
-    def _unknown(self, name: str) -> RequestError:
-        near = get_close_matches(name, self._by_name, n=3)
-        return RequestError(
-            f"table {self.name} has no register {name!r}",
-            expected=f"perhaps {', '.join(near)}" if near else "",
-            advice="`motorbus info BUS#ID --registers` lists them; nothing was sent",
-        )
-
     def at(self, address: int, subindex: int | None = None) -> Entry | None:
         """The row that starts at this address, or None."""
         return self._by_address.get((address, subindex))
 
     def derive(self, name: str, *changed: Entry, without: Iterable[str] = (), title: str = "") -> Table:
-        """A later model: these rows, some replaced or added by name, some left out."""
+        """The table of another model: these rows, some replaced or added by name, some removed."""
         rows = {key: row for key, row in self._by_name.items() if key not in set(without)}
         rows.update({row.name: row for row in changed})
         return Table(
@@ -216,5 +214,5 @@ class Table(Mapping[str, Entry]):
 
 
 def changed(entry: Entry, **differences: object) -> Entry:
-    """The same row with some fields different."""
+    """A copy of the row with some fields replaced."""
     return replace(entry, **differences)  # type: ignore[arg-type]

@@ -1,8 +1,7 @@
-"""The contract between a family of devices and everything that is family-blind.
+"""The contract between a device family and the code that works with any family.
 
-A family is a folder with four rooms (`wire`, `table`, `driver`, `simulator`) whose `__init__` says
-`FAMILY = …`, an object that fulfils `Family`. Nothing above knows more of a family than this file says, and
-`tests/conformance` is its executable definition of done.
+A family is a package with `wire`, `table`, `driver` and `simulator`. Its `__init__` defines `FAMILY`, which implements
+`Family`. Other packages use only what this module describes; `tests/conformance` tests it.
 """
 
 from __future__ import annotations
@@ -19,9 +18,10 @@ from motorbus.core.operation import Answer, Data, Event, Exchange, Operation, Ru
 
 
 class Option(NamedTuple):
-    """One option that a bus string or a flag may carry for this family: `name=value`.
+    """An option `name=value` of a family, in a bus string or a flag.
 
-    `choices` are all values it takes, () when that is not said; `source` is who says so, where somebody has to.
+    `choices` are all valid values, () if they are not listed; `source` is the source of the behaviour, where it needs
+    one.
     """
 
     name: str
@@ -33,18 +33,18 @@ class Option(NamedTuple):
 
 
 class LinkNeeds(NamedTuple):
-    """What a family asks of its link.
+    """Requirements of a family on its link, and its options.
 
-    `kind`      bytes or frames
-    `rate`      the usual rate (bit/s), and `rates` those worth scanning
-    `options`   of its simulator: what `sim,name=value` takes
-    `settings`  of a bus, simulated or not: what `Family.configured` takes
-    `window`    how many lanes may be in flight at once
-    `only`      the id of the only device that a line of this family can have; None: there may be many
-    `both_ways` a device hears while it speaks: a stop waits for no reply
-    `stops`     what an emergency stop may do to an axis, `torque_off` or `hold`, the usual first; () where that cannot
-                be said. Who has both takes a setting `estop_hold`, the ids of those that it holds
-    `captures`  how a recording of its line is taken apart; None: as the receiver hears it
+    `kind`      "bytes" or "frames"
+    `rate`      default rate (bit/s); `rates`: those that a scan tries
+    `options`   of the simulator: `sim,name=value`
+    `settings`  of a bus, simulated or not: arguments of `Family.configured`
+    `window`    maximum number of lanes in flight
+    `only`      id of the only device on a line of this family; None: there may be several
+    `both_ways` full duplex: a stop does not wait for a reply
+    `stops`     possible actions of an emergency stop on an axis, "torque_off" and "hold", the default first; () if
+                unknown. A family with both has a setting `estop_hold`: the ids that it holds
+    `captures`  decoders of recordings; None: the receiver decodes them
     """
 
     kind: str
@@ -61,7 +61,7 @@ class LinkNeeds(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What a device says it is. `table` is "" when its firmware is unknown: readable then, never written."""
+    """The identity that a device reports. `table` is "" for unknown firmware: it is read but never written."""
 
     node: int
     model: str
@@ -71,7 +71,7 @@ class Identity:
 
 
 class Found(NamedTuple):
-    """An event for `Report`, and what a scan returns: a node that answered, at which rate, and what it is."""
+    """A node found by a scan, its rate (bit/s) and identity (None: not known yet); also an event for `Report`."""
 
     node: int
     rate: int
@@ -79,9 +79,9 @@ class Found(NamedTuple):
 
 
 class Readdressed(NamedTuple):
-    """An event for `Report`: what is told to the id `new` is from now on, or soon, told to the device of `node`, too.
+    """An event for `Report` before a device gets another id: requests to id `new` will also reach the device `node`.
 
-    `node` is None where nobody knows which device that is. It is told before anything of that is written.
+    `node` is None if the device is unknown. The event precedes the first write.
     """
 
     node: int | None
@@ -89,7 +89,7 @@ class Readdressed(NamedTuple):
 
 
 class Quality(Enum):
-    """How far a sample can be trusted."""
+    """Reliability of a sample."""
 
     FRESH = "fresh"
     REPEATED = "repeated"
@@ -98,9 +98,9 @@ class Quality(Enum):
 
 
 class State(NamedTuple):
-    """One sample of a device in API units (rad, rad/s, fraction, A, V, °C); None where it does not tell.
+    """One sample of a device in API units (rad, rad/s, fraction, A, V, °C); None for values it does not report.
 
-    `at` is the arrival time on the link's clock in seconds, `alarm` the names of the alarm bits that are set.
+    `at` is the arrival time (s, link clock), `alarm` the names of the alarm bits that are set.
     """
 
     at: float
@@ -116,10 +116,11 @@ class State(NamedTuple):
 
 
 class Health(NamedTuple):
-    """How a device fares, from one cheap exchange; what it does not tell is None, also in its `state`.
+    """Health of a device, from one cheap exchange; None, also in `state`, for values it does not report.
 
-    `torque` whether its torque is on, None where it has no switch. `blank`: what it was told to keep until power-off is
-    as power-up leaves it. `restarts` counts how often it has said that it starts anew, where it says so.
+    `torque`    torque is on; None if the device has no torque switch
+    `blank`     the settings that the device keeps until power-off have their power-up values
+    `restarts`  number of start-up messages received from the device
     """
 
     state: State
@@ -129,7 +130,7 @@ class Health(NamedTuple):
 
 
 class Positions(NamedTuple):
-    """Positions in rad by id of all who answered, the ids of those who did not, and when (s on the link's clock)."""
+    """Positions (rad) by id, the ids without a reply, and the arrival time (s, link clock)."""
 
     values: dict[int, float]
     missing: tuple[int, ...]
@@ -137,50 +138,49 @@ class Positions(NamedTuple):
 
 
 class Train(Protocol):
-    """Devices of one bus in a control loop, of which all is known that a cycle needs; see `Family.axis`.
+    """Devices of one bus in a control loop, with all data that a cycle needs; see `Family.axis`.
 
-    Its exchanges ask nothing but what they bring. Those on different lanes may be in flight at once. Until `begin` is
-    carried out, or goals are sent, nothing is written. When settings of a device were written since through the same
-    object, goals that were made before do not leave, and later ones are reckoned anew or raise RequestError.
+    Its exchanges need no further requests. Those on different lanes may be in flight at once. Before `begin` runs or
+    goals are sent, nothing is written. After settings of a device were written through the same object, earlier goals
+    do not leave; later ones are computed from the new settings or raise RequestError.
     """
 
     @property
     def nodes(self) -> tuple[int, ...]:
-        """Their ids, in the order they were given."""
+        """The ids, in the given order."""
 
     @property
     def positions(self) -> Sequence[Exchange[Positions]]:
-        """What together brings all positions; may be kept and run again.
+        """Exchanges that together read all positions; may be kept and run again.
 
-        Each tells of some of the nodes, and who is silent is among its missing; one that asks a single node raises
-        NoReply then.
+        Each reads some of the nodes and lists the silent ones as missing; one for a single node raises NoReply instead.
         """
 
     def goals(self, to: Mapping[int, float]) -> Sequence[Exchange[Any]]:
-        """What orders these goals (rad), for some or all of them; the gate judges them when it leaves.
+        """Exchanges that order these goals (rad) for some or all nodes; the gate judges them when they leave.
 
-        Raises LimitExceeded for what is no finite number or what no device of this kind could be told, RequestError for
-        a node that is none of these.
+        Raises LimitExceeded for a goal that is not finite or that no device of this kind can take, RequestError for
+        another node.
         """
 
     def begin(self, speeds: Mapping[int, float]) -> Operation[None]:
-        """Make these ready to be led: torque on without a jump, and each as quick in following as it can be, but not
-        quicker than its speed (rad/s, above 0) where it can be told that, rounded up to what it can be told.
+        """Prepare these nodes for goals: torque on without a jump, and maximum tracking speed.
 
-        Who has no torque switch holds where it stands. Everyone is visited; then the first error is raised, with a note
-        for each other. Errors as `enable_torque`.
+        The value is the limit of that speed (rad/s, above 0), rounded up to what the device supports; a device without
+        such a setting ignores it. A device without torque switch holds its position. Every node is visited, then the
+        first error is raised, with a note for each other. Errors as `enable_torque`.
         """
 
 
 class Stop(NamedTuple):
-    """Frames that stop the nodes, in order, and what an acknowledgement of them promises."""
+    """Requests that stop the nodes, in order, and what their acknowledgement promises."""
 
     exchanges: tuple[Exchange[Answer], ...]
     promise: str
 
 
 class Part(NamedTuple):
-    """One field of a frame: where it starts, its bytes, what it is called and what it says."""
+    """One field of a frame: its offset, bytes, name and meaning."""
 
     start: int
     data: bytes
@@ -189,7 +189,7 @@ class Part(NamedTuple):
 
 
 class Explanation(NamedTuple):
-    """One frame, or a run of bytes that is none: `fault` is "" for a good frame, else why it is bad."""
+    """One frame, or a run of bytes that is none: `fault` is "" for a valid frame, else the reason."""
 
     data: bytes
     title: str
@@ -198,32 +198,33 @@ class Explanation(NamedTuple):
 
 
 class Receiver(Protocol):
-    """Turns what a link delivers into events. Never raises on any input, never holds more than 4 KiB.
+    """Parses data from a link into events. Never raises on any input, never holds more than 4 KiB.
 
-    Every byte that is fed comes out in exactly one event.
+    Every byte that is fed is part of exactly one event.
     """
 
     @property
     def held(self) -> int:
-        """How many bytes wait for more before anything can be made of them."""
+        """Number of bytes of an incomplete frame."""
 
     def feed(self, data: Data, /) -> list[Event]:
-        """Take bytes (cut anywhere) or one CAN frame; give what is complete."""
+        """Take a chunk of bytes, or one CAN frame; return the events that are complete."""
 
     def flush(self) -> list[Event]:
-        """Nothing more is coming: give what can be made of the rest, and the remainder as noise."""
+        """End of data: return the frames in the held bytes, and the remainder as noise."""
 
 
 class RawMemory(Protocol):
-    """The raw value of every row by its name."""
+    """The raw value of each row, by name."""
 
     def __getitem__(self, name: str, /) -> int: ...
 
 
 class Remark(NamedTuple):
-    """What a simulated device notes and tells no host: what it ignored, what a fault has done.
+    """A note of a simulated device that no host receives: what it ignored, what a fault did.
 
-    `number` counts its remarks from 1, `at` is s since the simulation began, as in a script of inputs.
+    `number` counts the remarks of the device from 1; `at` is in s since the start of the simulation, as in a script of
+    inputs.
     """
 
     number: int
@@ -232,14 +233,20 @@ class Remark(NamedTuple):
 
 
 class SimulatedNode(Protocol):
-    """One simulated device, as a test or a control socket pokes it. `memory` is what it holds at this moment.
+    """One simulated device, for tests and the control socket. `memory` holds its present values.
 
-    What only some have: `set_input(number, active)`. `log`, their latest `Remark`s in order. `notice()`, which lets the
-    device say what it says unasked although nothing has caused it. `switch(**changes)`, which changes switches while it
-    runs, as far as that makes sense, and gives all such switches as they are then; for an impossible name or value it
-    raises RequestError and has changed nothing. `midway()`, when (s) the step by which it stores something is half
-    done, infinity while it stores nothing: a power cut at that moment tears what is stored.
-    `block_shaft(between)`, `push_shaft(angle)`, `load_shaft(share)`, `release_shaft()` take rad, and 1 for full torque.
+    Some devices also have
+
+        set_input(number, active)
+        log                     the latest `Remark`s, in order
+        notice()                sends an unsolicited message without a cause
+        switch(**changes)       changes switches that can change at run time and returns all of these; raises
+                                RequestError for an invalid name or value and then changes nothing
+        midway()                moment (s) when half of a store operation is done, inf if none runs; a power cut at that
+                                moment leaves the stored data incomplete
+        block_shaft(between)  push_shaft(angle)                    rad
+        load_shaft(share)                                          1: full torque
+        release_shaft()
     """
 
     @property
@@ -252,42 +259,49 @@ class SimulatedNode(Protocol):
 
 
 class Simulator(Protocol):
-    """A simulated bus. Time comes in as an argument (seconds); it never waits and has no clock of its own.
+    """A simulated bus. Time is an argument (s): it never waits and has no clock.
 
-    One whose devices are set to another rate than most of their family may tell it as `usual_rate` (bit/s). One whose
-    devices have inputs takes what happens there as `script(text)`. One on whose line there may be two devices with one
-    id takes `duplicate(id)`: then there are two. One on CAN tells by `audience(frame)` whom that is for (`core.frame`).
+    Some simulators also have
+
+        usual_rate       bit/s, if the devices are set to another rate than the default of the family
+        script(text)     scripted inputs of the devices
+        duplicate(id)    adds a second device with this id
+        audience(frame)  on CAN, the receivers of a frame: a `core.frame.Audience`
     """
 
     @property
     def nodes(self) -> Mapping[int, SimulatedNode]: ...
 
     def receive(self, data: Data, at: float) -> None:
-        """The host's bytes, or one frame, have arrived completely at this moment."""
+        """Take bytes of the host, or one frame, whose last bit arrives at this moment (s)."""
 
     def advance(self, to: float) -> list[tuple[float, Data]]:
-        """Everything the devices begin to send up to this moment, each with its own moment, in order."""
+        """Return all data that the devices start to send up to this moment (s), each with its moment, in order."""
 
     def due(self) -> float | None:
-        """The next moment something happens by itself, or None."""
+        """The next moment (s) at which a device acts by itself, or None."""
 
     def tune(self, rate: int) -> None:
-        """The host's rate; devices set to another one neither hear nor are heard."""
+        """Set the rate (bit/s) of the host; devices set to another rate neither receive nor are received."""
 
 
 class Device(Protocol):
-    """The verbs that faces may expect of a blocking device; a verb a device lacks is absent, never raises.
+    """Methods of a blocking device. A method that a device does not support is absent.
 
-    `read(*names)` gives values by name, `write(**values)` takes them. What moves also has `position`, `telemetry`
-    (a `State`), `enable_torque`, `disable_torque`, `stop` and `move(to, *, wait=True)`; `move` may take `velocity` and
-    `acceleration`. What has modes also has `mode()` and `set_mode(mode)`, and of `set_velocity`, `set_duty`,
-    `set_current` and `step` those that some model of the family heeds. What can be given a zero has
-    `calibrate(to=None)` (rad; None: the middle) and `zero()`, and both give a named tuple whose floats are angles and
-    whose whole numbers are raw; `alarms()`, where it is there, gives each alarm that is set in words. Persistent rows
-    are written through a guarded sequence; where that opens a lock, the lock is a row named `lock` with a choice called
-    "closed", and it is closed again whatever happens. `table` is its register map once that is known (None before),
-    `value(row, raw)` and `raw(row, value)` convert with the factors of this very device. Reading has rank POLL and
-    effect NONE, so a dry run can tell it from what changes something.
+    `read(*names)` returns values by name, `write(**values)` writes them. Also, where the device supports them:
+
+        motion   position()  telemetry() -> State  enable_torque()  disable_torque()  stop()
+                 move(to, *, wait=True), on some devices with `velocity` and `acceleration`
+        modes    mode()  set_mode(mode)  and of set_velocity, set_duty, set_current and step those that some model of
+                 the family supports
+        zero     calibrate(to=None) (rad; None: the middle)  zero(); both return a named tuple, in which a float is an
+                 angle and an int a raw value
+        alarms() the active alarms, in words
+        table    its register map; None before it is known
+        value(row, raw)  raw(row, value)   conversion with the factors of this device
+
+    Persistent rows are written in a guarded sequence. If it opens a lock, the lock is a row named `lock` with a choice
+    "closed", and is always closed again. Reads have rank POLL and effect NONE, so a dry run can identify them.
     """
 
     @property
@@ -305,8 +319,7 @@ class Device(Protocol):
 
 
 class Devices(NamedTuple):
-    """The verb classes of a family, each called with a bus and a node id; `assures` is what these devices give to
-    whoever relies on them, None where the family does not say."""
+    """Device classes of a family, called with a bus and a node id. `assures`: None if the family does not state it."""
 
     blocking: Callable[[Any, int], Any]
     awaiting: Callable[[Any, int], Any]
@@ -314,88 +327,85 @@ class Devices(NamedTuple):
 
 
 class Family(Protocol):
-    """What motorbus knows of a family: eighteen members, no state (but see `configured`)."""
+    """A device family: eighteen members, no state (but see `configured`)."""
 
     @property
     def name(self) -> str:
-        """The word before the colon in a bus address."""
+        """The scheme of a bus address."""
 
     @property
     def link(self) -> LinkNeeds: ...
 
     @property
     def tables(self) -> Mapping[str, Table]:
-        """Every register map by its name."""
+        """All register maps, by name."""
 
     def configured(self, **settings: object) -> Family:
-        """This family as one bus speaks it, by its `link.settings`; one per open bus, and it may keep what that bus
-        has taught it. Without settings of its own a family gives itself. Raises RequestError for impossible ones.
+        """The family with the `link.settings` of one open bus; it may keep what it learns on that bus.
+
+        A family without settings returns itself. Raises RequestError for invalid settings.
         """
 
     @property
     def devices(self) -> Devices: ...
 
     def lane(self, node: int) -> int:
-        """The lane of this node; a family on a half-duplex line has one."""
+        """The lane of this node; a half-duplex line has one lane."""
 
     def air_time(self, exchange: Exchange[Any], rate: int) -> float:
-        """Seconds on the wire for the request and every reply due, gaps of the protocol included."""
+        """Time (s) on the wire of the request and all expected replies, with the gaps of the protocol."""
 
     def turnaround(self, exchange: Exchange[Any]) -> float:
-        """The longest time the devices may think before and between their replies, by `exchange.timeout`."""
+        """Maximum time (s) that devices take before and between their replies, by `exchange.timeout`."""
 
     def quiet_time(self, rate: int) -> float:
-        """Seconds a node must have been left alone before it is probed again after a doubtful exchange."""
+        """Time (s) without a request to a node that is out of sync, before it is probed."""
 
     def echo_test(self) -> Exchange[Any] | None:
-        """An exchange whose echo cannot be taken for its answer, sent when a bus is opened; None: cannot echo."""
+        """An exchange whose echo differs from its reply, sent when a bus is opened; None: the link has no echo."""
 
     def explain(self, data: bytes) -> list[Explanation]:
-        """Every frame in these bytes, field by field, and why a bad one is bad.
-
-        A CAN frame stands in a run of bytes as `CanFrame.flat()` says.
-        """
+        """Explain all frames in these bytes, field by field; a CAN frame is serialized by `CanFrame.flat()`."""
 
     def receiver(self) -> Receiver: ...
 
     def probe(self, node: int, attempt: int) -> Exchange[bool]:
-        """A harmless exchange with a known answer; its value says whether the answer was right.
+        """An exchange without effect; its value is True for the expected content of the reply.
 
-        Attempts with different numbers differ in the key or in the length of their reply, and none of them
-        can be confused with its own echo.
+        Replies to different attempts differ in key or length, and from the echo of the request.
         """
 
     def stop(self, nodes: Mapping[int, Answer | None]) -> Stop:
-        """Stop these nodes; each comes with its last answer that told a position, if there was one."""
+        """Requests that stop these nodes, by node with its latest answer that contains a position, or None."""
 
     def identify(self, node: int) -> Runnable[Identity]: ...
 
     def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Operation[list[Found]]:
-        """Look for devices by unicast; () means every id, or the present rate, which is set again in the end.
+        """Search devices by unicast. () means all ids, or the present rate, which is restored at the end.
 
-        Reports `Progress`, and `Found` as soon as one answers, perhaps before it was asked what it is.
+        Reports `Progress`, and `Found` when a device answers, possibly before its identity is read.
         """
 
     def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:
-        """What devices of this model can do, by name, in SI units; empty when it has none. What is absent it cannot do.
+        """Capabilities of devices of this model, by name, in SI units; what a model does not support is absent.
 
-        Each is called with a device (what `devices` makes) and gives an operation, but `train`. They are
+        Each is a function of a device (see `devices`), or several for `train`, and returns an operation:
 
-            state position velocity load current voltage temperature    what it tells: a `State`, else a number
-            health(device)                      how it fares, a `Health`: of a known device an exchange that can be kept
-            enable_torque(device)  disable_torque(device)               without a jump; limp
-            move(device, to, *, wait)  stop(device)                     to rad; decelerate and stay, gives a promise
-            move_by(device, angle, *, velocity, wait)                   by rad from where it stands
-            jog(device, velocity, seconds)  home(device, *, deadline)   for a while; to its switch
-            run(device, number, *, timeout)                             a program that is stored in it
-            limits(device)                      its own lowest and highest position, rad; read when not known
-            travel(device)                      between which positions, rad, any limits of it must lie; None: not known
-            cap_torque(device, fraction)  cap_current(device, ampere)   bound what it pushes with, until power-off
-            train(devices, *, rate) -> Operation[Train]                 several, to be led in a loop; rate in bit/s
+            state position velocity load current voltage temperature    its `State`, or one number
+            health(device)                      its `Health`; for an identified device an exchange that can be kept
+            enable_torque(device)  disable_torque(device)               without a jump; without torque
+            move(device, to, *, wait)  stop(device)                     to rad; decelerate and hold, returns a promise
+            move_by(device, angle, *, velocity, wait)                   rad from the present position
+            jog(device, velocity, seconds)  home(device, *, deadline)   for a time; to the home switch
+            run(device, number, *, timeout)                             a stored program
+            limits(device)                      lowest and highest position (rad) in its settings; read if unknown
+            travel(device)                      range (rad) in which its limits must lie; None: unknown
+            cap_torque(device, fraction)  cap_current(device, ampere)   limit until power-off
+            train(devices, *, rate) -> Operation[Train]                 for a control loop; rate in bit/s
             keep_time(device, angle, timing, *, velocity, acceleration) -> Operation[Turned]
-                by rad from where it stands, by a profile of its own, as long as others take; at most so fast (rad/s)
-                and so steep (rad/s²), where it can be told
+                rad from the present position, by its own profile, in the duration of the others; at most `velocity`
+                (rad/s) and `acceleration` (rad/s²) where the device supports that
         """
 
     def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
-        """A simulated bus with these nodes; "" is the family's usual model."""
+        """A simulated bus with these nodes; "" is the default model of the family."""

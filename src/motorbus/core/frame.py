@@ -1,4 +1,4 @@
-"""One frame of classic CAN, as links, buses and families hand it to each other."""
+"""A classic CAN frame, as links, buses and families exchange it."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ from enum import Enum
 from typing import Final, NamedTuple
 
 ERROR_FLAG: Final = 1 << 29
-"""Set in the identifier of what is no data frame but the adapter's report of a bus error, as SocketCAN does it."""
+"""Set in the identifier of an adapter's report of a bus error, as in SocketCAN; such a frame is no data frame."""
 REMOTE_FLAG: Final = 1 << 30
 """Set in the identifier of a remote frame."""
 
 
 class Audience(Enum):
-    """Whom a frame is for, as simulated devices see it: none of them, some of them alone, or everyone on the bus."""
+    """Receivers of a frame, seen from the simulated devices: none of them, only they, or all nodes of the bus."""
 
-    NOBODY = "nobody"
+    NONE = "none"
     OURS = "ours"
     EVERYONE = "everyone"
 
 
 class CanFrame(NamedTuple):
-    """One classic CAN frame: identifier (with the flags above), 0 to 8 data bytes, 29-bit identifier or not."""
+    """A classic CAN frame: identifier (with the flags above), 0 to 8 data bytes, 29-bit identifier or not."""
 
     id: int
     data: bytes
@@ -30,5 +30,5 @@ class CanFrame(NamedTuple):
         return f"{self.id:0{8 if self.extended else 3}X}#{self.data.hex().upper()}"
 
     def flat(self) -> bytes:
-        """How a frame stands in a run of bytes: identifier (4, big-endian, top bit for 29 bits), count, data."""
+        """Serialize as identifier (4 bytes, big-endian, top bit set for 29 bits), data length (1 byte), data."""
         return (self.id | self.extended << 31).to_bytes(4, "big") + bytes((len(self.data),)) + self.data

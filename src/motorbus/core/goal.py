@@ -1,4 +1,4 @@
-"""What an order says of each device, so that it can be judged before it leaves, and when it is obeyed."""
+"""What a motion request asks of each node, and when the node acts on it; the gate judges it before it leaves."""
 
 from __future__ import annotations
 
@@ -7,21 +7,25 @@ from typing import Final, NamedTuple
 
 
 class Stays(Enum):
-    """That an order makes nothing go anywhere; said by whoever made it so, and never found out from its numbers."""
+    """Marks a goal that moves nothing. The driver sets it; it is never derived from the numbers of the goal."""
 
     STILL = "still"
-    """Stay where it stands, or rest: it ends a movement, and passes whatever happens."""
+    """Hold the present position, or rest without torque: ends a movement; the gate always lets it pass."""
     ON = "on"
-    """The same, or nothing at all, and torque comes on with it."""
+    """Hold the present position, or do nothing, with torque switched on."""
 
 
 class Goal(NamedTuple):
-    """What a motion exchange orders of one node, in API units, with the limits in force when it was made.
+    """What a motion request asks of one node, in API units, with the limits in force when the request was made.
 
-    `quantity` is position (rad) or relative (rad); velocity (rad/s), load (fraction) or current (A), which are obeyed
-    until something else is ordered; what only bounds a movement: speed (rad/s), cap (A), time (a share of the
-    longest); or torque, which 1 switches on. A limit that is not known is None, and the gate refuses what it cannot
-    judge. `stays` marks what makes it go nowhere.
+    `quantity` is one of
+
+        position (rad)  relative (rad)
+        velocity (rad/s)  load (fraction)  current (A)         the node follows it until the next order
+        speed (rad/s)  cap (A)  time (a share of the longest)  only bounds a movement
+        torque                                                 1 switches it on
+
+    A limit is None where it is unknown; the gate refuses what it cannot judge. `stays` marks a goal that moves nothing.
     """
 
     node: int
@@ -33,20 +37,21 @@ class Goal(NamedTuple):
 
 
 def torque_on(node: int) -> Goal:
-    """Torque, or leave to obey goals, and nothing else."""
+    """The goal of a request that only enables torque, or lets the node accept goals."""
     return Goal(node, "torque", 1.0, 1.0, 1.0, Stays.ON)
 
 
 def torque_off(node: int) -> Goal:
-    """No torque: it rests, whatever it was told before."""
+    """The goal of a request that disables torque: the node rests, whatever its earlier goals."""
     return Goal(node, "torque", 0.0, 0.0, 0.0, Stays.STILL)
 
 
 class Later:
-    """Marks an exchange whose goals are not obeyed when it arrives, or that lets such goals begin.
+    """Marks a request whose goals do not take effect on arrival, or that makes such goals take effect.
 
-    Without `begins` what it brings waits in `node`, in place of what waited there. With it, what waits in `node` (None:
-    in everyone) begins. `done`: it has been acknowledged, where anybody acknowledges it; set by whoever made it.
+    Without `begins` its goals wait in `node` and replace those that waited there. With `begins` the goals that wait in
+    `node` (None: in all nodes) take effect. `done`: the request was acknowledged; the driver sets it, where devices
+    acknowledge such a request at all.
     """
 
     __slots__ = ("begins", "done", "node")

@@ -1,6 +1,6 @@
-"""Moves that are waited for: when the wait is interrupted, the devices stop and hold where they are.
+"""Wait for a move; if the wait is interrupted, stop the devices.
 
-Errors of the moves themselves (no reply, stalled, out of time) end the wait as they are and send nothing.
+Errors of the move itself (no reply, stalled, timeout) end the wait without a stop.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from motorbus.errors import MotorbusError, RequestError
 
 T = TypeVar("T")
 
-LOOK: Final = 0.02
-"""s between two readings of a device that was stopped."""
-STILL: Final = 0.006
-"""rad within which it must stay; the coarsest position has counts of 0.005."""
-SPAN: Final = 0.1
-"""s for which it must stay there."""
-LONGEST: Final = 1.0
-"""s after which it is no longer looked at."""
+PERIOD: Final = 0.02
+"""s between two position readings of a stopped device."""
+TOLERANCE: Final = 0.006
+"""rad within which a device at rest stays; the coarsest position has counts of 0.005 rad."""
+REST_TIME: Final = 0.1
+"""s for which it must stay within the tolerance."""
+TIMEOUT: Final = 1.0
+"""s after which the readings end, at rest or not."""
 
 
 class Device(Protocol):
-    """A device that moves; `last_move` identifies the move that was ordered last."""
+    """A device that moves; `last_move` identifies its latest move."""
 
     @property
     def node(self) -> int: ...
@@ -43,7 +43,7 @@ class Device(Protocol):
 
 
 class Moving(NamedTuple):
-    """A device of a move, how it stops (gives its promise, an Enum; None without torque), and where it is (rad)."""
+    """A device of a move, its stop (returns the promise, an Enum; None without torque), and its position (rad)."""
 
     device: Device
     stop: Callable[[], Runnable[Any]]
@@ -51,13 +51,13 @@ class Moving(NamedTuple):
 
 
 def stopped_if_interrupted(move: Runnable[T], *devices: Moving) -> Operation[T]:
-    """Order a move and wait for it; after an interruption stop its devices and add a note where each holds.
+    """Run a move; if it is interrupted, stop its devices and add a note to the error: where each holds.
 
-    A device that has got a newer move is left alone.
+    A device with a newer move is not stopped.
     """
     wait = _Wait(devices)
     try:
-        return (yield from afterwards(wait.on(move), wait.stopped))
+        return (yield from afterwards(wait.run(move), wait.stop))
     except BaseException as error:
         for note in wait.notes:
             error.add_note(note)
@@ -71,63 +71,63 @@ class _Wait:
         self._move = object()
         self._open = False
 
-    def on(self, move: Runnable[T]) -> Operation[T]:
-        for one in self._devices:
-            one.device.last_move = self._move
+    def run(self, move: Runnable[T]) -> Operation[T]:
+        for moving in self._devices:
+            moving.device.last_move = self._move
         self._open = True
         try:
             value = yield from move
         except (Exception, Closed, GeneratorExit) as error:
-            self._open = isinstance(error, MemoryError)
+            self._open = isinstance(error, MemoryError)  # an interruption: it says nothing of the move
             raise
         self._open = False
         return value
 
-    def stopped(self) -> Operation[None]:
+    def stop(self) -> Operation[None]:
         if not self._open:
             return
-        cut_off = MotorbusError("its stop was interrupted")
-        self.notes = [_note(one, cut_off) for one in self._devices]
-        told = yield from Together([outcome(iter(Alone(self._stop(one)))) for one in self._devices])
+        interrupted = MotorbusError("its stop was interrupted")
+        self.notes = [_note(moving, interrupted) for moving in self._devices]
+        results = yield from Together([outcome(iter(Alone(self._stop(moving)))) for moving in self._devices])
         self._open = False
-        found = [(one, came) for one, came in zip(self._devices, told, strict=True) if came]
-        self.notes = [_note(one, came) for one, came in found]
-        places = yield from Together([_place(one, came) for one, came in found])
+        stopped = [pair for pair in zip(self._devices, results, strict=True) if pair[1]]
+        self.notes = [_note(moving, result) for moving, result in stopped]
+        places = yield from Together([_place(moving, result) for moving, result in stopped])
         self.notes = [note + place for note, place in zip(self.notes, places, strict=True)]
 
-    def _stop(self, one: Moving) -> Operation[str]:
-        """Nothing else goes onto the bus meanwhile, so a newer move comes before all of it or behind."""
-        if one.device.last_move is not self._move:
+    def _stop(self, moving: Moving) -> Operation[str]:
+        """Run it inside `Alone`: a newer move is then ordered either before the check or after the stop."""
+        if moving.device.last_move is not self._move:
             return ""
-        promise = yield from one.stop()
+        promise = yield from moving.stop()
         if promise is None:
             return "its torque is off"
         return "holds" if promise.name.startswith("HOLD") else f"{promise.value};"
 
 
-def _note(one: Moving, came: str | MotorbusError) -> str:
-    node = one.device.node
-    if isinstance(came, str):
-        return f"#{node}: {came}"
-    how = came.advice if isinstance(came, RequestError) else f"`motorbus stop BUS#{node}` stops it"
-    return f"#{node} may still be moving: {came.summary}; {how}"
+def _note(moving: Moving, result: str | MotorbusError) -> str:
+    node = moving.device.node
+    if isinstance(result, str):
+        return f"#{node}: {result}"
+    fix = result.advice if isinstance(result, RequestError) else f"`motorbus stop BUS#{node}` stops it"
+    return f"#{node} may still be moving: {result.summary}; {fix}"
 
 
-def _place(one: Moving, came: str | MotorbusError) -> Operation[str]:
-    """Where a device that was stopped came to rest, or was seen last."""
-    if isinstance(came, MotorbusError):
+def _place(moving: Moving, result: str | MotorbusError) -> Operation[str]:
+    """Return the text of the position at which a stopped device came to rest, or of its last reading."""
+    if isinstance(result, MotorbusError):
         return ""
-    begun = since = yield from Pause(0)
-    mark: float | None = None
+    begin = since = yield from Pause(0)
+    rest: float | None = None
     while True:
-        here = yield from outcome(one.position())
-        if isinstance(here, MotorbusError):
-            return f", and its position is not known: {here.summary}"
-        now = yield from Pause(LOOK)
-        if mark is None or abs(here - mark) > STILL:
-            mark, since = here, now
-        place = f" at {units.show(here, 'position')}"
-        if now - since >= SPAN:
+        position = yield from outcome(moving.position())
+        if isinstance(position, MotorbusError):
+            return f", and its position is not known: {position.summary}"
+        now = yield from Pause(PERIOD)
+        if rest is None or abs(position - rest) > TOLERANCE:
+            rest, since = position, now
+        place = f" at {units.show(position, 'position')}"
+        if now - since >= REST_TIME:
             return place
-        if now - begun >= LONGEST:
+        if now - begin >= TIMEOUT:
             return f"{place}, not yet at rest"

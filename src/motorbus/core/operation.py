@@ -1,10 +1,10 @@
-"""How work is said, so that it can be said once and run blocking or async.
+"""Operations: driver functions that run on a blocking or an async bus alike.
 
-A driver function is a generator (an `Operation`) that yields *steps* and returns its answer. There are seven steps and
-no others. A step is a plain value: the bus that runs the operation (`bus/tasks.py`) decides when and how. One
-that needs a single exchange returns the `Exchange` itself, which may be kept and run again.
+A driver function is a generator (an `Operation`) that yields *steps* and returns its result. There are seven steps. A
+step is a plain value; the bus that runs the operation (`bus/tasks.py`) executes it. A function with a single exchange
+returns the `Exchange` itself, which may be kept and run again.
 
-Each step is iterable so that `value = yield from step` has a type; the bare `yield` occurs in this file only.
+`value = yield from step` has the type of the step; a bare `yield` occurs in this module only.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Key: TypeAlias = Hashable
 
 
 class Rank(IntEnum):
-    """Who goes first when several exchanges wait: the lower the earlier."""
+    """Priority among waiting exchanges: the lowest number leaves first."""
 
     STOP = 0
     CONTROL = 1
@@ -37,7 +37,7 @@ class Rank(IntEnum):
 
 
 class Effect(IntEnum):
-    """What carrying out a write does to the world; the greatest of several counts."""
+    """Effect of a write; of several effects the highest number counts."""
 
     NONE = 0
     PERSISTENT = 1
@@ -47,7 +47,7 @@ class Effect(IntEnum):
 
 
 class Timeout(IntEnum):
-    """How long the device itself may take before it answers; the family gives the seconds."""
+    """Class of the time that a device takes before it replies; the family defines the seconds."""
 
     REPLY = 0
     SCAN = 1
@@ -55,9 +55,9 @@ class Timeout(IntEnum):
 
 
 class Due(NamedTuple):
-    """One reply that an exchange calls for: from which node, recognised by which key, how many bytes exactly.
+    """An expected reply: its node, the key that identifies it, and its exact length in bytes.
 
-    A refusal is a reply too: where it is shorter, the family's `wire` pads it to this length, as CANopen does.
+    A refusal is a reply, too; where it is shorter, the family pads it to this length, as CANopen does.
     """
 
     node: int
@@ -66,19 +66,19 @@ class Due(NamedTuple):
 
 
 class Any_(Enum):  # noqa: N801 - typing.Any is taken
-    """The type of `ANY`: every reply that comes until the deadline is part of the answer."""
+    """The type of `ANY`: every reply before the deadline is part of the answer."""
 
     ANY = "any"
 
 
 ANY: Final = Any_.ANY
 EVERY_LANE: Final = -1
-"""The lane of an exchange that addresses everyone on a bus where each node has a lane of its own; its replies are
-`ANY`: it takes each that nobody else awaits, on whatever lane it comes."""
+"""Lane of a request to all nodes of a bus where each node has its own lane. Its replies are `ANY`: it takes the replies
+of any lane that no other exchange expects."""
 
 
 class Reply(NamedTuple):
-    """A frame that answers some request. `key` tells which, `data` is the whole frame or the CAN data field."""
+    """A frame that answers a request. `key` identifies it, `data` is the whole frame or the CAN data field."""
 
     lane: int
     key: Key
@@ -86,9 +86,9 @@ class Reply(NamedTuple):
 
 
 class Notice(NamedTuple):
-    """A frame the device sent on its own account: a report, an alarm, the end of a program.
+    """A frame that a device sent unsolicited: a report, an alarm, the end of a program.
 
-    `at` is when it arrived, s on the link's clock; the bus fills it in.
+    `at` is its arrival time (s, link clock), set by the bus.
     """
 
     node: int
@@ -98,10 +98,10 @@ class Notice(NamedTuple):
 
 
 class Noise(NamedTuple):
-    """Bytes that belong to nobody, and why.
+    """Bytes that are no reply and no notice.
 
-    `fault` is framing or checksum, which cast doubt on whoever was asked lately, or foreign, which does not: a whole
-    frame of other traffic. `lane` confines the doubt to one lane; None means that anyone may have sent it.
+    `fault` is "framing" or "checksum": the bytes may be a damaged reply of a node that was asked recently. Or it is
+    "foreign": a whole frame of other traffic. `lane` is the lane of the bytes, None if any node may have sent them.
     """
 
     data: bytes
@@ -113,7 +113,7 @@ Event: TypeAlias = Reply | Notice | Noise
 
 
 class Answer(NamedTuple):
-    """What came back: the replies in the order they were due, the nodes that did not answer, and when (s)."""
+    """The replies in the expected order, the nodes without a reply, and the arrival time (s, link clock)."""
 
     replies: tuple[Reply, ...]
     missing: tuple[int, ...]
@@ -121,43 +121,42 @@ class Answer(NamedTuple):
 
 
 class Unlike(Enum):
-    """The type of `UNLIKE`: these bytes are not exactly the replies due, or not as they usually are."""
+    """The type of `UNLIKE`: the bytes are not exactly the expected replies, or need the general decoder."""
 
     UNLIKE = "unlike"
 
 
 UNLIKE: Final = Unlike.UNLIKE
 Whole: TypeAlias = "Callable[[Any, float], T | Unlike]"
-"""What all that came, and when (s), says at once; `UNLIKE` where it must be looked at piece by piece."""
+"""(all received bytes, arrival time in s) -> value, or `UNLIKE` for the general decoder."""
 
 Stops: TypeAlias = Callable[[int], int]
-"""How many stops have left for a node by now, those for everybody included."""
+"""Node -> number of stops sent to it so far, stops to all nodes included."""
 Refusal: TypeAlias = Callable[[Stops], MotorbusError | None]
-"""Why an exchange must not leave after all, None when it may."""
+"""The error if an exchange must not leave, None if it may."""
 
 
 class Exchange(Generic[T_co]):
-    """One request and the replies, or the silence, it calls for. A value: never changed after it is made.
+    """One request and its expected replies. An immutable value.
 
     `request`     the bytes or the CAN frame to send
-    `replies`     one `Due` for each reply; empty when none is due; `ANY` for all that come until the deadline
-    `read`        answer -> value; None gives the `Answer` itself. Matching never looks at it, so an exchange
-                  without it is plain data
-    `lane`        two exchanges on one lane never overlap
-    `rank`        who goes first
-    `effect`      the greatest effect of the rows it writes
-    `goals`       what it orders, per node, for the gate
-    `later`       its goals wait where it brings them, or it lets those begin that wait; None: neither
-    `timeout`     how long the device may think
-    `repeatable`  sending it twice does no more than sending it once
-    `tells_position`  the replies begin with the present position, so stop can hold it. As a function it says where that
-                  is (rad, by node; none for whom nobody can tell), so the gate can judge by it
-    `refusal`     asked just before it leaves, at every try, where it moves or switches torque: the error for which it
-                  must not, None when it may. So what was ordered under other settings, or before a stop, never leaves
-    `whole`       of one that is kept: what `read` makes of the answer, straight from all the bytes of the replies due,
-                  when each is sound and tells no alarm; else `UNLIKE`. `course` is what a bus keeps of it
-    `other`       makes one that says the same and has replies of another length: where replies carry no number, taking
-                  turns keeps a second copy of the last one from being taken for the next
+    `replies`     one `Due` per expected reply; () for none; `ANY` for all replies before the deadline
+    `read`        answer -> value; None: the value is the `Answer`. Matching of replies does not use it
+    `lane`        exchanges on the same lane never overlap
+    `rank`        priority
+    `effect`      highest effect of the rows that it writes
+    `goals`       goal of each node, for the gate
+    `later`       its goals wait in the node, or it makes waiting goals take effect; None: neither
+    `timeout`     class of the time that the device needs
+    `repeatable`  sending it twice has the same effect as sending it once
+    `tells_position`  True: the replies begin with the present position, so a stop can hold it. A function: answer ->
+                  position (rad) by node, without the nodes whose reply does not give it; the gate uses it
+    `refusal`     checked before each attempt that moves or switches torque: the error if the exchange must not leave,
+                  as after a stop or a change of settings; None if it may
+    `whole`       for an exchange that is kept: the value of `read`, decoded from the bytes of all expected replies if
+                  each is valid and reports no alarm; else `UNLIKE`. `course` is the state that a bus keeps for it
+    `other`       makes an equivalent exchange with replies of another length. The bus alternates where replies carry no
+                  number, so that a second copy of the last reply is not taken for the next one
     """
 
     __slots__ = (
@@ -180,7 +179,7 @@ class Exchange(Generic[T_co]):
 
     aim: Any = None
     sure = False
-    """Every goal of it lies within the limits that it brings, and moves nothing without an end: see `Aimed`."""
+    """Every goal is within the limits that it carries, and none is an endless motion; see `Aimed`."""
 
     def __init__(
         self,
@@ -218,11 +217,11 @@ class Exchange(Generic[T_co]):
 
     @property
     def ordered(self) -> Sequence[int]:
-        """The nodes of its goals."""
+        """The nodes of the goals."""
         return [goal.node for goal in self.goals]
 
     def reading(self, read: Callable[[Answer], T]) -> Exchange[T]:
-        """The same request, whose answer is read in another way."""
+        """The same request with another `read`, without `other` and `whole`."""
         own = ("request", "replies", "read", "other", "whole", "course")
         rest = [name for name in Exchange.__slots__ if name not in own]
         return Exchange(self.request, self.replies, read, **{name: getattr(self, name) for name in rest})
@@ -232,15 +231,15 @@ class Exchange(Generic[T_co]):
         return value
 
     def __repr__(self) -> str:
-        shown = self.request.hex(" ") if isinstance(self.request, bytes) else repr(self.request)
-        return f"<Exchange {shown}>"
+        text = self.request.hex(" ") if isinstance(self.request, bytes) else repr(self.request)
+        return f"<Exchange {text}>"
 
 
 class Together(Generic[T_co]):
-    """Operations that may overlap where the bus allows it; results in order.
+    """Operations that overlap where the bus allows it; gives their results in order.
 
-    One failure does not stop the others, an interruption in one (KeyboardInterrupt, want of memory) ends them all. When
-    all have ended the first error is raised, with a note for each other; `outcome()` around each makes them values.
+    An error in one does not end the others; an interruption (KeyboardInterrupt, MemoryError) ends all. After all have
+    ended the first error is raised, with a note for each other; `outcome()` around each gives errors as values.
     """
 
     __slots__ = ("operations",)
@@ -254,7 +253,7 @@ class Together(Generic[T_co]):
 
 
 class Alone(Generic[T_co]):
-    """An operation during which nothing else but a stop goes onto the bus."""
+    """An operation during which the bus sends nothing else, except a stop."""
 
     __slots__ = ("operation",)
 
@@ -267,7 +266,7 @@ class Alone(Generic[T_co]):
 
 
 class Pause:
-    """Let at least `seconds` pass on the link's clock; gives the moment (s) it is over. 0 only asks what time it is."""
+    """Wait at least `seconds` on the link clock; gives the time (s) then. 0 only reads the clock."""
 
     __slots__ = ("seconds",)
 
@@ -280,7 +279,7 @@ class Pause:
 
 
 class Listen:
-    """Wait for a notice that `match` accepts, at most `until` seconds from this step on; None when none came."""
+    """Wait at most `until` seconds from this step on for a notice that `match` accepts; gives it, or None."""
 
     __slots__ = ("match", "until")
 
@@ -294,10 +293,10 @@ class Listen:
 
 
 class Tune:
-    """Set the rate of the link, in bit/s, once nothing is in flight; gives the rate it had. 0 only asks.
+    """Set the rate of the link (bit/s) when nothing is in flight; gives the previous rate. 0 only reads it.
 
-    With `listen_only` the link sends nothing, not even the acknowledge bit of CAN, until it is tuned again: so a bus of
-    unknown rate is not disturbed. A serial link is silent anyway while nothing is sent.
+    With `listen_only` the link sends nothing, not even the acknowledge bit of CAN, until the next `Tune`: a bus of
+    unknown rate is not disturbed.
     """
 
     __slots__ = ("listen_only", "rate")
@@ -312,7 +311,7 @@ class Tune:
 
 
 class Progress(NamedTuple):
-    """An event for `Report`: `done` of `total` units of work, and what is being done."""
+    """An event for `Report`: `done` of `total` units of work, and the present activity."""
 
     done: int
     total: int
@@ -320,14 +319,17 @@ class Progress(NamedTuple):
 
 
 class Journal(NamedTuple):
-    """An event for `Report` that must be on disk before the next step: how far a guarded change has come.
+    """An event for `Report` that must be on disk before the next step: the state of a guarded change.
 
-    `change`  the verb that makes it, as "set_id"
-    `state`   ASKED: it is wanted, and its conditions are about to be checked; nothing is kept, but a bus on which
-              another change is unfinished refuses. INTENT: from the next step on something may be changed; `facts` are
-              all that is needed to finish it or to take it back, as plain data, the id of the device as "node", and
-              for people, where the verb tells too little, "what" is unfinished, its "cause", and "advice" ({bus}).
-              Any other word: a step that has been reached. OUTCOME: it is over, `facts["outcome"]` says how
+    `change`  the verb that makes the change, as "set_id"
+    `state`   ASKED    requested, conditions not yet checked; not stored, but refused while another change on the bus
+                       is unfinished
+              INTENT   the next step may change something
+              OUTCOME  the change has ended; `facts["outcome"]` says how
+              Any other word is a step that was reached.
+    `facts`   of INTENT: plain data that suffices to finish or revert the change, with the id of the device as "node".
+              For people, where the verb does not suffice: "what" is unfinished, its "cause", and "advice" ({bus} in
+              it is replaced)
     """
 
     change: str
@@ -338,12 +340,12 @@ class Journal(NamedTuple):
 ASKED: Final = "asked"
 INTENT: Final = "intent"
 OUTCOME: Final = "outcome"
-REACHED: Final = "reached"  # among the facts of a change that is taken up again: its states so far, in order
-READABLE: Final = "readable"  # True among the facts of a change that leaves readings true, or that only reads
+REACHED: Final = "reached"  # in the facts of a resumed change: its states so far, in order
+READABLE: Final = "readable"  # in the facts: True for a change that only reads or leaves readings valid
 
 
 class Report:
-    """Hand an event (progress, an early result, a journal record) to whoever listens, before the next step."""
+    """Pass an event (progress, an early result, a journal record) to its observers before the next step."""
 
     __slots__ = ("event",)
 
@@ -360,11 +362,11 @@ Runnable: TypeAlias = "Generator[Step, Any, T] | Exchange[T]"
 
 
 class Closed(BaseException):
-    """Raised in an operation whose coroutine was closed: settings are given back, and no motion is ordered."""
+    """Raised in an operation whose coroutine was closed: it restores settings and orders no motion."""
 
 
 def outcome(runnable: Runnable[T]) -> Operation[T | MotorbusError]:
-    """Carry out `runnable`; an error of ours becomes the value, so that a loop can visit everyone."""
+    """Run `runnable`; a MotorbusError becomes the value, so that a loop can visit all nodes."""
     try:
         return (yield from runnable)
     except MotorbusError as error:
@@ -372,9 +374,9 @@ def outcome(runnable: Runnable[T]) -> Operation[T | MotorbusError]:
 
 
 def afterwards(runnable: Runnable[T], clean_up: Callable[[], Runnable[object]]) -> Operation[T]:
-    """Carry out `runnable`, then `clean_up()`, whatever happens: an unlock is always followed by a lock.
+    """Run `runnable`, then always `clean_up()`, as a lock after an unlock.
 
-    An error, or an interruption or two at any line, is raised when that is over. It must be harmless to repeat.
+    An error, or up to two interruptions at any line, are raised after that. `clean_up` must be repeatable.
     """
     tries: list[str] = []
     try:
@@ -384,10 +386,10 @@ def afterwards(runnable: Runnable[T], clean_up: Callable[[], Runnable[object]]) 
             finally:
                 yield from _insist(clean_up, tries)
         finally:
-            if not tries:  # an interruption fell between the lines above
+            if not tries:  # interrupted between the lines above
                 yield from _insist(clean_up, tries)
     finally:
-        if not tries:  # and a second one
+        if not tries:  # interrupted twice
             yield from _insist(clean_up, tries)
 
 

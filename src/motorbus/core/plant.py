@@ -1,12 +1,10 @@
-"""How a motor moves, as functions of time that are worked out when somebody asks and never ticked.
+"""Motion of a simulated motor as a function of time, evaluated on demand without a tick.
 
-A simulated bus may hold 253 servos and be read a thousand times a second or once an hour; with a tick it would
-cost the same in both cases and be wrong by the width of the tick in either. So a movement is a value: a few
-phases of constant acceleration, made once when a goal is given. Asking where the motor is costs a few
-multiplications, and the same question always has the same answer.
+A movement is a value: a few phases of constant acceleration, computed once per goal. A reading costs a few
+multiplications and has no error of a time step, for 253 servos read 1000 times per second or once per hour.
 
-Any unit of length does, as long as velocity and acceleration are in it too. Time is in seconds on whatever
-clock the caller uses; only differences count.
+Length has any unit; velocity and acceleration use the same one. Time is in s on the clock of the caller; only
+differences matter.
 """
 
 from __future__ import annotations
@@ -17,11 +15,11 @@ from math import copysign, inf, isfinite, sqrt
 from typing import Final, NamedTuple
 
 _made: Final = tuple.__new__
-"""Makes a named tuple in half the time of its own call: a fleet makes four for every goal of every axis."""
+"""Makes a named tuple in half the time of its constructor; every goal of every axis makes four."""
 
 
 class Phase(NamedTuple):
-    """A stretch of constant acceleration: where and how fast it begins, how long it lasts (s)."""
+    """A time of constant acceleration: its duration (s), then position, velocity and acceleration at its start."""
 
     duration: float
     position: float
@@ -38,7 +36,7 @@ class Phase(NamedTuple):
 
 
 class Stretch(NamedTuple):
-    """A part of a movement in one direction: from when to when, how fast at its beginning, and how that changes."""
+    """A part of a movement in one direction: begin and end (s), position and velocity at the begin, acceleration."""
 
     begin: float
     end: float
@@ -48,15 +46,15 @@ class Stretch(NamedTuple):
 
     @property
     def way(self) -> float:
-        """1.0 or -1.0 where it goes, 0.0 where it stands."""
+        """Direction: 1.0 or -1.0, 0.0 at rest."""
         direction = self.velocity or self.acceleration
         return copysign(1.0, direction) if direction else 0.0
 
 
 class Motion(NamedTuple):
-    """A movement that began at `start` (s) and afterwards is at `goal`, or goes on at `cruise` for ever.
+    """A movement from `start` (s) on. After its phases it stays at `goal`, or moves on from there at `cruise`.
 
-    Before `start` it answers as at `start`, so a question that comes late on a reordered wire is harmless.
+    Before `start` the state is that at `start`: a request that a reordering line delivers late gets this state.
     """
 
     start: float
@@ -65,7 +63,7 @@ class Motion(NamedTuple):
     cruise: float = 0.0
 
     def position(self, at: float) -> float:
-        """Where it is at this moment: what most packets ask of every servo."""
+        """Position at this moment (s). Faster than `state`: most packets read only this, of every servo."""
         elapsed = at - self.start
         if elapsed < 0.0:
             elapsed = 0.0
@@ -76,15 +74,15 @@ class Motion(NamedTuple):
         return self.goal + self.cruise * elapsed if self.cruise else self.goal
 
     def velocity(self, at: float) -> float:
-        """How fast it is at this moment, with its sign."""
+        """Signed velocity at this moment (s)."""
         return self.state(at)[1]
 
     def acceleration(self, at: float) -> float:
-        """How much faster it gets at this moment, with its sign."""
+        """Signed acceleration at this moment (s)."""
         return self.state(at)[2]
 
     def state(self, at: float) -> tuple[float, float, float]:
-        """Position, velocity and acceleration at this moment."""
+        """Position, velocity and acceleration at this moment (s)."""
         elapsed = at - self.start
         if elapsed < 0.0:
             elapsed = 0.0
@@ -97,24 +95,24 @@ class Motion(NamedTuple):
 
     @property
     def peak(self) -> float:
-        """The greatest speed with which a phase begins, or that it keeps in the end."""
-        greatest = abs(self.cruise)
+        """The highest speed at the start of a phase or after the last one."""
+        highest = abs(self.cruise)
         for _, _, velocity, _ in self.phases:
-            if abs(velocity) > greatest:
-                greatest = abs(velocity)
-        return greatest
+            if abs(velocity) > highest:
+                highest = abs(velocity)
+        return highest
 
     def moving(self, at: float) -> bool:
-        """Whether it has not come to its end yet."""
+        """Whether the movement is not yet at its end at this moment (s)."""
         return at < self.done_at
 
     @property
     def done_at(self) -> float:
-        """When it comes to rest at its goal; infinity when it never does."""
+        """Moment (s) at which it comes to rest at the goal; inf if it never does."""
         return inf if self.cruise else self.start + sum(phase.duration for phase in self.phases)
 
     def stretches(self, since: float = -inf) -> Iterator[Stretch]:
-        """Every part that ends after `since`, in order; the last one, at rest or cruising, ends at infinity."""
+        """Yield the parts that end after `since` (s), in order; the last one, at rest or at `cruise`, ends at inf."""
         begin = self.start
         for phase in self.phases:
             for stretch in _one_way(begin, phase):
@@ -125,7 +123,7 @@ class Motion(NamedTuple):
 
 
 def rest(at: float, position: float) -> Motion:
-    """Stand still here: at rest, limp, or held."""
+    """No movement: at rest, without torque, or held."""
     return Motion(at, (), position)
 
 
@@ -139,13 +137,14 @@ def move(
     acceleration: float = inf,
     deceleration: float | None = None,
 ) -> Motion:
-    """Go to `goal` and stop there: a trapezoid, or a triangle where the way is short.
+    """Move to `goal` and stop there: a trapezoid of velocity, or a triangle over a short distance.
 
-    It may begin with a `velocity`. When that is too high to stop in time it overshoots and comes back; when it
-    points away from the goal it brakes first; when it exceeds `speed` it brakes down to it. It brakes with
-    `deceleration`, or with `acceleration` where none is given. `acceleration` may be infinite: then velocity changes
-    in no time. `speed` 0 brakes to a halt wherever that is. Raises ValueError for a negative or missing figure, for
-    an infinite speed with an infinite acceleration, and where only one of the accelerations is infinite.
+    With an initial `velocity` too high to stop at the goal it overshoots and returns. An initial velocity away from the
+    goal, or above `speed`, is braked first. It brakes with `deceleration`, by default `acceleration`. With infinite
+    `acceleration` the velocity changes at once. `speed` 0 brakes to a halt anywhere.
+
+    Raises ValueError for a negative speed, an acceleration of 0 or less, NaN, an infinite position or velocity, if both
+    speed and acceleration are infinite, and if only one of acceleration and deceleration is.
     """
     _check(speed, acceleration, position, goal, velocity)
     braking = acceleration
@@ -157,12 +156,14 @@ def move(
     if not speed:
         return run(at, position, 0.0, velocity=velocity, acceleration=braking)
     if acceleration == inf:
-        return _dash(at, position, goal, speed)
+        distance = goal - position
+        full_speed = Phase(abs(distance) / speed, position, copysign(speed, distance), 0.0)
+        return Motion(at, (full_speed,) if distance else (), goal)
     halt = position + velocity * abs(velocity) / (2 * braking)
     if goal == halt:
         return _braked(at, position, velocity, goal, braking)
     way = copysign(1.0, goal - halt)
-    if way * velocity < 0 and braking != acceleration:  # the ramp has a corner where the direction turns
+    if way * velocity < 0 and braking != acceleration:  # acceleration changes where the direction does
         first = _braked(at, position, velocity, halt, braking)
         back = move(at, halt, goal, speed=speed, acceleration=acceleration, deceleration=braking)
         return Motion(at, first.phases + back.phases, goal)
@@ -178,7 +179,7 @@ def move(
 def run(
     at: float, position: float, velocity_goal: float, *, velocity: float = 0.0, acceleration: float = inf
 ) -> Motion:
-    """Reach `velocity_goal` and keep it for ever, as a wheel does; 0 brakes to a halt."""
+    """Accelerate to `velocity_goal` and keep it without end, as a wheel; 0 brakes to a halt."""
     _check(abs(velocity_goal), acceleration, position, velocity_goal, velocity)
     change = velocity_goal - velocity
     if not change or acceleration == inf:
@@ -188,9 +189,9 @@ def run(
 
 
 def obstructed(motion: Motion, low: float, high: float) -> Motion:
-    """The same movement with obstacles at `low` and `high`: it ends at the one it runs into, at once and at rest.
+    """The same movement with obstacles at `low` and `high`: it ends at rest where it meets one.
 
-    Beyond an obstacle only the way back is free. A movement that meets none is given back as it is.
+    Beyond an obstacle only the way back is free. A movement that meets none is returned unchanged.
     """
     phases: list[Phase] = []
     for stretch in motion.stretches():
@@ -207,7 +208,7 @@ def obstructed(motion: Motion, low: float, high: float) -> Motion:
 
 
 def _one_way(begin: float, phase: Phase) -> Iterator[Stretch]:
-    """A phase, cut in two where the direction changes."""
+    """Split a phase in two where its direction changes."""
     end = begin + phase.duration
     turn = -phase.velocity / phase.acceleration if phase.acceleration else inf
     if not 0 < turn < phase.duration:
@@ -218,7 +219,7 @@ def _one_way(begin: float, phase: Phase) -> Iterator[Stretch]:
 
 
 def _time_over(distance: float, stretch: Stretch) -> float | None:
-    """Seconds until a stretch has covered this distance; None if it never does, whenever it ends."""
+    """Seconds in which a stretch covers this distance, even beyond its end; None if it never does."""
     if distance == inf:
         return None
     speed, gain = abs(stretch.velocity), stretch.acceleration * stretch.way
@@ -237,21 +238,12 @@ def _check(speed: float, acceleration: float, *finite: float) -> None:
         raise ValueError("speed and acceleration cannot both be infinite")
 
 
-def _dash(at: float, position: float, goal: float, speed: float) -> Motion:
-    """Without inertia: full speed from the first moment to the last."""
-    way = goal - position
-    return Motion(at, (Phase(abs(way) / speed, position, copysign(speed, way), 0.0),) if way else (), goal)
-
-
 def _braked(at: float, position: float, velocity: float, goal: float, acceleration: float) -> Motion:
-    """Braking at once ends exactly at the goal."""
+    """Brake at once; the stopping distance ends exactly at `goal`."""
     if not velocity:
         return rest(at, goal)
-    return Motion(
-        at,
-        (Phase(abs(velocity) / acceleration, position, velocity, -copysign(acceleration, velocity)),),
-        goal,
-    )
+    phase = Phase(abs(velocity) / acceleration, position, velocity, -copysign(acceleration, velocity))
+    return Motion(at, (phase,), goal)
 
 
 def _trapezoid(
@@ -265,13 +257,13 @@ def _trapezoid(
     *,
     cruises: bool,
 ) -> Motion:
-    """To the velocity `peak`, along at it if it is the highest allowed, and down to nothing at the goal."""
+    """Accelerate to the signed velocity `peak`, keep it if it `cruises`, then brake to rest at the goal."""
     gain = peak - velocity
     ramp, slope = abs(gain) / acceleration, copysign(acceleration, gain)
     reached = position + ramp * (velocity + 0.5 * slope * ramp)
     braking = goal - peak * abs(peak) / (2 * deceleration)
     phases: tuple[Phase, ...] = (_made(Phase, (ramp, position, velocity, slope)),) if ramp else ()
-    # A triangle has no cruise: there the difference is rounding, and divided by a tiny peak it would be ages.
+    # A triangle has no cruise: its difference is a rounding error, which a tiny peak would turn into a long time.
     if cruises and (cruise := (braking - reached) / peak) > 0.0:
         phases += (_made(Phase, (cruise, reached, peak, 0.0)),)
     if brake := abs(peak) / deceleration:
@@ -281,11 +273,11 @@ def _trapezoid(
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """The electrical side of a motor, as far as a plausible reading needs it.
+    """Electrical model of a motor, for plausible readings.
 
-    `top_speed` is what it reaches without load at full duty; `idle_current` (A) flows while it turns without
-    load and `stall_current` (A) at full torque. `torque` below is the share of the stall torque that the
-    outside takes, signed like velocity.
+    `top_speed` is the speed without load at full duty, `idle_current` (A) the current without load, `stall_current` (A)
+    that at full torque. `torque` of the methods is the external load as a fraction of the stall torque, signed like
+    velocity.
     """
 
     top_speed: float
@@ -293,10 +285,10 @@ class Drive:
     stall_current: float
 
     def duty(self, velocity: float, torque: float = 0.0) -> float:
-        """Share of the supply the driver must switch through, -1 to 1: what FEETECH calls load."""
+        """Duty cycle of the motor voltage, -1 to 1; FEETECH calls it load."""
         return max(-1.0, min(1.0, velocity / self.top_speed + torque))
 
     def current(self, velocity: float, torque: float = 0.0) -> float:
-        """Supply current in A, signed like the effort."""
+        """Supply current (A), signed like the effort."""
         idle = copysign(self.idle_current, velocity) if velocity else 0.0
         return idle + self.stall_current * torque

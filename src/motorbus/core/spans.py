@@ -1,7 +1,7 @@
-"""Which of many places in a recording are packets, worked out for all of them at once.
+"""Select the packets among all candidates in a recording, with numpy arrays.
 
-Rules of every family with bytes: the first place that holds a sound packet takes its bytes, the next one is looked for
-behind it, and what lies between is noise. numpy comes as an argument, so that nothing is loaded with this file.
+Rules of every family on a byte stream: the first valid packet takes its bytes, the search continues after it, and bytes
+between packets are noise. numpy is an argument (`np`), so that importing this module does not load it.
 """
 
 from __future__ import annotations
@@ -9,18 +9,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from motorbus.core.capture import FAULTS, NOBODY, NOISE, PIECE, Columns
+from motorbus.core.capture import ABSENT, FAULTS, NOISE, PIECE, Columns
 
 _CHECKSUM = FAULTS.index("checksum")
 _FRAMING = FAULTS.index("framing")
 _MANY = 64
-"""Spans of one size, or parts of all spans: for fewer it takes longer to look for them than to cut them out."""
+"""numpy copies the spans of one size together if they are more than this number plus 1/64 of all spans; fewer are
+faster to copy one by one."""
 
 
 def first_come(np: Any, starts: Any, ends: Any) -> Any:
-    """Which of these spans (sorted by their starts) are taken, as a mask: each that begins where none is under way."""
+    """Mask of the spans (sorted by start) that are accepted: those that begin outside every accepted span."""
     taken = np.ones(len(starts), bool)
-    meets = np.flatnonzero(starts[1:] < ends[:-1])  # rarely any
+    meets = np.flatnonzero(starts[1:] < ends[:-1])  # overlaps are rare
     at = 0
     while at < len(meets):
         one = int(meets[at])
@@ -37,16 +38,16 @@ def tiled(
     doubtful: tuple[Any, Any],
     tell: Callable[[Any, Any], tuple[Any, Any, Any]],
 ) -> Columns:
-    """Packets and noise that together are all of `total` bytes.
+    """Divide `total` bytes into packets and noise.
 
-    `sound` and `doubtful` are starts (sorted) and ends of places where a packet is, and where one seems to be but for
-    its checksum. A sound one that ends behind the last byte takes the rest and makes it noise. `tell` gives kinds,
-    nodes and codes of packets by starts and ends; one number where all have the same.
+    `sound` are the starts (sorted) and ends of valid packets, `doubtful` those of packets with a wrong checksum. A
+    valid packet that ends after the last byte makes the remaining bytes noise. `tell(starts, ends)` gives kinds, nodes
+    and codes of packets; a single number where all packets have the same.
     """
     starts, ends = sound
     taken = first_come(np, starts, ends)
     if not taken.all():
-        which = np.flatnonzero(taken)  # taking by places is quicker than by a mask
+        which = np.flatnonzero(taken)  # indexing by positions is faster than by a mask
         starts, ends = starts[which], ends[which]
     behind = total
     if len(ends) and ends[-1] > total:
@@ -60,20 +61,20 @@ def tiled(
 
 
 def _columns(
-    np: Any, total: int, packets: Any, told: tuple[Any, Any, Any], begin: Any, fault: Any
+    np: Any, total: int, packets: Any, facts: tuple[Any, Any, Any], begin: Any, fault: Any
 ) -> Columns:
-    """All in order. As there is nothing between them, each ends where the next one begins."""
-    order = np.argsort(begin, kind="stable")  # two rows in order: the quickest sort of all
+    """Merge packets and noise in order. There are no gaps, so each ends where the next begins."""
+    order = np.argsort(begin, kind="stable")  # two sorted runs: the fastest case of this sort
     begin = begin[order]
     stray = np.searchsorted(packets, begin) + np.arange(len(begin))
     sound = np.ones(len(packets) + len(begin), bool)
     sound[stray] = False
     where = np.flatnonzero(sound)
-    columns = Columns(*np.empty((len(Columns._fields), len(sound)), np.int64))  # one block is got at one go
+    columns = Columns(*np.empty((len(Columns._fields), len(sound)), np.int64))  # a single allocation
     for column, those, others in zip(
         (columns.start, columns.kind, columns.node, columns.code, columns.fault),
-        (packets, *told, 0),
-        (begin, NOISE, NOBODY, NOBODY, fault[order]),
+        (packets, *facts, 0),
+        (begin, NOISE, ABSENT, ABSENT, fault[order]),
         strict=True,
     ):
         if np.ndim(those):
@@ -87,7 +88,7 @@ def _columns(
 
 
 def _between(np: Any, starts: Any, ends: Any, total: int) -> tuple[Any, Any]:
-    """The gaps of these spans, of which none overlap, within `total`."""
+    """The gaps between these spans, which do not overlap, within `total` bytes."""
     inner = np.flatnonzero(ends[:-1] < starts[1:])
     begin = np.concatenate(([0], ends[inner], ends[-1:]))
     end = np.concatenate((starts[:1], starts[inner + 1], [total]))
@@ -96,9 +97,9 @@ def _between(np: Any, starts: Any, ends: Any, total: int) -> tuple[Any, Any]:
 
 
 def _united(np: Any, gaps: tuple[Any, Any], starts: Any, ends: Any, behind: int) -> tuple[Any, Any]:
-    """What wrong checksums cast doubt on, each up to the next packet: starts and ends that do not touch.
+    """Spans with a wrong checksum, each up to the next packet: starts and ends of disjoint spans.
 
-    A doubtful place outside the gaps, or from `behind` on, is in a packet and was never looked at.
+    A doubtful span outside the gaps, or from `behind` on, lies in a packet and is not counted.
     """
     begin, end = gaps
     if not len(starts) or not len(begin):
@@ -116,7 +117,7 @@ def _united(np: Any, gaps: tuple[Any, Any], starts: Any, ends: Any, behind: int)
 
 
 def _without(np: Any, gaps: tuple[Any, Any], bad: tuple[Any, Any]) -> tuple[Any, Any]:
-    """What is left of the gaps, each of which may hold several of the others: it ends where one of those begins."""
+    """The gaps without the bad spans; a gap may contain several."""
     begin = np.sort(np.concatenate((gaps[0], bad[1])))
     end = np.sort(np.concatenate((bad[0], gaps[1])))
     wide = begin < end
@@ -124,7 +125,7 @@ def _without(np: Any, gaps: tuple[Any, Any], bad: tuple[Any, Any]) -> tuple[Any,
 
 
 def _pieces(np: Any, starts: Any, ends: Any, fault: int) -> tuple[Any, Any]:
-    """Where these spans begin, cut so that none is longer than `PIECE`, and what they are."""
+    """Starts and faults of these spans, split into pieces of at most `PIECE` bytes."""
     count = -((starts - ends) // PIECE)
     if (count > 1).any():
         number = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
@@ -133,10 +134,7 @@ def _pieces(np: Any, starts: Any, ends: Any, fault: int) -> tuple[Any, Any]:
 
 
 def cut_out(np: Any, data: bytes, starts: Any, sizes: Any) -> list[bytes]:
-    """The bytes of these spans.
-
-    Those of a size that many have are made by numpy, all of this size at once, and only the rest one by one.
-    """
+    """The bytes of these spans: with numpy for a size that many spans have, else one by one."""
     found = np.empty(len(starts), object)
     count = np.bincount(sizes)
     many = count > _MANY + len(starts) // _MANY

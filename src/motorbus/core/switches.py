@@ -1,8 +1,7 @@
-"""How a simulated device behaves where nobody has settled how a real one does: named switches with a source each.
+"""Switches of simulated devices: named options for behaviour on which the sources conflict or are silent.
 
-A simulator that guesses in silence teaches its users the guess. So where sources conflict or say nothing, the
-behaviour is chosen by name, as an option of a bus string or a flag. A family lists its switches as the fields of a
-frozen dataclass; texts, ranges and help are the same for all families.
+Every switch has a source. It is set in a bus string or by a flag. A family lists its switches as the fields of a frozen
+dataclass; parsing, ranges, errors and help are the same for all families.
 """
 
 from __future__ import annotations
@@ -26,27 +25,26 @@ _NO = frozenset({"no", "false", "off", "0"})
 def switch(
     default: object, help: str, *choices: object, source: str, span: tuple[float, float] = (0.0, inf)
 ) -> Any:
-    """A field of a dataclass of switches: its default, what it does, its choices (none: any), and who says so.
+    """A dataclass field for a switch: default, help, choices (none: any value) and source.
 
-    `span` bounds a number that has no choices. The type of the default is the type of the switch.
+    `span` is the range of a number without choices. The switch has the type of its default.
     """
     return field(default=default, metadata={"help": help, "choices": choices, "source": source, "span": span})
 
 
 def options(kind: type[Any]) -> tuple[Option, ...]:
-    """Every switch of this dataclass as an option that a bus string may carry."""
-    return tuple(_option(one) for one in fields(kind))
-
-
-def _option(one: Field[Any]) -> Option:
-    told = one.metadata
-    return Option(one.name, type(one.default), one.default, told["help"], told["choices"], told["source"])
+    """The switches of this dataclass as options of a bus string."""
+    keys = ("help", "choices", "source")
+    return tuple(
+        Option(one.name, type(one.default), one.default, *(one.metadata[key] for key in keys))
+        for one in fields(kind)
+    )
 
 
 def switched(kind: type[S], family: str, given: Mapping[str, object]) -> S:
-    """The switches of this dataclass, some set by name; values may be text.
+    """Make this dataclass of switches with the given values, which may be text.
 
-    Raises RequestError, with suggestions, for an unknown name or an impossible value.
+    Raises RequestError for an unknown name, with similar names, and for an invalid value.
     """
     known = {one.name: one for one in fields(kind)}  # type: ignore[arg-type]  # S is a dataclass
     for name in given.keys() - known.keys():
@@ -63,7 +61,10 @@ def _value(one: Field[Any], value: object) -> object:
     choices, span = one.metadata["choices"], one.metadata["span"]
     found: object = ("no", "yes")[value] if isinstance(value, bool) else str(value)
     if isinstance(one.default, bool):
-        return _truth(one.name, value)
+        word = str(value).lower()
+        if word not in _YES | _NO:
+            raise RequestError(f"option {one.name}: {value!r} is neither yes nor no", expected="yes or no")
+        return word in _YES
     if isinstance(one.default, int | float):
         found = _number(one.name, value, type(one.default), span)
     if choices and found not in choices:
@@ -71,13 +72,6 @@ def _value(one: Field[Any], value: object) -> object:
             f"option {one.name}: {value!r} is not possible", expected=f"one of {', '.join(map(str, choices))}"
         )
     return found
-
-
-def _truth(name: str, value: object) -> bool:
-    word = str(value).lower()
-    if word not in _YES | _NO:
-        raise RequestError(f"option {name}: {value!r} is neither yes nor no", expected="yes or no")
-    return word in _YES
 
 
 def _number(name: str, value: object, kind: type, span: tuple[float, float]) -> float:

@@ -1,6 +1,6 @@
-"""How a device that moves by a profile of its own keeps time with others, and what it says of its movement.
+"""Synchronised start of devices that move by a profile of their own, and the record of such a movement.
 
-Such a device is not led: it is told a whole way at once, and tells nothing while it goes. See `keep_time` of
+Such a device takes the whole movement in one order and reports nothing while it moves. See `keep_time` in
 `core.family.Family.axis`.
 """
 
@@ -13,32 +13,33 @@ from motorbus.core.operation import Operation
 
 
 class Timing(Protocol):
-    """How a device that moves by a profile of its own keeps time with others, which may be on other buses."""
+    """Synchronises one device with others, which may be on other buses."""
 
     def agreed(self, shortest: float, fitted: Callable[[float], float]) -> Operation[float]:
-        """How long (s) all take, once each has said how long it takes at least: never less than `shortest`.
+        """Return the common duration (s), at least `shortest`, once every device has given its minimum.
 
-        `fitted` gives, for a duration that others need, the nearest one, not shorter, that this device can have.
-        Raises Interrupted when somebody cannot take part.
+        `fitted` maps a duration that the others need to the nearest one, not shorter, that this device supports.
+        Raises Interrupted if one of the devices cannot take part.
         """
 
     def start(self, lead: float) -> Operation[float]:
-        """It is ready. Comes back `lead` s before the common start, and gives that moment (s on this link's clock).
+        """Report this device ready. Return `lead` s before the common start; the value is that start (s, link clock).
 
-        Raises Interrupted when somebody cannot take part.
+        Raises Interrupted if one of the devices cannot take part.
         """
 
     def fails(self, error: BaseException) -> None:
-        """It does not begin, or has not come to its end, for this error: to be said at once, before cleaning up, so
-        that the others do not go on meanwhile.
+        """Report that the movement does not start, or did not complete, because of `error`.
+
+        Call it before any clean-up, so that the other devices do not continue meanwhile.
         """
 
 
 class Turned(NamedTuple):
-    """A movement that a device made by its own profile: all *estimated*, for nothing told of it.
+    """A movement that a device made by its own profile. All values are *estimates*: the device reports none.
 
-    `angle` (rad, with its sign) is the whole way, which began at the moment `start` (s on the link's clock) and took
-    `duration` (s). `way` says how much of it was done so many s after the start (rad, with its sign).
+    `angle` is the whole signed movement (rad), `start` the moment it began (s, link clock), `duration` in s. `way`
+    maps the time since the start (s) to the signed angle done by then (rad).
     """
 
     node: int

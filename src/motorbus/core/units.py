@@ -1,9 +1,7 @@
-"""Quantities as people type and read them, and as the API takes them.
+"""Conversion between quantities as text (`90deg`, `30rpm`, `5 mm`) and numbers in API units.
 
-The API knows one unit per quantity (rad, rad/s, rad/s², A, V, °C, s, a plain fraction for load, and m, m/s, m/s² for
-what a linear axis does), so that numbers can be passed on without asking. People say `90deg`, `30rpm` and `5 mm`; this
-is where the one becomes the other, and nowhere else. A number without a unit is in the API's unit. Raw counts are
-another thing than a quantity and are only ever taken as such: see `raw`.
+The API has one unit per quantity: rad, rad/s, rad/s², A, V, °C, s, a fraction for load, and m, m/s, m/s² for linear
+axes. A number without a unit is in the API unit. Raw counts are not a quantity: see `raw`.
 """
 
 from __future__ import annotations
@@ -57,31 +55,23 @@ SCALES: Mapping[str, Mapping[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "min": 60.0},
     "load": {"%": 0.01, "fraction": 1.0},
 }
-"""For each quantity, what one of each unit is in the API's unit. The API's unit has 1; load needs none."""
+"""By quantity and unit, the value of one unit in the API unit. The first unit with 1.0 is the API unit."""
 
-QUANTITIES: Mapping[str, str] = {
-    "rad": "position",
-    "rad/s": "velocity",
-    "rad/s²": "acceleration",
-    "m": "length",
-    "m/s": "linear velocity",
-    "m/s²": "linear acceleration",
-    "A": "current",
-    "V": "voltage",
-    "°C": "temperature",
-    "s": "time",
-    "fraction": "load",
+_API_UNITS = {
+    quantity: next(unit for unit, scale in scales.items() if scale == 1.0)
+    for quantity, scales in SCALES.items()
 }
-"""Which quantity a unit of the API (the unit of a table row) measures."""
+QUANTITIES: Mapping[str, str] = {unit: quantity for quantity, unit in _API_UNITS.items()}
+"""The quantity of each API unit, which is also the unit of a table row."""
 
-LEAST_RATE: Final = 1e-6
-"""Hz of anything that goes on in cycles: one in eleven days."""
-GREATEST_RATE: Final = 1e6
-"""Hz; on the quickest bus there is one byte takes longer than such a cycle."""
+MIN_RATE: Final = 1e-6
+"""Hz of a cyclic operation: one cycle in 11.6 days."""
+MAX_RATE: Final = 1e6
+"""Hz; one byte takes longer than such a cycle on the fastest bus."""
 
 _MILLIMETRES = {"length": "mm", "linear velocity": "mm/s", "linear acceleration": "mm/s²"}
 _LONG = 16
-"""Characters; a number with its unit that has as many is no number that a person wrote."""
+"""Characters; a number with its unit of this length was not written by a person."""
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _RATE = re.compile(r"(\d+(?:\.\d+)?)([kM])", re.ASCII)
 _FACTORS = {"k": 1000, "M": 1_000_000}
@@ -89,10 +79,10 @@ _RAW = re.compile(r"([+-]?(?:0[xX][0-9a-fA-F]+|\d+))\s*raw", re.ASCII)
 
 
 def parse(text: str, quantity: str) -> float:
-    """`90deg`, `-45°`, `0.25 turn`, `1.2` -> the API's unit of `quantity` (a key of `SCALES`).
+    """`90deg`, `-45°`, `0.25 turn`, `1.2` -> number in the API unit of `quantity` (a key of `SCALES`).
 
-    Raises RequestError for text without a number, a number that is not finite, a unit that is not known or
-    measures something else, and for raw counts.
+    Raises RequestError for text without a number, a number that is not finite, an unknown unit, a unit of another
+    quantity, and raw counts.
     """
     scales = SCALES[quantity]
     stripped = text.strip()
@@ -107,9 +97,9 @@ def parse(text: str, quantity: str) -> float:
 
 
 def raw(text: str) -> int | None:
-    """`100raw` or `0x64 raw` -> 100; None when the text does not say that it is a raw value.
+    """`100raw` or `0x64 raw` -> 100; None for text that does not end with `raw`.
 
-    Raises RequestError when it says so and is not a whole number.
+    Raises RequestError if a text that ends with `raw` is not a whole number.
     """
     stripped = text.strip()
     if not stripped.endswith("raw"):
@@ -125,30 +115,30 @@ def raw(text: str) -> int | None:
 
 
 def whole(text: str) -> int:
-    """A whole number as people type it: `37`, `0x25`, `-3`, `0b101`.
+    """`37`, `0x25`, `-3`, `0b101` -> int.
 
-    Raises ValueError for anything else, also for what Python itself would take: `1_0`, and digits of other scripts.
+    Raises ValueError for other text, also for `1_0` and digits of other scripts, which Python accepts.
     """
-    return int(_plainly(text), 0)
+    return int(_checked(text), 0)
 
 
 def real(text: str) -> float:
-    """A number as people type it: `0.5`, `-3`, `1e-3`. Raises ValueError as `whole` does."""
-    return float(_plainly(text))
+    """`0.5`, `-3`, `1e-3` -> float. Raises ValueError as `whole` does."""
+    return float(_checked(text))
 
 
-def _plainly(text: str) -> str:
+def _checked(text: str) -> str:
     if "_" in text or not text.isascii():
         raise ValueError(f"{text!r} is not a number")
     return text
 
 
 LONG: Final = 1e6
-"""A number from here on is shown in six digits: nobody reads more, and there may be three hundred."""
+"""`show` gives six significant digits from this size on; a float may have 300."""
 
 
 def show(value: float, quantity: str) -> str:
-    """A value in the API's unit, for people: enough digits for a motor and no more, with its unit."""
+    """Text of a value in the API unit, for people: with the digits that matter for a motor, and the unit."""
     if abs(value) >= LONG:
         return f"{value:.6g} {next(iter(SCALES[quantity]))}"
     if quantity == "position":
@@ -158,7 +148,10 @@ def show(value: float, quantity: str) -> str:
     if quantity == "load":
         return f"{value * 100:.1f} %"
     if quantity == "time":
-        return _show_time(value)
+        for unit, scale in (("s", 1.0), ("ms", 1e-3)):
+            if abs(value) >= scale or not value:
+                return f"{value / scale:.4g} {unit}"
+        return f"{value / 1e-6:.4g} µs"
     if quantity in _MILLIMETRES:
         return f"{value * 1000:.3f} {_MILLIMETRES[quantity]}"
     decimals = {"acceleration": 2, "current": 3, "voltage": 1, "temperature": 0}[quantity]
@@ -166,34 +159,22 @@ def show(value: float, quantity: str) -> str:
 
 
 def written(value: float, quantity: str, unit: str) -> str:
-    """A value in the API's unit, for a file: the fewest digits in `unit` that `parse` reads as the same number.
+    """Text of a value in the API unit, for a file: the fewest digits in `unit` that `parse` reads as the same number.
 
-    In the API's own unit where that is shorter by far, as 2 rad is, or where no digits in `unit` do. Raises KeyError
-    for a unit that is none of `quantity`.
+    In the API unit where no digits in `unit` do, or where that text is long (16 characters) and the API unit shorter,
+    as for 2 rad. Raises KeyError for a unit that `quantity` does not have.
     """
-    api = next(name for name, scale in SCALES[quantity].items() if scale == 1.0)
-    own, plain = _fewest(value, quantity, unit), f"{_plain(value)} {api}"
-    return own if own and (len(own) < _LONG or len(own) <= len(plain)) else plain
-
-
-def _fewest(value: float, quantity: str, unit: str) -> str:
+    plain = f"{_plain(value)} {_API_UNITS[quantity]}"
     number = value / SCALES[quantity][unit]
     for digits in range(1, 18):
         text = f"{_plain(float(f'{number:.{digits}g}'))} {unit}"
         if parse(text, quantity) == value:
-            return text
-    return ""
+            return text if len(text) < _LONG or len(text) <= len(plain) else plain
+    return plain
 
 
 def _plain(number: float) -> str:
     return repr(number).removesuffix(".0")
-
-
-def _show_time(value: float) -> str:
-    for unit, scale in (("s", 1.0), ("ms", 1e-3)):
-        if abs(value) >= scale or not value:
-            return f"{value / scale:.4g} {unit}"
-    return f"{value / 1e-6:.4g} µs"
 
 
 def _scale(text: str, unit: str, quantity: str, scales: Mapping[str, float]) -> float:
@@ -208,14 +189,10 @@ def _scale(text: str, unit: str, quantity: str, scales: Mapping[str, float]) -> 
         raise _refused(text, quantity, "is a raw value, and a quantity is wanted")
     if unit.startswith(",") and unit[1:2].isdigit():
         raise _refused(text, quantity, "has a decimal comma; write a point")
-    raise _refused(text, quantity, f"has the unit {unit!r}, {_other(unit, quantity)}")
-
-
-def _other(unit: str, quantity: str) -> str:
-    for name, scales in SCALES.items():
-        if unit in scales:
-            return f"which measures {name} and not {quantity}"
-    return "which is not known"
+    for name, others in SCALES.items():
+        if unit in others:
+            raise _refused(text, quantity, f"has the unit {unit!r}, which measures {name} and not {quantity}")
+    raise _refused(text, quantity, f"has the unit {unit!r}, which is not known")
 
 
 def _refused(text: str, quantity: str, what: str) -> RequestError:
@@ -228,14 +205,14 @@ def _refused(text: str, quantity: str, what: str) -> RequestError:
 
 
 def rate(text: object) -> int:
-    """`500000`, `500k`, `0.5M` -> bit/s; the one spelling of rates, in addresses and in flags.
+    """`500000`, `500k`, `0.5M` -> bit/s, for addresses and flags.
 
-    Raises RequestError for what is no whole number of bit/s above 0.
+    Raises RequestError for text that is not a whole number of bit/s above 0.
     """
-    said = str(text).strip()
-    short = _RATE.fullmatch(said)
+    stripped = str(text).strip()
+    short = _RATE.fullmatch(stripped)
     try:
-        found = Fraction(short[1]) * _FACTORS[short[2]] if short else Fraction(whole(said))
+        found = Fraction(short[1]) * _FACTORS[short[2]] if short else Fraction(whole(stripped))
     except ValueError:
         found = Fraction(0)
     if found <= 0 or found.denominator != 1:

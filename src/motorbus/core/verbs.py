@@ -1,7 +1,7 @@
-"""One list of verbs gives a blocking and an awaitable face, both typed, with no mirror.
+"""Methods of device classes, blocking and async, made of one list of driver functions, with their types.
 
-A device class lists driver functions: `position = verb(driver.position)`. `Servo` and `AsyncServo` are two-line
-classes over one list. What is a method here is always I/O; nothing that costs a frame is an attribute.
+A class lists the functions: `position = verb(driver.position)`; `Servo` and `AsyncServo` derive from it. Every verb
+does I/O and is a method; an attribute never does.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ T = TypeVar("T")
 
 
 class BlockingRunner(Protocol):
-    """What a blocking device needs of its bus."""
+    """The bus of a blocking device."""
 
     def run(self, operation: Runnable[T], /) -> T: ...
 
 
 class AsyncRunner(Protocol):
-    """What an async device needs of its bus."""
+    """The bus of an async device."""
 
     async def run(self, operation: Runnable[T], /) -> T: ...
 
 
-class Spoken:
-    """What verbs are said to. A copy has methods of its own: those that are kept here speak for this one."""
+class _Owner:
+    """Base of devices with verbs. A copy drops the cached methods: they are bound to the original."""
 
     def __getstate__(self) -> dict[str, Any]:
         kind = type(self)
@@ -40,24 +40,24 @@ class Spoken:
         }
 
 
-class Blocking(Spoken):
-    """Carries out verbs by a blocking bus."""
+class Blocking(_Owner):
+    """A device whose verbs run on a blocking bus."""
 
     def __init__(self, bus: BlockingRunner) -> None:
         self.bus = bus
 
 
-class Awaiting(Spoken):
-    """Carries out verbs by an async bus."""
+class Awaiting(_Owner):
+    """A device whose verbs run on an async bus."""
 
     def __init__(self, bus: AsyncRunner) -> None:
         self.bus = bus
 
 
-def dressed(
+def _described(
     call: Callable[P, T], name: str, function: Callable[..., object], owner: object
 ) -> Callable[P, T]:
-    """A method that shows its name, what its function says of itself, and what it takes, without the first of it."""
+    """Give a method the name, docstring and signature (without the first parameter) of its function."""
     call.__name__ = name
     call.__qualname__ = f"{type(owner).__name__}.{name}"
     call.__doc__ = function.__doc__
@@ -66,7 +66,7 @@ def dressed(
 
 
 class Said(Generic[P, T]):
-    """A function in a list of verbs, and the method that it becomes; what carries it out, its kinds say."""
+    """Base of descriptors that make a method of a driver function; a subclass says how the method runs it."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self.function = function
@@ -77,17 +77,17 @@ class Said(Generic[P, T]):
         self.name = name
 
     def method(self, owner: Any, carry_out: Callable[[Any], Any]) -> Any:
-        """The method of this object: what the function says of it is carried out when it is called."""
+        """The method of `owner`: calls the function and passes the result to `carry_out`."""
         function = self.function
 
         def call(*args: Any, **kwargs: Any) -> Any:
             return carry_out(function(owner, *args, **kwargs))
 
-        return dressed(call, self.name, function, owner)
+        return _described(call, self.name, function, owner)
 
 
-class verb(Said[P, T]):  # noqa: N801 - reads as a word in a list of verbs
-    """Makes a method of a driver function: blocking on a `Blocking` device, awaitable on an `Awaiting` one."""
+class verb(Said[P, T]):  # noqa: N801 - used like a function
+    """Makes a method of a driver function: blocking on a `Blocking` device, a coroutine on an `Awaiting` one."""
 
     function: Callable[Concatenate[Any, P], Runnable[T]]
 
@@ -106,12 +106,13 @@ class verb(Said[P, T]):  # noqa: N801 - reads as a word in a list of verbs
         function: Callable[..., Any] = self.function
 
         def call(*args: Any, **kwargs: Any) -> Any:
-            said = function(device, *args, **kwargs) if args or kwargs else function(device)
-            return device.bus.run(said)
+            procedure = function(device, *args, **kwargs) if args or kwargs else function(device)
+            return device.bus.run(procedure)
 
-        method = dressed(call, self.name, function, device)
-        if (
-            getattr(type(device), self.name, None) is self
-        ):  # not where a subclass says more and asks for this one
-            device.__dict__[self.name] = method  # from now on it is found there, without coming here
+        method = _described(call, self.name, function, device)
+        overridden = (
+            getattr(type(device), self.name, None) is not self
+        )  # a subclass calls this one by `super`
+        if not overridden:
+            device.__dict__[self.name] = method  # found without this descriptor from now on
         return method

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 from motorbus import families
-from motorbus.core.capture import NOBODY, NOTICE, REPLY, Captures, Run, Told
+from motorbus.core.capture import ABSENT, NOTICE, REPLY, Captures, PacketFacts, Run
 from motorbus.core.entry import shown
 from motorbus.core.family import Family
 from motorbus.core.operation import CanFrame, Data, Event, Noise, Notice
@@ -52,17 +52,17 @@ class ByReceiver:
         """Nothing more comes: give what can be made of the rest."""
         return self._runs(self._receiver.flush(), b"")
 
-    def tell(self, packets: list[bytes]) -> Told:
+    def tell(self, packets: list[bytes]) -> PacketFacts:
         """What the receiver said of these, which it has found last."""
         found, self._found = self._found[: len(packets)], self._found[len(packets) :]
         kinds = [NOTICE if isinstance(event, Notice) else REPLY for event in found]
         nodes = [self._node(event) for event in found]
-        return lambda: (kinds, nodes, [NOBODY] * len(found))
+        return lambda: (kinds, nodes, [ABSENT] * len(found))
 
     def _node(self, event: Event) -> int:
         if isinstance(event, Notice):
             return event.node
-        return event.lane if self._frames and event.lane is not None else NOBODY
+        return event.lane if self._frames and event.lane is not None else ABSENT
 
     def _runs(self, events: list[Event], data: Data) -> list[Run]:
         runs: list[Run] = []

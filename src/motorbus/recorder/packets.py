@@ -13,11 +13,11 @@ from functools import cached_property
 from itertools import accumulate, repeat
 from typing import Any, Final, NamedTuple, TypeAlias, overload
 
-from motorbus.core.capture import FAULTS, KINDS, NOBODY, NOISE, Columns, Packet, Told
+from motorbus.core.capture import ABSENT, FAULTS, KINDS, NOISE, Columns, Packet, PacketFacts
 from motorbus.core.operation import CanFrame, Data
 
 _new = tuple.__new__
-_VOID: Final = (NOISE, NOBODY, NOBODY)
+_VOID: Final = (NOISE, ABSENT, ABSENT)
 Cut: TypeAlias = Callable[[bytes, Any, Any], list[bytes]]
 
 
@@ -104,7 +104,7 @@ class Heard(Packets):
         marks: Sequence[Mark],
         data: list[bytes],
         noise: Mapping[int, int],
-        told: Told,
+        told: PacketFacts,
         frames: bool,
     ) -> None:
         self._first: Final = first

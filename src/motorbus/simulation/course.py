@@ -96,7 +96,7 @@ class Course:
         """A client has sent this, at this rate (bit/s) if it has set one."""
         at = self._passed(data, now)
         audience = self._audience(data)
-        if audience is Audience.NOBODY:
+        if audience is Audience.NONE:
             self._push(Delivery(at, Side.DEVICE, data), sender, rate)
             return
         alone = audience is Audience.EVERYONE
@@ -119,7 +119,7 @@ class Course:
         if not self._shared:
             return Audience.OURS
         told: Callable[[Data], Audience] | None = getattr(self.simulator, "audience", None)
-        return told(data) if told else Audience.NOBODY
+        return told(data) if told else Audience.NONE
 
     def next(self) -> float:
         """The next moment at which something happens by itself."""

@@ -285,11 +285,11 @@ def test_the_next_report_is_known_anew_when_somebody_begins_stops_or_changes_its
         (CanFrame(0x625, bytes(8)), Audience.OURS),
         (CanFrame(0x625, b"\1"), Audience.OURS),
         (CanFrame(0x600, bytes(8)), Audience.EVERYONE),
-        (CanFrame(0x626, bytes(8)), Audience.NOBODY),
-        (CanFrame(0x5A5, bytes(8)), Audience.NOBODY),
-        (CanFrame(0x625, bytes(8), extended=True), Audience.NOBODY),
-        (CanFrame(0x600, bytes(8), extended=True), Audience.NOBODY),
-        (b"\0", Audience.NOBODY),
+        (CanFrame(0x626, bytes(8)), Audience.NONE),
+        (CanFrame(0x5A5, bytes(8)), Audience.NONE),
+        (CanFrame(0x625, bytes(8), extended=True), Audience.NONE),
+        (CanFrame(0x600, bytes(8), extended=True), Audience.NONE),
+        (b"\0", Audience.NONE),
     ],
 )
 def test_whom_a_frame_is_for(frame: Data, audience: Audience) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from motorbus.core.entry import shown
-from motorbus.core.units import GREATEST_RATE, LEAST_RATE
+from motorbus.core.units import MAX_RATE, MIN_RATE
 from motorbus.errors import Interrupted, NoReply, RequestError
 from motorbus.motion.limits import check_number
 
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 def check_loop(rate: float, direct: bool, jerk: float | None) -> None:
     """Raise RequestError for what cannot be."""
     check_number("rate", rate)
-    if not LEAST_RATE <= rate <= GREATEST_RATE:
+    if not MIN_RATE <= rate <= MAX_RATE:
         raise RequestError(
             f"rate is {shown(rate)}",
-            expected=f"cycles per second: {LEAST_RATE:g} to {GREATEST_RATE:g}",
+            expected=f"cycles per second: {MIN_RATE:g} to {MAX_RATE:g}",
             advice="choose such a rate; budget() tells the highest that the buses carry; nothing was sent",
         )
     if direct and jerk is not None:

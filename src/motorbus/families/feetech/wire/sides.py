@@ -11,7 +11,7 @@ from functools import partial
 from operator import itemgetter
 from typing import Final
 
-from motorbus.core.capture import EITHER, REPLY, REQUEST, Told
+from motorbus.core.capture import EITHER, REPLY, REQUEST, PacketFacts
 from motorbus.families.feetech.wire.packets import (
     BROADCAST,
     RULES,
@@ -39,7 +39,7 @@ class Sides:
         self._last: bytes | None = None
         self._owed: dict[int, int] = {}  # by id: so many bytes of parameters has the answer that is due
 
-    def tell(self, packets: list[bytes]) -> Told:
+    def tell(self, packets: list[bytes]) -> PacketFacts:
         """Of the next packets, each whole and sound. Only what was said before makes it necessary to look at once."""
         kind = self._kind
         if (

@@ -154,10 +154,10 @@ class KstBus:
         """Whom a frame is for. What no host sends, as replies of other devices, is for none of these."""
         node = wire.addressed(data) if isinstance(data, CanFrame) else None
         if node is None or not isinstance(data, CanFrame):
-            return Audience.NOBODY
+            return Audience.NONE
         heeding = [servo for servo in self.servos if servo.takes(data.extended)]
         if not any(node in (wire.EVERYONE, servo.node) for servo in heeding):
-            return Audience.NOBODY
+            return Audience.NONE
         return Audience.EVERYONE if node == wire.EVERYONE else Audience.OURS
 
     obeys_at_once = False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from motorbus.core.capture import NOISE, Captures, Run, Told
+from motorbus.core.capture import NOISE, Captures, PacketFacts, Run
 from motorbus.core.operation import CanFrame, Data, Noise
 from motorbus.families.kst.wire.bulk import frames_in
 from motorbus.families.kst.wire.said import code_of, said
@@ -32,7 +32,7 @@ class Recording:
         """Nothing is held back."""
         return []
 
-    def tell(self, packets: list[bytes]) -> Told:
+    def tell(self, packets: list[bytes]) -> PacketFacts:
         """Kinds, nodes and codes of the frames that came next."""
         found, self._found = self._found[: len(packets)], self._found[len(packets) :]
         kinds, nodes, codes = ([one[column] for one in found] for column in range(3))

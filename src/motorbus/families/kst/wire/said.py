@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.capture import NOBODY, NOISE, NOTICE, REPLY, REQUEST
+from motorbus.core.capture import ABSENT, NOISE, NOTICE, REPLY, REQUEST
 from motorbus.core.operation import ERROR_FLAG, CanFrame
 from motorbus.families.kst.wire.frames import REPLY as REPLIES
 from motorbus.families.kst.wire.notices import decode_notice, decode_start
@@ -24,7 +24,7 @@ class Said(NamedTuple):
     code: int = 0
 
 
-_NOTHING: Final = Said(NOISE, NOBODY, 0, NOBODY)
+_NOTHING: Final = Said(NOISE, ABSENT, 0, ABSENT)
 _WHOLE: Final = 0xFFFF_FFFF
 _SPECIFIER: Final = 0xFF00_0000
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.capture import NOISE, NOTICE, REPLY, REQUEST, Captures, Run, Told
+from motorbus.core.capture import NOISE, NOTICE, REPLY, REQUEST, Captures, PacketFacts, Run
 from motorbus.core.operation import CanFrame, Data, Noise
 from motorbus.families.stepper.wire import bulk, frames
 from motorbus.families.stepper.wire.frames import (
@@ -80,7 +80,7 @@ class Recording:
         """Nothing more comes: give what can be made of the rest."""
         return self._cut(self._rest, more=False)
 
-    def tell(self, packets: list[bytes]) -> Told:
+    def tell(self, packets: list[bytes]) -> PacketFacts:
         """Kinds, the one node of the line, and bytes 2 and 3 of the packets that were found next."""
         kinds, self._kinds = self._kinds[: len(packets)], self._kinds[len(packets) :]
         return lambda: (kinds, [ONLY] * len(packets), [code_of(packet) for packet in packets])
