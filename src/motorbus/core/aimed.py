@@ -36,7 +36,7 @@ class Aimed(Exchange[None]):
 
     __slots__ = ("_goals", "_raws", "aim")
 
-    aim: Aim
+    aim: Aim  # type: ignore[misc]
     refusal: Refusal  # type: ignore[misc]
     sure = True
     replies = ()  # type: ignore[misc]  # the same for all requests, so it is a class attribute
@@ -47,8 +47,8 @@ class Aimed(Exchange[None]):
     repeatable = False  # type: ignore[misc]
     tells_position = False  # type: ignore[misc]
     later = None  # type: ignore[misc]
-    other = None  # type: ignore[misc]
-    whole = None  # type: ignore[misc]
+    other = None
+    whole = None
     course = None
 
     def __init__(self, request: bytes, aim: Aim, raws: Sequence[int]) -> None:
@@ -62,7 +62,7 @@ class Aimed(Exchange[None]):
         """The same request with another aim."""
         return Aimed(self.request, aim, self._raws)  # type: ignore[arg-type]  # always bytes here
 
-    @staticmethod  # type: ignore[misc]
+    @staticmethod
     def read(_: Answer) -> None:
         """There is no reply to read."""
 

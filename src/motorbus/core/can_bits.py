@@ -25,14 +25,6 @@ _LIMIT: Final = 5  # equal bits; a stuff bit follows them
 _PADDING: Final = tuple(0b0101_0101 & ((1 << count) - 1) for count in range(8))  # alternating, last bit 1
 
 
-def _crc_row(byte: int) -> int:
-    crc = byte << _CRC - 8
-    for _ in range(8):
-        crc = crc << 1 ^ (_POLYNOMIAL if crc >> _CRC - 1 & 1 else 0)
-        crc &= (1 << _CRC) - 1
-    return crc
-
-
 def _stuffed(state: int, byte: int) -> tuple[int, int]:
     """Return the state after this byte and its number of stuff bits. A state is the run length * 2 + the last bit."""
     last, run, count = state & 1, state >> 1, 0
@@ -48,8 +40,12 @@ def _stuffed(state: int, byte: int) -> tuple[int, int]:
 @cache
 def _tables() -> tuple[tuple[int, ...], tuple[tuple[tuple[int, int], ...], ...]]:
     """Tables of CRC and stuffing per byte, built on first use: buses without CAN do not need them."""
-    crc = tuple(_crc_row(byte) for byte in range(256))
-    return crc, tuple(tuple(_stuffed(state, byte) for byte in range(256)) for state in range(2 * _LIMIT))
+    crcs = [byte << _CRC - 8 for byte in range(256)]
+    for _ in range(8):
+        crcs = [(crc << 1 ^ (_POLYNOMIAL if crc >> _CRC - 1 & 1 else 0)) & 0x7FFF for crc in crcs]
+    return tuple(crcs), tuple(
+        tuple(_stuffed(state, byte) for byte in range(256)) for state in range(2 * _LIMIT)
+    )
 
 
 @lru_cache(maxsize=1 << 16)

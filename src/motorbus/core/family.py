@@ -20,8 +20,7 @@ from motorbus.core.operation import Answer, Data, Event, Exchange, Operation, Ru
 class Option(NamedTuple):
     """An option `name=value` of a family, in a bus string or a flag.
 
-    `choices` are all valid values, () if they are not listed; `source` is the source of the behaviour, where it needs
-    one.
+    `choices` are all valid values, () if not listed; `source` is the source of the behaviour, where it needs one.
     """
 
     name: str
@@ -71,7 +70,7 @@ class Identity:
 
 
 class Found(NamedTuple):
-    """A node found by a scan, its rate (bit/s) and identity (None: not known yet); also an event for `Report`."""
+    """A node found by a scan, its rate (bit/s) and identity (None: unknown); also an event for `Report`."""
 
     node: int
     rate: int
@@ -118,9 +117,8 @@ class State(NamedTuple):
 class Health(NamedTuple):
     """Health of a device, from one cheap exchange; None, also in `state`, for values it does not report.
 
-    `torque`    torque is on; None if the device has no torque switch
-    `blank`     the settings that the device keeps until power-off have their power-up values
-    `restarts`  number of start-up messages received from the device
+    `torque`: torque is on; None without a torque switch. `blank`: the settings that the device keeps until power-off
+    have their power-up values. `restarts`: number of start-up messages received from the device.
     """
 
     state: State
@@ -160,7 +158,7 @@ class Train(Protocol):
         """Exchanges that order these goals (rad) for some or all nodes; the gate judges them when they leave.
 
         Raises LimitExceeded for a goal that is not finite or that no device of this kind can take, RequestError for
-        another node.
+        a node that is not one of these.
         """
 
     def begin(self, speeds: Mapping[int, float]) -> Operation[None]:
@@ -223,8 +221,7 @@ class RawMemory(Protocol):
 class Remark(NamedTuple):
     """A note of a simulated device that no host receives: what it ignored, what a fault did.
 
-    `number` counts the remarks of the device from 1; `at` is in s since the start of the simulation, as in a script of
-    inputs.
+    `number` counts from 1; `at` is in s since the start of the simulation, as in a script of inputs.
     """
 
     number: int
@@ -238,15 +235,13 @@ class SimulatedNode(Protocol):
     Some devices also have
 
         set_input(number, active)
-        log                     the latest `Remark`s, in order
-        notice()                sends an unsolicited message without a cause
-        switch(**changes)       changes switches that can change at run time and returns all of these; raises
-                                RequestError for an invalid name or value and then changes nothing
-        midway()                moment (s) when half of a store operation is done, inf if none runs; a power cut at that
-                                moment leaves the stored data incomplete
-        block_shaft(between)  push_shaft(angle)                    rad
-        load_shaft(share)                                          1: full torque
-        release_shaft()
+        log                the latest `Remark`s, in order
+        notice()           sends an unsolicited message without a cause
+        switch(**changes)  changes switches at run time, where possible, and returns all of these; RequestError for an
+                           invalid name or value, without a change
+        midway()           moment (s) when half of a store operation is done, inf if none runs: a power cut at that
+                           moment leaves the stored data incomplete
+        block_shaft(between) push_shaft(angle) load_shaft(share) release_shaft()    in rad; a share of 1 is full torque
     """
 
     @property
@@ -261,12 +256,9 @@ class SimulatedNode(Protocol):
 class Simulator(Protocol):
     """A simulated bus. Time is an argument (s): it never waits and has no clock.
 
-    Some simulators also have
-
-        usual_rate       bit/s, if the devices are set to another rate than the default of the family
-        script(text)     scripted inputs of the devices
-        duplicate(id)    adds a second device with this id
-        audience(frame)  on CAN, the receivers of a frame: a `core.frame.Audience`
+    Some simulators also have `usual_rate` (bit/s; the rate of the devices, if not the default of the family),
+    `script(text)` (inputs of the devices), `duplicate(id)` (adds a second device with this id) and, on CAN,
+    `audience(frame)` (its receivers, a `core.frame.Audience`).
     """
 
     @property
@@ -288,17 +280,16 @@ class Simulator(Protocol):
 class Device(Protocol):
     """Methods of a blocking device. A method that a device does not support is absent.
 
-    `read(*names)` returns values by name, `write(**values)` writes them. Also, where the device supports them:
+    `read(*names)` returns values by name, `write(**values)` writes them. Devices also have, where they support it:
 
-        motion   position()  telemetry() -> State  enable_torque()  disable_torque()  stop()
-                 move(to, *, wait=True), on some devices with `velocity` and `acceleration`
-        modes    mode()  set_mode(mode)  and of set_velocity, set_duty, set_current and step those that some model of
-                 the family supports
-        zero     calibrate(to=None) (rad; None: the middle)  zero(); both return a named tuple, in which a float is an
-                 angle and an int a raw value
-        alarms() the active alarms, in words
-        table    its register map; None before it is known
-        value(row, raw)  raw(row, value)   conversion with the factors of this device
+        position() telemetry() enable_torque() disable_torque() stop()    `telemetry` returns a `State`
+        move(to, *, wait=True)                  on some devices with `velocity` and `acceleration`
+        mode() set_mode(mode)                   also those of set_velocity, set_duty, set_current and step that some
+                                                model of the family supports
+        calibrate(to=None) zero()               rad, None: the middle; return a named tuple, float: angle, int: raw
+        alarms()                                the active alarms, in words
+        table                                   register map; None before it is known
+        value(row, raw) raw(row, value)         conversion with the factors of this device
 
     Persistent rows are written in a guarded sequence. If it opens a lock, the lock is a row named `lock` with a choice
     "closed", and is always closed again. Reads have rank POLL and effect NONE, so a dry run can identify them.

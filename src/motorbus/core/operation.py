@@ -10,8 +10,9 @@ returns the `Exchange` itself, which may be kept and run again.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, field
 from enum import Enum, IntEnum
-from typing import Any, Final, Generic, NamedTuple, TypeAlias, TypeVar
+from typing import Any, ClassVar, Final, Generic, NamedTuple, TypeAlias, TypeVar
 
 from motorbus.core.frame import ERROR_FLAG as ERROR_FLAG
 from motorbus.core.frame import REMOTE_FLAG as REMOTE_FLAG
@@ -136,84 +137,58 @@ Refusal: TypeAlias = Callable[[Stops], MotorbusError | None]
 """The error if an exchange must not leave, None if it may."""
 
 
-class Exchange(Generic[T_co]):
-    """One request and its expected replies. An immutable value.
+class _Step(Generic[T_co]):
+    """Base of the steps: `yield from` has the type of the result."""
+
+    __slots__ = ()
+
+    def __iter__(self) -> Generator[Step, Any, T_co]:
+        result: T_co = yield self  # type: ignore[misc]  # every subclass is one of `Step`
+        return result
+
+
+@dataclass(slots=True, eq=False, repr=False)
+class Exchange(_Step[T_co]):
+    """One request and its expected replies. A value: no field but `course` changes.
 
     `request`     the bytes or the CAN frame to send
     `replies`     one `Due` per expected reply; () for none; `ANY` for all replies before the deadline
     `read`        answer -> value; None: the value is the `Answer`. Matching of replies does not use it
     `lane`        exchanges on the same lane never overlap
-    `rank`        priority
     `effect`      highest effect of the rows that it writes
     `goals`       goal of each node, for the gate
-    `later`       its goals wait in the node, or it makes waiting goals take effect; None: neither
-    `timeout`     class of the time that the device needs
     `repeatable`  sending it twice has the same effect as sending it once
-    `tells_position`  True: the replies begin with the present position, so a stop can hold it. A function: answer ->
-                  position (rad) by node, without the nodes whose reply does not give it; the gate uses it
+    `later`       its goals wait in the node, or it makes waiting goals take effect
     `refusal`     checked before each attempt that moves or switches torque: the error if the exchange must not leave,
-                  as after a stop or a change of settings; None if it may
+                  as after a stop or a change of settings
     `whole`       for an exchange that is kept: the value of `read`, decoded from the bytes of all expected replies if
                   each is valid and reports no alarm; else `UNLIKE`. `course` is the state that a bus keeps for it
     `other`       makes an equivalent exchange with replies of another length. The bus alternates where replies carry no
                   number, so that a second copy of the last reply is not taken for the next one
+    `tells_position`  True: the replies begin with the present position, so a stop can hold it. A function: answer ->
+                  position (rad) by node, without the nodes whose reply does not give it; the gate uses it
     """
 
-    __slots__ = (
-        "course",
-        "effect",
-        "goals",
-        "lane",
-        "later",
-        "other",
-        "rank",
-        "read",
-        "refusal",
-        "repeatable",
-        "replies",
-        "request",
-        "tells_position",
-        "timeout",
-        "whole",
-    )
+    request: Final[Data]
+    replies: Final[tuple[Due, ...] | Any_] = ()
+    read: Callable[[Answer], T_co] | None = None
+    _: KW_ONLY
+    lane: Final[int] = 0
+    rank: Final[Rank] = Rank.POLL
+    effect: Final[Effect] = Effect.NONE
+    goals: Final[tuple[Goal, ...]] = ()
+    timeout: Final[Timeout] = Timeout.REPLY
+    repeatable: Final[bool] = False
+    tells_position: Final[bool | Callable[[Answer], Mapping[int, float]]] = False
+    refusal: Final[Refusal | None] = None
+    later: Final[Later | None] = None
+    other: Callable[[], Exchange[T_co]] | None = None
+    whole: Whole[T_co] | None = None
+    course: Any = field(default=None, init=False)
 
-    aim: Any = None
-    sure = False
+    aim: ClassVar[Any] = None
+    sure: ClassVar[bool] = False
     """Every goal is within the limits that it carries, and none is an endless motion; see `Aimed`."""
-
-    def __init__(
-        self,
-        request: Data,
-        replies: tuple[Due, ...] | Any_ = (),
-        read: Callable[[Answer], T_co] | None = None,
-        *,
-        lane: int = 0,
-        rank: Rank = Rank.POLL,
-        effect: Effect = Effect.NONE,
-        goals: tuple[Goal, ...] = (),
-        timeout: Timeout = Timeout.REPLY,
-        repeatable: bool = False,
-        tells_position: bool | Callable[[Answer], Mapping[int, float]] = False,
-        refusal: Refusal | None = None,
-        later: Later | None = None,
-        other: Callable[[], Exchange[T_co]] | None = None,
-        whole: Whole[T_co] | None = None,
-    ) -> None:
-        self.request: Final = request
-        self.replies: Final = replies
-        self.read: Final = read
-        self.lane: Final = lane
-        self.rank: Final = rank
-        self.effect: Final = effect
-        self.goals: Final = goals
-        self.timeout: Final = timeout
-        self.repeatable: Final = repeatable
-        self.tells_position: Final = tells_position
-        self.refusal: Final = refusal
-        self.later: Final = later
-        self.other: Final = other
-        self.whole: Final = whole
-        self.course: Any = None
 
     @property
     def ordered(self) -> Sequence[int]:
@@ -226,88 +201,54 @@ class Exchange(Generic[T_co]):
         rest = [name for name in Exchange.__slots__ if name not in own]
         return Exchange(self.request, self.replies, read, **{name: getattr(self, name) for name in rest})
 
-    def __iter__(self) -> Generator[Step, Any, T_co]:
-        value: T_co = yield self
-        return value
-
     def __repr__(self) -> str:
         text = self.request.hex(" ") if isinstance(self.request, bytes) else repr(self.request)
         return f"<Exchange {text}>"
 
 
-class Together(Generic[T_co]):
+@dataclass(slots=True, eq=False)
+class Together(_Step[list[T_co]]):
     """Operations that overlap where the bus allows it; gives their results in order.
 
     An error in one does not end the others; an interruption (KeyboardInterrupt, MemoryError) ends all. After all have
     ended the first error is raised, with a note for each other; `outcome()` around each gives errors as values.
     """
 
-    __slots__ = ("operations",)
-
-    def __init__(self, operations: Sequence[Runnable[T_co]]) -> None:
-        self.operations: Final = operations
-
-    def __iter__(self) -> Generator[Step, Any, list[T_co]]:
-        values: list[T_co] = yield self
-        return values
+    operations: Sequence[Runnable[T_co]]
 
 
-class Alone(Generic[T_co]):
+@dataclass(slots=True, eq=False)
+class Alone(_Step[T_co]):
     """An operation during which the bus sends nothing else, except a stop."""
 
-    __slots__ = ("operation",)
-
-    def __init__(self, operation: Runnable[T_co]) -> None:
-        self.operation: Final = operation
-
-    def __iter__(self) -> Generator[Step, Any, T_co]:
-        value: T_co = yield self
-        return value
+    operation: Runnable[T_co]
 
 
-class Pause:
+@dataclass(slots=True, eq=False)
+class Pause(_Step[float]):
     """Wait at least `seconds` on the link clock; gives the time (s) then. 0 only reads the clock."""
 
-    __slots__ = ("seconds",)
-
-    def __init__(self, seconds: float) -> None:
-        self.seconds: Final = seconds
-
-    def __iter__(self) -> Generator[Step, Any, float]:
-        moment: float = yield self
-        return moment
+    seconds: Final[float]
 
 
-class Listen:
+@dataclass(slots=True, eq=False)
+class Listen(_Step[Notice | None]):
     """Wait at most `until` seconds from this step on for a notice that `match` accepts; gives it, or None."""
 
-    __slots__ = ("match", "until")
-
-    def __init__(self, match: Callable[[Notice], bool], until: float) -> None:
-        self.match: Final = match
-        self.until: Final = until
-
-    def __iter__(self) -> Generator[Step, Any, Notice | None]:
-        notice: Notice | None = yield self
-        return notice
+    match: Final[Callable[[Notice], bool]]
+    until: Final[float]
 
 
-class Tune:
+@dataclass(slots=True, eq=False)
+class Tune(_Step[int]):
     """Set the rate of the link (bit/s) when nothing is in flight; gives the previous rate. 0 only reads it.
 
-    With `listen_only` the link sends nothing, not even the acknowledge bit of CAN, until the next `Tune`: a bus of
-    unknown rate is not disturbed.
+    With `listen_only` the link sends nothing until the next `Tune`, not even the acknowledge bit of CAN: a bus of
+    unknown rate is not disturbed. A serial link has no such bit.
     """
 
-    __slots__ = ("listen_only", "rate")
-
-    def __init__(self, rate: int, listen_only: bool = False) -> None:
-        self.rate: Final = rate
-        self.listen_only: Final = listen_only
-
-    def __iter__(self) -> Generator[Step, Any, int]:
-        before: int = yield self
-        return before
+    rate: Final[int]
+    listen_only: Final[bool] = False
 
 
 class Progress(NamedTuple):
@@ -344,16 +285,11 @@ REACHED: Final = "reached"  # in the facts of a resumed change: its states so fa
 READABLE: Final = "readable"  # in the facts: True for a change that only reads or leaves readings valid
 
 
-class Report:
+@dataclass(slots=True, eq=False)
+class Report(_Step[None]):
     """Pass an event (progress, an early result, a journal record) to its observers before the next step."""
 
-    __slots__ = ("event",)
-
-    def __init__(self, event: object) -> None:
-        self.event: Final = event
-
-    def __iter__(self) -> Generator[Step, Any, None]:
-        yield self
+    event: Final[object]
 
 
 Step: TypeAlias = "Exchange[Any] | Together[Any] | Alone[Any] | Pause | Listen | Tune | Report"

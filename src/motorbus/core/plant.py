@@ -115,10 +115,16 @@ class Motion(NamedTuple):
         """Yield the parts that end after `since` (s), in order; the last one, at rest or at `cruise`, ends at inf."""
         begin = self.start
         for phase in self.phases:
-            for stretch in _one_way(begin, phase):
-                if stretch.end > since:
-                    yield stretch
-            begin += phase.duration
+            end = begin + phase.duration
+            turn = -phase.velocity / phase.acceleration if phase.acceleration else inf
+            if 0 < turn < phase.duration:
+                middle = begin + turn
+                first = Stretch(begin, middle, *phase[1:])
+                second = Stretch(middle, end, phase.position_after(turn), 0.0, phase.acceleration)
+                yield from (part for part in (first, second) if part.end > since)
+            elif end > since:
+                yield Stretch(begin, end, *phase[1:])
+            begin = end
         yield Stretch(begin, inf, self.goal, self.cruise, 0.0)
 
 
@@ -172,8 +178,20 @@ def move(
     peak = sqrt(share) if share > 0.0 else 0.0
     if speed < peak:
         peak = speed
-    gaining = acceleration if peak > way * velocity else braking
-    return _trapezoid(at, position, velocity, goal, way * peak, gaining, braking, cruises=peak == speed)
+    cruises = peak == speed
+    ramp_limit = acceleration if peak > way * velocity else braking
+    peak *= way
+    gain = peak - velocity
+    ramp, slope = abs(gain) / ramp_limit, copysign(ramp_limit, gain)
+    reached = position + ramp * (velocity + 0.5 * slope * ramp)
+    brakes_at = goal - peak * abs(peak) / (2 * braking)
+    phases: tuple[Phase, ...] = (_made(Phase, (ramp, position, velocity, slope)),) if ramp else ()
+    # A triangle has no cruise: its difference is a rounding error, which a tiny peak would turn into a long time.
+    if cruises and (cruise := (brakes_at - reached) / peak) > 0.0:
+        phases += (_made(Phase, (cruise, reached, peak, 0.0)),)
+    if brake := abs(peak) / braking:
+        phases += (_made(Phase, (brake, brakes_at, peak, -copysign(braking, peak))),)
+    return _made(Motion, (at, phases, goal, 0.0))
 
 
 def run(
@@ -207,17 +225,6 @@ def obstructed(motion: Motion, low: float, high: float) -> Motion:
     return motion
 
 
-def _one_way(begin: float, phase: Phase) -> Iterator[Stretch]:
-    """Split a phase in two where its direction changes."""
-    end = begin + phase.duration
-    turn = -phase.velocity / phase.acceleration if phase.acceleration else inf
-    if not 0 < turn < phase.duration:
-        yield Stretch(begin, end, *phase[1:])
-        return
-    yield Stretch(begin, begin + turn, *phase[1:])
-    yield Stretch(begin + turn, end, phase.position_after(turn), 0.0, phase.acceleration)
-
-
 def _time_over(distance: float, stretch: Stretch) -> float | None:
     """Seconds in which a stretch covers this distance, even beyond its end; None if it never does."""
     if distance == inf:
@@ -244,31 +251,6 @@ def _braked(at: float, position: float, velocity: float, goal: float, accelerati
         return rest(at, goal)
     phase = Phase(abs(velocity) / acceleration, position, velocity, -copysign(acceleration, velocity))
     return Motion(at, (phase,), goal)
-
-
-def _trapezoid(
-    at: float,
-    position: float,
-    velocity: float,
-    goal: float,
-    peak: float,
-    acceleration: float,
-    deceleration: float,
-    *,
-    cruises: bool,
-) -> Motion:
-    """Accelerate to the signed velocity `peak`, keep it if it `cruises`, then brake to rest at the goal."""
-    gain = peak - velocity
-    ramp, slope = abs(gain) / acceleration, copysign(acceleration, gain)
-    reached = position + ramp * (velocity + 0.5 * slope * ramp)
-    braking = goal - peak * abs(peak) / (2 * deceleration)
-    phases: tuple[Phase, ...] = (_made(Phase, (ramp, position, velocity, slope)),) if ramp else ()
-    # A triangle has no cruise: its difference is a rounding error, which a tiny peak would turn into a long time.
-    if cruises and (cruise := (braking - reached) / peak) > 0.0:
-        phases += (_made(Phase, (cruise, reached, peak, 0.0)),)
-    if brake := abs(peak) / deceleration:
-        phases += (_made(Phase, (brake, braking, peak, -copysign(deceleration, peak))),)
-    return _made(Motion, (at, phases, goal, 0.0))
 
 
 @dataclass(frozen=True, slots=True)

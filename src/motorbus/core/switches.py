@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import Field, field, fields
 from difflib import get_close_matches
-from math import inf, isfinite
+from math import inf, isfinite, nan
 from typing import Any, TypeVar
 
 from motorbus.core import units
@@ -66,21 +66,17 @@ def _value(one: Field[Any], value: object) -> object:
             raise RequestError(f"option {one.name}: {value!r} is neither yes nor no", expected="yes or no")
         return word in _YES
     if isinstance(one.default, int | float):
-        found = _number(one.name, value, type(one.default), span)
+        is_int = isinstance(one.default, int)
+        try:
+            found = number = (units.whole if is_int else units.real)(str(value))
+        except ValueError:
+            number = nan
+        if not (isfinite(number) and span[0] <= number <= span[1]):
+            what = "a whole number" if is_int else "a number"
+            bounds = f"{span[0]:g} or more" if span[1] == inf else f"{span[0]:g} to {span[1]:g}"
+            raise RequestError(f"option {one.name}: {value!r} is not possible", expected=f"{what}, {bounds}")
     if choices and found not in choices:
         raise RequestError(
             f"option {one.name}: {value!r} is not possible", expected=f"one of {', '.join(map(str, choices))}"
         )
     return found
-
-
-def _number(name: str, value: object, kind: type, span: tuple[float, float]) -> float:
-    try:
-        number = (units.whole if kind is int else units.real)(str(value))
-    except ValueError:
-        number = float("nan")
-    if not (isfinite(number) and span[0] <= number <= span[1]):
-        what = "whole number" if kind is int else "number"
-        bounds = f"{span[0]:g} or more" if span[1] == inf else f"{span[0]:g} to {span[1]:g}"
-        raise RequestError(f"option {name}: {value!r} is not possible", expected=f"a {what}, {bounds}")
-    return number

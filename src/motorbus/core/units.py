@@ -16,38 +16,21 @@ from motorbus.errors import RequestError
 
 DEGREE = pi / 180
 TURN = 2 * pi
+RPM = TURN / 60
 
 SCALES: Mapping[str, Mapping[str, float]] = {
     "position": {"rad": 1.0, "mrad": 1e-3, "deg": DEGREE, "°": DEGREE, "turn": TURN, "turns": TURN},
-    "velocity": {
-        "rad/s": 1.0,
-        "deg/s": DEGREE,
-        "°/s": DEGREE,
-        "rpm": TURN / 60,
-        "turn/s": TURN,
-        "turns/s": TURN,
-    },
+    "velocity": {"rad/s": 1.0, "deg/s": DEGREE, "°/s": DEGREE, "rpm": RPM, "turn/s": TURN, "turns/s": TURN},
     "acceleration": {
-        "rad/s²": 1.0,
-        "rad/s2": 1.0,
-        "rad/s^2": 1.0,
-        "deg/s²": DEGREE,
-        "deg/s2": DEGREE,
-        "deg/s^2": DEGREE,
-        "°/s²": DEGREE,
-        "°/s2": DEGREE,
-        "turn/s²": TURN,
-        "turn/s2": TURN,
+        **dict.fromkeys(("rad/s²", "rad/s2", "rad/s^2"), 1.0),
+        **dict.fromkeys(("deg/s²", "deg/s2", "deg/s^2", "°/s²", "°/s2"), DEGREE),
+        **dict.fromkeys(("turn/s²", "turn/s2"), TURN),
     },
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6},
     "linear velocity": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "um/s": 1e-6, "mm/min": 1e-3 / 60},
     "linear acceleration": {
-        "m/s²": 1.0,
-        "m/s2": 1.0,
-        "m/s^2": 1.0,
-        "mm/s²": 1e-3,
-        "mm/s2": 1e-3,
-        "mm/s^2": 1e-3,
+        **dict.fromkeys(("m/s²", "m/s2", "m/s^2"), 1.0),
+        **dict.fromkeys(("mm/s²", "mm/s2", "mm/s^2"), 1e-3),
     },
     "current": {"A": 1.0, "mA": 1e-3},
     "voltage": {"V": 1.0, "mV": 1e-3},
@@ -90,7 +73,13 @@ def parse(text: str, quantity: str) -> float:
     if number is None:
         raise _refused(text, quantity, "is not a number" if stripped else "is empty")
     unit = stripped[number.end() :].strip()
-    value = float(number[0]) * _scale(text, unit, quantity, scales)
+    scale = scales.get(unit) if unit else 1.0
+    if scale is None:
+        folded = (known for name, known in scales.items() if name.lower() == unit.lower())
+        scale = next(folded, None)
+    if scale is None:
+        raise _refused(text, quantity, _unit_fault(unit, quantity))
+    value = float(number[0]) * scale
     if not isfinite(value):
         raise _refused(text, quantity, "is too large to be a number")
     return value
@@ -177,22 +166,15 @@ def _plain(number: float) -> str:
     return repr(number).removesuffix(".0")
 
 
-def _scale(text: str, unit: str, quantity: str, scales: Mapping[str, float]) -> float:
-    if not unit:
-        return 1.0
-    if unit in scales:
-        return scales[unit]
-    for name, scale in scales.items():
-        if name.lower() == unit.lower():
-            return scale
+def _unit_fault(unit: str, quantity: str) -> str:
     if unit == "raw":
-        raise _refused(text, quantity, "is a raw value, and a quantity is wanted")
+        return "is a raw value, and a quantity is wanted"
     if unit.startswith(",") and unit[1:2].isdigit():
-        raise _refused(text, quantity, "has a decimal comma; write a point")
-    for name, others in SCALES.items():
-        if unit in others:
-            raise _refused(text, quantity, f"has the unit {unit!r}, which measures {name} and not {quantity}")
-    raise _refused(text, quantity, f"has the unit {unit!r}, which is not known")
+        return "has a decimal comma; write a point"
+    for name, scales in SCALES.items():
+        if unit in scales:
+            return f"has the unit {unit!r}, which measures {name} and not {quantity}"
+    return f"has the unit {unit!r}, which is not known"
 
 
 def _refused(text: str, quantity: str, what: str) -> RequestError:
