@@ -19,21 +19,21 @@ def judged(values: Iterator[int]) -> int:
         return next(values)
 
     def run() -> Operation[None]:
-        told.append((yield from agreed(reading, node=3, what="position")))
+        readings.append((yield from agreed(reading, node=3, what="position")))
 
-    told: list[int] = []
+    readings: list[int] = []
     assert list(run()) == []
-    return told[0]
+    return readings[0]
 
 
 @pytest.mark.parametrize(
-    ("told", "left"), [([5, 5, 6], [6]), ([5, 6, 6, 7], [7]), ([1, 2, 1, 2, 3, 3], []), ([9, 9], [])]
+    ("readings", "left"), [([5, 5, 6], [6]), ([5, 6, 6, 7], [7]), ([1, 2, 1, 2, 3, 3], []), ([9, 9], [])]
 )
-def test_the_first_two_in_a_row_that_agree_are_believed(told: list[int], left: list[int]) -> None:
-    values = iter(told)
+def test_the_first_two_in_a_row_that_agree_are_the_result(readings: list[int], left: list[int]) -> None:
+    values = iter(readings)
     agreed_on = judged(values)
     assert list(values) == left
-    assert agreed_on == told[len(told) - len(left) - 1]
+    assert agreed_on == readings[len(readings) - len(left) - 1]
 
 
 def test_what_changes_all_the_time_is_not_read_for_ever() -> None:

@@ -111,7 +111,7 @@ def test_two_rows_at_one_address_are_refused() -> None:
 
 @pytest.mark.parametrize("value", [1e308, -1e308, *HUGE, None, "1", 1j, [1.0], object()])
 @pytest.mark.parametrize("row", [PLAIN, SIGNED])
-def test_what_cannot_be_reckoned_with_is_a_bad_request(row: Entry, value: Any) -> None:
+def test_a_value_that_is_no_finite_number_is_a_bad_request(row: Entry, value: Any) -> None:
     with pytest.raises(RequestError, match=r"not a finite number|out of range") as caught:
         row.encode(row.to_raw(value))
     assert len(caught.value.summary) < 400

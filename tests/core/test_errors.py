@@ -45,10 +45,10 @@ def test_only_what_was_refused_before_anything_was_sent_says_by_itself_that_noth
 
 
 @pytest.mark.parametrize("kind", CLASSES, ids=lambda kind: kind.__name__)
-def test_what_is_said_anew_is_what_everybody_is_told(kind: type[errors.MotorbusError]) -> None:
+def test_a_changed_summary_is_the_argument_of_every_copy(kind: type[errors.MotorbusError]) -> None:
     """A traceback, a copy and another process show what Python keeps of an error, which is its arguments."""
     error = kind("no answer", advice="ask again")
     error.summary = f"arm.toml: {error.summary}"
-    for told in (error, copy.copy(error), pickle.loads(pickle.dumps(error))):
-        assert told.args == ("arm.toml: no answer",)
-        assert str(told) == "arm.toml: no answer\n  what to do: ask again"
+    for copied in (error, copy.copy(error), pickle.loads(pickle.dumps(error))):
+        assert copied.args == ("arm.toml: no answer",)
+        assert str(copied) == "arm.toml: no answer\n  what to do: ask again"

@@ -53,7 +53,7 @@ def tiles(total: int, sound: list[tuple[int, int]], doubtful: list[tuple[int, in
 
 
 @pytest.mark.parametrize(
-    ("doubtful", "told"),
+    ("doubtful", "expected"),
     [
         ([(2, 6)], [(0, 2, "framing"), (2, 4, "checksum"), (6, 4, "framing"), (10, 5, "")]),
         ([(2, 6), (4, 9)], [(0, 2, "framing"), (2, 7, "checksum"), (9, 1, "framing"), (10, 5, "")]),
@@ -66,9 +66,9 @@ def tiles(total: int, sound: list[tuple[int, int]], doubtful: list[tuple[int, in
     ],
 )  # fmt: skip
 def test_doubt_ends_at_the_next_packet_and_never_begins_in_one(
-    doubtful: list[tuple[int, int]], told: list[Tile]
+    doubtful: list[tuple[int, int]], expected: list[Tile]
 ) -> None:
-    assert tiles(15, [(10, 15)], doubtful) == told
+    assert tiles(15, [(10, 15)], doubtful) == expected
 
 
 @pytest.mark.parametrize("extra", [-1, 0, 1, PIECE])

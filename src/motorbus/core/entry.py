@@ -70,7 +70,7 @@ class Entry:
     the raw value; value = raw * scale in `unit` (empty unit: a plain number). `choices` names single values, `bits`
     single bits. `default` is the raw value as shipped, where known. `source` names the source of each fact. `conflict`
     lists what sources say where they disagree or none confirms it, and the choice made; empty without a doubt. `note`
-    holds other facts.
+    holds other facts. A `protected` row is not written by name and not copied to another device.
     """
 
     name: str

@@ -18,14 +18,9 @@ class Stays(Enum):
 class Goal(NamedTuple):
     """What a motion request asks of one node, in API units, with the limits in force when the request was made.
 
-    `quantity` is one of
-
-        position (rad)  relative (rad)
-        velocity (rad/s)  load (fraction)  current (A)         the node follows it until the next order
-        speed (rad/s)  cap (A)  time (a share of the longest)  only bounds a movement
-        torque                                                 1 switches it on
-
-    A limit is None where it is unknown; the gate refuses what it cannot judge. `stays` marks a goal that moves nothing.
+    `quantity` is position or relative (rad); velocity (rad/s), load (fraction) or current (A), which the node follows
+    until the next order; speed (rad/s), cap (A) or time (a share of the longest), which only bound a movement; or
+    torque (1: on). A limit is None where it is unknown; the gate refuses what it cannot judge.
     """
 
     node: int

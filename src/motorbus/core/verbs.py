@@ -110,9 +110,7 @@ class verb(Said[P, T]):  # noqa: N801 - used like a function
             return device.bus.run(procedure)
 
         method = _described(call, self.name, function, device)
-        overridden = (
-            getattr(type(device), self.name, None) is not self
-        )  # a subclass calls this one by `super`
-        if not overridden:
-            device.__dict__[self.name] = method  # found without this descriptor from now on
+        # Cache it, so that the next call skips this descriptor; not if a subclass overrides the verb and calls `super`.
+        if getattr(type(device), self.name, None) is self:
+            device.__dict__[self.name] = method
         return method
