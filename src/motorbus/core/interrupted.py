@@ -9,16 +9,7 @@ from collections.abc import Callable
 from typing import Any, Final, NamedTuple, Protocol, TypeVar
 
 from motorbus.core import units
-from motorbus.core.operation import (
-    Alone,
-    Closed,
-    Operation,
-    Pause,
-    Runnable,
-    Together,
-    afterwards,
-    outcome,
-)
+from motorbus.core.operation import Alone, Closed, Operation, Pause, Runnable, Together, afterwards, outcome
 from motorbus.errors import MotorbusError, RequestError
 
 T = TypeVar("T")
@@ -65,6 +56,8 @@ def stopped_if_interrupted(move: Runnable[T], *devices: Moving) -> Operation[T]:
 
 
 class _Wait:
+    """The wait for one move; `notes` say what each device does after `stop`."""
+
     def __init__(self, devices: tuple[Moving, ...]) -> None:
         self.notes: list[str] = []
         self._devices = devices

@@ -7,9 +7,12 @@ between packets are noise. numpy is an argument (`np`), so that importing this m
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeAlias
 
 from motorbus.core.capture import ABSENT, FAULTS, NOISE, PIECE, Columns
+
+Spans: TypeAlias = tuple[Any, Any]
+"""Arrays of starts and ends."""
 
 _CHECKSUM = FAULTS.index("checksum")
 _FRAMING = FAULTS.index("framing")
@@ -32,17 +35,13 @@ def first_come(np: Any, starts: Any, ends: Any) -> Any:
 
 
 def tiled(
-    np: Any,
-    total: int,
-    sound: tuple[Any, Any],
-    doubtful: tuple[Any, Any],
-    tell: Callable[[Any, Any], tuple[Any, Any, Any]],
+    np: Any, total: int, sound: Spans, doubtful: Spans, tell: Callable[[Any, Any], tuple[Any, Any, Any]]
 ) -> Columns:
     """Divide `total` bytes into packets and noise.
 
-    `sound` are the starts (sorted) and ends of valid packets, `doubtful` those of packets with a wrong checksum. A
-    valid packet that ends after the last byte makes the remaining bytes noise. `tell(starts, ends)` gives kinds, nodes
-    and codes of packets; a single number where all packets have the same.
+    `sound` are valid packets, sorted by start, `doubtful` packets with a wrong checksum. A valid packet that ends after
+    the last byte makes the remaining bytes noise. `tell(starts, ends)` gives kinds, nodes and codes of packets; a
+    single number where all packets have the same.
     """
     starts, ends = sound
     taken = first_come(np, starts, ends)
@@ -87,7 +86,7 @@ def _columns(
     return columns
 
 
-def _between(np: Any, starts: Any, ends: Any, total: int) -> tuple[Any, Any]:
+def _between(np: Any, starts: Any, ends: Any, total: int) -> Spans:
     """The gaps between these spans, which do not overlap, within `total` bytes."""
     inner = np.flatnonzero(ends[:-1] < starts[1:])
     begin = np.concatenate(([0], ends[inner], ends[-1:]))
@@ -96,7 +95,7 @@ def _between(np: Any, starts: Any, ends: Any, total: int) -> tuple[Any, Any]:
     return begin[wide], end[wide]
 
 
-def _united(np: Any, gaps: tuple[Any, Any], starts: Any, ends: Any, behind: int) -> tuple[Any, Any]:
+def _united(np: Any, gaps: Spans, starts: Any, ends: Any, behind: int) -> Spans:
     """Spans with a wrong checksum, each up to the next packet: starts and ends of disjoint spans.
 
     A doubtful span outside the gaps, or from `behind` on, lies in a packet and is not counted.
@@ -116,7 +115,7 @@ def _united(np: Any, gaps: tuple[Any, Any], starts: Any, ends: Any, behind: int)
     return starts[first], furthest[np.append(first[1:], len(starts)) - 1]
 
 
-def _without(np: Any, gaps: tuple[Any, Any], bad: tuple[Any, Any]) -> tuple[Any, Any]:
+def _without(np: Any, gaps: Spans, bad: Spans) -> Spans:
     """The gaps without the bad spans; a gap may contain several."""
     begin = np.sort(np.concatenate((gaps[0], bad[1])))
     end = np.sort(np.concatenate((bad[0], gaps[1])))

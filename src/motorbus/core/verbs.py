@@ -32,12 +32,8 @@ class _Owner:
     """Base of devices with verbs. A copy drops the cached methods: they are bound to the original."""
 
     def __getstate__(self) -> dict[str, Any]:
-        kind = type(self)
-        return {
-            name: value
-            for name, value in self.__dict__.items()
-            if not isinstance(getattr(kind, name, None), Said)
-        }
+        cached = {name for name in self.__dict__ if isinstance(getattr(type(self), name, None), Said)}
+        return {name: value for name, value in self.__dict__.items() if name not in cached}
 
 
 class Blocking(_Owner):
@@ -54,9 +50,7 @@ class Awaiting(_Owner):
         self.bus = bus
 
 
-def _described(
-    call: Callable[P, T], name: str, function: Callable[..., object], owner: object
-) -> Callable[P, T]:
+def _bound(call: Callable[P, T], name: str, function: Callable[..., object], owner: object) -> Callable[P, T]:
     """Give a method the name, docstring and signature (without the first parameter) of its function."""
     call.__name__ = name
     call.__qualname__ = f"{type(owner).__name__}.{name}"
@@ -83,7 +77,7 @@ class Said(Generic[P, T]):
         def call(*args: Any, **kwargs: Any) -> Any:
             return carry_out(function(owner, *args, **kwargs))
 
-        return _described(call, self.name, function, owner)
+        return _bound(call, self.name, function, owner)
 
 
 class verb(Said[P, T]):  # noqa: N801 - used like a function
@@ -109,7 +103,7 @@ class verb(Said[P, T]):  # noqa: N801 - used like a function
             procedure = function(device, *args, **kwargs) if args or kwargs else function(device)
             return device.bus.run(procedure)
 
-        method = _described(call, self.name, function, device)
+        method = _bound(call, self.name, function, device)
         # Cache it, so that the next call skips this descriptor; not if a subclass overrides the verb and calls `super`.
         if getattr(type(device), self.name, None) is self:
             device.__dict__[self.name] = method
