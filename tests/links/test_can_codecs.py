@@ -92,17 +92,21 @@ def test_no_data_makes_a_decoder_raise(data: bytes) -> None:
 def test_a_line_that_is_no_frame_is_counted(line: bytes) -> None:
     reader = SlcanCodec()
     assert reader.feed(line + b"\r" + SOME) == [PING]
-    assert reader.counts.damaged == 1
+    assert reader.damaged == 1
 
 
 def test_replies_are_no_frames() -> None:
     reader = SlcanCodec()
     assert reader.feed(b"\rz\rZ\rV1013\rNSIMU\rF00\rA\r") == []
-    assert (reader.counts.damaged, reader.replies) == (0, [True] * 7)
+    assert (reader.damaged, reader.reply) == (0, True)
+
+
+def test_the_first_reply_counts() -> None:
+    reader = SlcanCodec()
     reader.feed(b"\a\n\r")
-    assert (reader.counts.refused, reader.replies[-2:]) == (1, [False, True])
+    assert (reader.refused, reader.reply) == (1, False)
     reader.forget()
-    assert reader.replies == []
+    assert reader.reply is None
 
 
 @pytest.mark.parametrize(
@@ -119,7 +123,7 @@ def test_replies_are_no_frames() -> None:
 def test_an_element_that_is_no_frame_is_counted(element: bytes) -> None:
     reader = SocketcandCodec()
     assert reader.feed(element + b"< frame 625 1.0  >") == [CanFrame(0x625, b"")]
-    assert reader.counts.damaged == 1
+    assert reader.damaged == 1
 
 
 def test_timestamps_are_known_by_two_in_a_row() -> None:
@@ -129,4 +133,4 @@ def test_timestamps_are_known_by_two_in_a_row() -> None:
     assert reader.feed(stamped * 2) == [PING, PING]
     assert reader.feed(SOME) == []
     assert reader.feed(stamped) == [PING]
-    assert reader.counts.damaged == 2
+    assert reader.damaged == 2

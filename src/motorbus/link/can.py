@@ -1,56 +1,44 @@
-"""CAN channels that python-can opens: `can://INTERFACE/CHANNEL`.
+"""CAN channels: `can://INTERFACE/CHANNEL`.
 
-Every interface of python-can works, with its configuration files and CAN_* variables. Where python-can would silently
-take another bit rate, ignore an option or wait without end, this link raises an error. python-can is imported here
-only, when a port is opened.
+Every interface of python-can works, with its configuration files and CAN_* variables; slcan and socketcand are read
+by our own code. Where python-can would silently take another bit rate, ignore an option or wait without end, this link
+raises an error. python-can is imported here only, when a port is opened.
 """
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import logging
-import os
 import time
-from collections.abc import Iterable, Mapping
+import warnings
+from collections.abc import Mapping
+from threading import Lock
 from types import ModuleType
 from typing import Any, Final
 
-from motorbus.core.operation import ERROR_FLAG, CanFrame, Data
+from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Data
 from motorbus.errors import LinkError, LinkLost, MotorbusError, PortNotFound, RequestError
 from motorbus.link import usb_adapters
-from motorbus.link.can_channel import BusChannel, Counts, TextChannel, open_bus
-from motorbus.link.can_options import SHARED, TEXT_OPTIONS, CanOptions, read_options
+from motorbus.link.can_options import SHARED, CanOptions, read_options
 from motorbus.link.can_rates import check_rate, ip_command, kernel_rate
-from motorbus.link.errors import busy
+from motorbus.link.can_text import TextChannel
+from motorbus.link.errors import busy, lost
 from motorbus.link.lock import PortLock, opening
 from motorbus.link.serial import NO_DEVICE
-from motorbus.link.slcan import SlcanChannel, open_slcan, rate_command
+from motorbus.link.slcan import SlcanChannel
 from motorbus.link.socketcand import open_socketcand
 
 BUS_OFF: Final = 0x40  # CAN_ERR_BUSOFF in the identifier of an error frame, linux/can/error.h
-INSTALL: Final = 'pip install "motorbus[can]"'
+SLICE: Final = 0.02  # s of one wait inside python-can
+MOST_FRAMES: Final = 256  # taken from python-can by one read
+_IDENTIFIER: Final = ERROR_FLAG - 1
+_FULL: Final = (errno.ENOBUFS, errno.EAGAIN)
+_FULL_TEXTS: Final = ("full", "overflow", "could not send message to one or more")
 _FRAME_DESCRIPTOR: Final = ("socketcan", "udp_multicast")
 """Interfaces whose descriptor is readable exactly when there is a frame."""
 _KERNEL_ERRORS: Final = ("socketcan", "socketcand")
 """Interfaces whose error frames are those of the Linux kernel."""
-_LATENCY: Final = {
-    "virtual": usb_adapters.TERMINAL_LATENCY,  # two threads are scheduled
-    "udp_multicast": usb_adapters.TERMINAL_LATENCY,
-    "socketcan": usb_adapters.USB_TIME,  # of the USB adapter below the kernel
-}
-"""s; any other adapter has the latency of a USB device."""
-_EXTRAS: Final = {
-    "gs_usb": "gs-usb",
-    "udp_multicast": "multicast",
-    **{name: name for name in ("canalystii", "cantact", "neovi", "nixnet", "serial", "seeedstudio")},
-}
-"""The extra of python-can that a back end needs."""
-_DRIVERS: Final = {
-    "pcan": "PEAK's PCAN-Basic library",
-    "kvaser": "Kvaser's CANlib",
-    "ixxat": "the VCI driver (Windows)",
-    "vector": "Vector's XL driver (Windows)",
-}
 _LISTEN_ONLY: Final[Mapping[str, Mapping[str, Any]]] = {
     "slcan": {},  # by a command
     "socketcan": {},  # by the kernel
@@ -70,7 +58,8 @@ def python_can(port: str) -> ModuleType:
     try:
         import can
     except ImportError as error:
-        raise LinkError(f"{port} needs python-can, which is missing: {error}", advice=INSTALL) from None
+        advice = 'pip install "motorbus[can]"'
+        raise LinkError(f"{port} needs python-can, which is missing: {error}", advice=advice) from None
     log = logging.getLogger("can")
     if not log.handlers:
         log.addHandler(logging.NullHandler())
@@ -94,14 +83,14 @@ class CanLink:
     `connect_time`  time-out in s for a host of the network
 
     `lock_name` names the adapter for its lock and its emergency stop; "" for a shared channel. `no_wire`: no device
-    can be real. Raises RequestError for an unknown interface or option, PortNotFound, PortBusy, or LinkError: for a bit
-    rate that the adapter does not have, a missing driver, a refusal.
+    can be real. `device` is the serial port of the adapter; "" for any other channel. Raises RequestError for an
+    unknown interface or option, PortNotFound, PortBusy, or LinkError: for a bit rate that the adapter does not have, a
+    missing driver, a refusal.
     """
 
     paced = False  # adapters do not report when a frame was on the wire
     virtual = False
     simulated = False
-    timeless = False  # frames through a pseudo-terminal take no time
 
     def __init__(
         self,
@@ -115,197 +104,112 @@ class CanLink:
         connect_time: float | None = None,
     ) -> None:
         self.name = port
-        self._connect_time = connect_time
-        self._can = python_can(port)
-        self._options = found = read_options(self._can, port, rate, options or {})
-        self._back_end: Any = None
-        if found.interface not in TEXT_OPTIONS:
-            try:
-                self._back_end = self._can.interface._get_class_for_interface(found.interface)
-            except Exception as error:
-                raise open_error(found, error) from error
-        self.warnings = found.warnings
-        self.latency = _LATENCY.get(found.interface, usb_adapters.DEVICE_LATENCY)
-        self.rate = self._checked_rate(default_rate)
-        self.listen_only = found.listen_only
+        self._options = found = read_options(python_can(port), port, rate, options or {})
         self.no_wire = found.no_wire
         self.lock_name = found.lock_name
-        self._changing = False
-        self._reported = (0, 0)
+        self.device = found.device
+        self.listen_only = found.listen_only
+        self.rate = found.rate or default_rate
+        if self.rate <= 0:
+            raise RequestError(f"{port}: the bit rate is missing", expected="bitrate=500000, for example")
+        warning = self._check_settings(found.rate, self.listen_only)
         if self.lock_name and not (shared and found.interface == "socketcan"):
             with opening(self.lock_name, lock) as self.lock:
-                self._channel = self._open(self.rate, self.listen_only)
+                self._channel = self._open(connect_time)
         else:
             self.lock = PortLock(port)
-            self._channel = self._open(self.rate, self.listen_only)
+            self._channel = self._open(connect_time)
+        self.latency = self._channel.latency
+        self.warnings = self._channel.warnings + warning
 
-    def _checked_rate(self, default_rate: int) -> int:
-        """The rate to open with. Raises LinkError when the adapter would make another one."""
-        options = self._options
-        if options.interface == "socketcan":
-            rate, warnings = kernel_rate(options, options.rate, default_rate)
-            self.warnings += warnings
-            return rate
-        rate = options.rate or options.timing_rate or default_rate
-        if rate <= 0:
-            raise RequestError(
-                f"{self.name}: the bit rate is missing", expected="bitrate=500000, for example"
-            )
-        if options.sets_rate:
-            check_rate(options, self._back_end, rate)
-        elif options.rate and options.interface not in SHARED:
-            place = "server" if options.interface == "socketcand" else "adapter"
-            self.warnings += (
-                f"the bit rate is set at the {place}; whether that is {rate} bit/s cannot be checked",
-            )
-        return rate
+    def _check_settings(self, rate: int, listen_only: bool) -> tuple[str, ...]:
+        """Check rate (bit/s, 0 for any) and mode; a warning when the adapter does not tell its rate.
 
-    def _open(self, rate: int, listen_only: bool) -> TextChannel | BusChannel:
-        options = self._options
-        if listen_only:
-            self._check_can_listen()
-        if options.interface in TEXT_OPTIONS:
-            return self._open_text(rate, listen_only)
-        try:
-            settings = dict(options.settings)
-            if options.sets_rate and "timing" not in settings:
-                settings["bitrate"] = rate
-            if listen_only:
-                settings.update(_LISTEN_ONLY[options.interface])
-                if "state" in settings:
-                    settings["state"] = self._can.BusState[settings["state"]]
-            bus = open_bus(self._back_end, options.channel, settings)
-            descriptor = bus.fileno() if options.interface in _FRAME_DESCRIPTOR else None
-            return BusChannel(self.name, bus, self._can.Message, descriptor)
-        except MotorbusError:
-            raise
-        except Exception as error:  # each back end has its own types
-            raise open_error(options, error) from error
-
-    def _open_text(self, rate: int, listen_only: bool) -> TextChannel:
-        options = self._options
-        if options.interface == "socketcand":
-            channel = open_socketcand(options, self._connect_time)
-            self.latency = channel.latency
-            return channel
-        slcan = open_slcan(options, self.lock.borrow(), self._connect_time)
-        try:
-            slcan.configure(rate_command(options, rate), rate, listen_only=listen_only)
-        except BaseException:
-            slcan.close()
-            raise
-        self.latency = slcan.latency
-        self.warnings += slcan.warnings
-        self.timeless = os.path.realpath(options.device).startswith(usb_adapters.PSEUDO_TERMINALS)
-        return slcan
-
-    def _check_can_listen(self) -> None:
-        interface = self._options.interface
-        if interface not in _LISTEN_ONLY:
+        Raises LinkError when the adapter cannot have them.
+        """
+        options, interface = self._options, self._options.interface
+        if listen_only and interface not in _LISTEN_ONLY:
             raise LinkError(
                 f"{self.name}: {interface} cannot only listen: its adapter would acknowledge frames",
                 expected=f"listen_only with one of {', '.join(_LISTEN_ONLY)}",
                 advice="leave out listen_only where nothing else is on the bus",
             )
+        if interface == "socketcan":
+            actual = kernel_rate(options, rate, listen_only)
+            if actual is None:
+                return (f"the kernel did not tell the bit rate; {self.rate} bit/s is assumed",)
+            self.rate = actual or self.rate
+        elif options.sets_rate:
+            check_rate(options, rate or self.rate)
+        elif rate and interface not in SHARED:
+            return (f"the bit rate is set at the server; whether that is {rate} bit/s cannot be checked",)
+        return ()
 
-    @property
-    def device(self) -> str:
-        """The serial port of the adapter; "" for any other channel."""
-        return self._options.device
+    def _open(self, connect_time: float | None) -> TextChannel | BusChannel:
+        channel: TextChannel | BusChannel
+        if self._options.interface == "slcan":
+            channel = SlcanChannel(self._options, connect_time)
+        elif self._options.interface == "socketcand":
+            channel = open_socketcand(self._options, connect_time)
+        else:
+            channel = BusChannel(self._options)
+        try:
+            channel.configure(self.rate, self.listen_only)
+        except BaseException:
+            channel.close()
+            raise
+        return channel
 
     def port_at(self, device: str) -> str:
         """The address of this adapter at another serial port."""
         _, at, baud = str(self._options.channel).partition("@")
         return f"can://{self._options.interface}/{device.lstrip('/')}{at}{baud}"
 
-    @property
-    def counts(self) -> Counts:
-        """Damaged lines, refused commands and dropped frames."""
-        return self._channel.counts
-
     def trouble(self) -> str:
         """What the adapter has reported since the last call, for the error of a missing reply; "" for nothing."""
-        refused, damaged = self.counts.refused, self.counts.damaged
-        before, self._reported = self._reported, (refused, damaged)
-        if refused > before[0]:
-            return (
-                f"the adapter refused {refused - before[0]} frames: no node on the bus acknowledges them, the bit rate "
-                "is another, or its buffer is full"
-            )
-        if damaged > before[1]:
-            return f"{damaged - before[1]} lines of the adapter were damaged: its cable, or another program on its port"
-        return ""
+        return self._channel.trouble()
 
     def now(self) -> float:
         return time.monotonic()
 
     def write(self, data: Data) -> None:
-        if not isinstance(data, CanFrame):
-            raise RequestError(f"{self.name} carries CAN frames, not bytes", sent=data)
+        assert isinstance(data, CanFrame)
         if self.listen_only:
             raise LinkError(f"{self.name} only listens and cannot send", sent=data)
         self._channel.write(data)
 
     def read(self, until: float) -> list[Data]:
-        channel = self._channel
-        try:
-            frames = channel.read(until)
-        except LinkLost:
-            if channel is self._channel and not self._changing:
-                raise
-            time.sleep(0.001)
-            return []  # another thread reopens it for another rate
+        """See `Link.read`. Raises LinkLost too when an error frame of the kernel reports bus off."""
+        frames = self._channel.read(until)
         if frames and self._options.interface in _KERNEL_ERRORS:
-            check_bus_off(self.name, frames)
+            for frame in frames:
+                if isinstance(frame, CanFrame) and frame.id & ERROR_FLAG and frame.id & BUS_OFF:
+                    raise _bus_off(self.name, frame)
         return frames
 
     def tune(self, rate: int, listen_only: bool = False) -> None:
         if rate < 0:
             raise RequestError(f"{rate} is not a rate in bit/s")
-        rate = rate or self.rate
-        if (rate, listen_only) == (self.rate, self.listen_only):
+        before = self.rate, self.listen_only
+        wanted = rate or self.rate, listen_only
+        if wanted == before:
             return
-        if listen_only:
-            self._check_can_listen()
+        is_unknown = self._check_settings(*wanted)
         options = self._options
-        if options.interface == "socketcan":
-            self._check_kernel(rate, listen_only)
-        elif options.interface not in SHARED:
-            if not options.sets_rate and rate != self.rate:
-                raise LinkError(
-                    f"{self.name}: the bit rate of {options.interface} cannot be changed to {rate} bit/s from here",
-                    advice="set it where the adapter is",
-                )
-            check_rate(options, self._back_end, rate)
-            self._change(rate, listen_only)
-        self.rate, self.listen_only = rate, listen_only
-
-    def _check_kernel(self, rate: int, listen_only: bool) -> None:
-        _, unknown = kernel_rate(self._options._replace(listen_only=listen_only), rate, rate)
-        if unknown:
+        if is_unknown and (options.interface == "socketcan" or wanted[0] != self.rate):
             raise LinkError(
-                f"{self.name}: the bit rate of a SocketCAN interface is set by the system",
-                advice=ip_command(str(self._options.channel), rate, listen_only),
+                f"{self.name}: the bit rate of {options.interface} cannot be changed to {wanted[0]} bit/s from here",
+                advice=ip_command(str(options.channel), *wanted)
+                if options.interface == "socketcan"
+                else "set it where the adapter is",
             )
-
-    def _change(self, rate: int, listen_only: bool) -> None:
-        """Set up the adapter again; as before when that fails."""
-        self._changing = True
-        try:
-            self._set_up(rate, listen_only)
-        except MotorbusError:
-            self._set_up(self.rate, self.listen_only)
-            raise
-        finally:
-            self._changing = False
-
-    def _set_up(self, rate: int, listen_only: bool) -> None:
-        if isinstance(self._channel, SlcanChannel):
-            command = rate_command(self._options, rate)
-            self._channel.configure(command, rate, listen_only=listen_only)
-        else:
-            self._channel.close()
-            self._channel = self._open(rate, listen_only)
+        if options.sets_rate:
+            try:
+                self._channel.configure(*wanted)
+            except MotorbusError:
+                self._channel.configure(*before)
+                raise
+        self.rate, self.listen_only = wanted
 
     def fileno(self) -> int | None:
         return self._channel.fileno()
@@ -315,39 +219,143 @@ class CanLink:
         self.lock.release()
 
 
-def check_bus_off(name: str, frames: Iterable[Data]) -> None:
-    """Raise LinkLost for an error frame of the kernel that reports bus off: the controller sends nothing any more."""
-    for frame in frames:
-        if isinstance(frame, CanFrame) and frame.id & ERROR_FLAG and frame.id & BUS_OFF:
-            raise LinkLost(
-                f"{name} is off the bus: its controller has counted too many errors",
-                received=frame,
-                cause="a short circuit, another bit rate on the bus, no terminating resistors, or no other node",
-                advice="check the bus; an interface without restart-ms needs `ip link set can0 type can restart`",
-            )
+def _bus_off(name: str, frame: CanFrame) -> LinkLost:
+    return LinkLost(
+        f"{name} is off the bus: its controller has counted too many errors",
+        received=frame,
+        cause="a short circuit, another bit rate on the bus, no terminating resistors, or no other node",
+        advice="check the bus; an interface without restart-ms needs `ip link set can0 type can restart`",
+    )
+
+
+class BusChannel:
+    """A bus of python-can; `configure` opens it. `read` waits in short slices, so that another thread can close it."""
+
+    warnings: tuple[str, ...] = ()
+
+    def __init__(self, options: CanOptions) -> None:
+        self.name = options.name
+        is_shared = options.interface in SHARED
+        self.latency = usb_adapters.TERMINAL_LATENCY if is_shared else usb_adapters.DEVICE_LATENCY
+        self._options = options
+        self._can: Any = python_can(options.name)
+        self._bus: Any = None
+        self._descriptor: int | None = None
+        self._access = Lock()
+
+    def configure(self, rate: int, listen_only: bool) -> None:
+        """Open the bus anew, at this rate in bit/s. Raises LinkError, or RequestError for what it refuses."""
+        self.close()
+        options, can = self._options, self._can
+        settings = dict(options.settings)
+        if options.sets_rate and "timing" not in settings:
+            settings["bitrate"] = rate
+        if listen_only:
+            settings.update(_LISTEN_ONLY[options.interface])
+        if isinstance(settings.get("state"), str):
+            settings["state"] = can.BusState[settings["state"]]
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # about adjusted clocks and deprecated names
+                self._bus = can.Bus(options.channel, options.interface, ignore_config=True, **settings)
+            if options.interface in _FRAME_DESCRIPTOR:
+                self._descriptor = self._bus.fileno()
+        except Exception as error:  # each back end has its own types
+            raise open_error(options, error) from error
+
+    def read(self, until: float) -> list[Data]:
+        frames: list[Data] = []
+        while not frames:
+            pause = max(0.0, min(until - time.monotonic(), SLICE))
+            with self._access:
+                for _ in range(MOST_FRAMES):
+                    try:
+                        message = self._open_bus().recv(0.0 if frames else pause)
+                    except LinkLost:
+                        raise
+                    except Exception as error:  # each back end has its own types
+                        raise lost(self.name, error) from error
+                    if message is None:
+                        break
+                    frame = frame_of(message)
+                    if frame is not None:
+                        frames.append(frame)
+            if time.monotonic() >= until:
+                break
+        return frames
+
+    def _open_bus(self) -> Any:
+        if self._bus is None:
+            raise lost(self.name, "it is closed")
+        return self._bus
+
+    def write(self, frame: CanFrame) -> None:
+        message = self._can.Message(
+            arbitration_id=frame.id & _IDENTIFIER,
+            data=bytearray(frame.data),
+            dlc=len(frame.data),
+            is_extended_id=frame.extended,
+            is_remote_frame=bool(frame.id & REMOTE_FLAG),
+        )
+        bus = self._open_bus()
+        try:
+            bus.send(message, 0)
+        except Exception as error:  # each back end has its own types
+            text = str(error).lower()
+            is_full = isinstance(error, TimeoutError) or _error_code(error) in _FULL
+            if is_full or any(words in text for words in _FULL_TEXTS):
+                raise LinkError(
+                    f"{self.name} takes no more frames: {error}",
+                    cause="no node acknowledges, the bus is off, or frames are written faster than its rate",
+                ) from error
+            raise lost(self.name, error) from error
+
+    def trouble(self) -> str:
+        return ""
+
+    def fileno(self) -> int | None:
+        return self._descriptor
+
+    def close(self) -> None:
+        bus, self._bus = self._bus, None
+        if bus is not None:
+            with self._access, contextlib.suppress(Exception):  # it may be broken already
+                bus.shutdown()
+
+
+def frame_of(message: Any) -> CanFrame | None:
+    """The frame of a python-can message; None for CAN FD and for our own frames."""
+    if message.is_fd or not message.is_rx:
+        return None
+    if message.is_error_frame:
+        return CanFrame(message.arbitration_id & _IDENTIFIER | ERROR_FLAG, bytes(message.data or b"")[:8])
+    if message.is_remote_frame:
+        return CanFrame(message.arbitration_id | REMOTE_FLAG, bytes(message.dlc), message.is_extended_id)
+    return CanFrame(message.arbitration_id, bytes(message.data), message.is_extended_id)
 
 
 def open_error(options: CanOptions, error: Exception) -> MotorbusError:
     """The error for what python-can has raised at open: a missing driver is an ImportError here, a NameError there."""
     name, interface = options.name, options.interface
-    source = error.__cause__ if isinstance(error.__cause__, OSError) else error
-    code = getattr(source, "errno", None) or getattr(error, "error_code", None)
+    code = _error_code(error)
     if isinstance(error, (NotImplementedError, ImportError, NameError)) or "library not found" in str(error):
-        advice = f"install {_DRIVERS.get(interface, 'the driver that comes with the adapter')}"
-        if interface in _EXTRAS:
-            advice = f'pip install "python-can[{_EXTRAS[interface]}]"'
-        return LinkError(f"{name}: the driver of {interface} is missing: {error}", advice=advice)
+        extra = interface.replace("_", "-")
+        return LinkError(
+            f"{name}: the driver of {interface} is missing: {error}",
+            advice=f'install the driver of the adapter, or pip install "python-can[{extra}]"',
+        )
     if isinstance(error, (ValueError, TypeError)):
         return RequestError(f"{name}: python-can's {interface} refuses this: {error}")
     if code in NO_DEVICE:
         return PortNotFound(f"{name}: there is no {interface} channel {options.channel}: {error}")
-    if code == errno.EAFNOSUPPORT:
-        return LinkError(
-            f"{name}: the kernel of this system has no CAN",
-            advice="sudo modprobe can-raw; where there is none, use the adapter by can://slcan/…",
-        )
     if code == errno.EBUSY:
         return busy(name, None)
     return LinkError(
         f"{name} cannot be opened: {error}", advice="is the adapter plugged in, the channel right?"
     )
+
+
+def _error_code(error: Exception) -> int | None:
+    """The errno of an error of python-can, or of its cause."""
+    cause = error.__cause__ if isinstance(error.__cause__, OSError) else error
+    return getattr(cause, "errno", None) or getattr(error, "error_code", None)

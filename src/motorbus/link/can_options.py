@@ -1,13 +1,12 @@
 """What a CAN address means, with its options and the configuration of python-can.
 
 The address and options win over environment variables, and those over configuration files, as in python-can. But
-python-can passes every option to every back end, and most ignore unknown ones. Here an unknown option of the user is an
-error, and an unsuitable setting of a configuration is dropped with a warning.
+python-can passes every option to every back end, and most ignore unknown ones; here such an option of the user is an
+error. A setting of a configuration that the back end does not have is ignored.
 """
 
 from __future__ import annotations
 
-import contextlib
 import difflib
 import inspect
 import os
@@ -22,25 +21,23 @@ SHARED: Final = ("virtual", "udp_multicast")
 """Interfaces without bit rate and wire, which any number of programs share."""
 SERIAL_PORTS: Final = ("slcan", "serial", "robotell", "seeedstudio")
 """Interfaces whose channel is a serial port."""
-TIMING: Final = ("f_clock", "brp", "tseg1", "tseg2", "sjw", "nof_samples")
-"""The bit timing of python-can: controller clock (Hz), prescaler, two segments, jump width, samples."""
 EXAMPLES: Final = "can://slcan/dev/ttyACM0, can://socketcan/can0, can://socketcand/localhost/can0"
 TEXT_OPTIONS: Final = {"slcan": {"tty_baudrate", "timing"}, "socketcand": {"host", "port"}}
 """Options of the interfaces that go over our own links."""
-_LINK_OPTIONS: Final = ("bitrate", "config_context", "listen_only")
-_RESERVED: Final = {"self", "channel", "args", "kwargs", "timing", "bitrate", "timeout", "listen_only"}
-"""Constructor parameters that are no options: the link sets them."""
+_TIMING: Final = ("f_clock", "brp", "tseg1", "tseg2", "sjw", "nof_samples")
+"""The bit timing of python-can: controller clock (Hz), prescaler, two segments, jump width, samples."""
+_LINK_OPTIONS: Final = {"bitrate", "config_context", "listen_only"}
+_SET_HERE: Final = {"self", "channel", "args", "kwargs", "bitrate", "timeout", "listen_only"}
+"""Constructor parameters that are no options."""
 _WORDS: Final[Mapping[str, object]] = {"yes": True, "no": False, "on": True, "off": False}
 
 
 class CanOptions(NamedTuple):
     """A CAN channel to open.
 
-    `rate`         bit/s from the user or a configuration; 0 when not given
-    `settings`     constructor arguments of the back end besides channel and bit rate
-    `sets_rate`    the back end sets the bit rate
-    `timing_rate`  bit/s of an explicit bit timing in `settings`; else 0
-    `warnings`     settings that were dropped
+    `rate`      bit/s from the user, a configuration or a bit timing; 0 when not given
+    `settings`  constructor arguments of the back end besides channel and bit rate
+    `back_end`  the class of python-can; None for a text protocol, or when its driver is missing
     """
 
     name: str
@@ -49,9 +46,12 @@ class CanOptions(NamedTuple):
     rate: int
     listen_only: bool
     settings: dict[str, Any]
-    sets_rate: bool
-    timing_rate: int = 0
-    warnings: tuple[str, ...] = ()
+    back_end: Any
+
+    @property
+    def sets_rate(self) -> bool:
+        """Whether the program that opens the channel sets its bit rate."""
+        return self.interface not in (*SHARED, "socketcan", "socketcand", "serial")
 
     @property
     def no_wire(self) -> bool:
@@ -109,82 +109,46 @@ def read_options(can: Any, port: str, rate: int, options: Mapping[str, object]) 
     """All settings of this port; `can` is python-can. Raises RequestError."""
     interface, address = parse_port(port)
     user = _with_switches(options)
-    context = user.pop("config_context", None)
     given = {**user, **address, **({"interface": interface} if interface else {})}
-    merged = _load(can, port, given, None if context is None else str(context))
+    merged = _with_switches(_load(can, port, given, user.get("config_context")))
     interface, channel = merged.pop("interface"), merged.pop("channel")
     if interface in SERIAL_PORTS and not channel:
         raise RequestError(
             f"{port}: the serial port of the adapter is missing",
             expected=f"can://{interface}/dev/ttyACM0, or channel in python-can's configuration",
         )
-    merged = _with_switches(merged)
-    taken = TEXT_OPTIONS.get(interface)
-    if taken is None:
-        with contextlib.suppress(
-            can.CanInterfaceNotImplementedError
-        ):  # its driver is missing: opening it says so
-            taken = parameters(can.interface._get_class_for_interface(interface))
-    names = None if taken is None else taken - _RESERVED
-    has_timing = taken is None or "timing" in taken
-    if names is not None:
-        _check_names(port, interface, user, {*names, *_LINK_OPTIONS, *(TIMING if has_timing else ())})
-    bitrate = merged.get("bitrate")
-    if bitrate is not None and not (isinstance(bitrate, int) and bitrate > 0):
+    bitrate = merged.get("bitrate", 0)
+    listen_only = merged.get("listen_only", False)
+    if not isinstance(bitrate, int) or bitrate < 0:
         raise RequestError(f"python-can's configuration says bitrate={bitrate}", expected="a rate in bit/s")
-    listen_only = merged.pop("listen_only", False)
     if listen_only not in (True, False):
         raise RequestError(f"listen_only={listen_only}: neither yes nor no", expected="yes or no")
-    found = CanOptions(
-        name=port,
-        interface=interface,
-        channel=channel,
-        rate=rate or bitrate or 0,
-        listen_only=bool(listen_only),
-        settings={name: value for name, value in merged.items() if names is None or name in names},
-        sets_rate=taken is None or "bitrate" in taken or interface == "slcan",
-        warnings=tuple(
-            f"python-can's configuration says {name}={value}, which {interface} does not have: ignored"
-            for name, value in merged.items()
-            if names is not None and name not in {*names, *given, *TIMING, "timing", "bitrate"}
-        ),
-    )
-    return _with_timing(found, merged, user) if has_timing else found
+    back_end, names = None, TEXT_OPTIONS.get(interface)
+    if names is None:
+        try:
+            back_end = can.interface._get_class_for_interface(interface)
+        except can.CanInterfaceNotImplementedError:  # opening it says that the driver is missing
+            names = {*merged}
+        else:
+            names = parameters(back_end) - _SET_HERE
+    settings = {name: value for name, value in merged.items() if name in names}
+    _check_options(port, interface, user, settings, names)
+    timing_rate = getattr(settings.get("timing"), "bitrate", 0)
+    rate = rate or bitrate or timing_rate
+    return CanOptions(port, interface, channel, rate, bool(listen_only), settings, back_end)
 
 
-def _with_timing(options: CanOptions, merged: dict[str, Any], user: Collection[str]) -> CanOptions:
-    """Add the bit timing that python-can has made of its six parts. Raises RequestError for an incomplete one."""
-    timing = merged.get("timing")
-    if timing is not None:
-        settings = {**options.settings, "timing": timing}
-        return options._replace(settings=settings, timing_rate=int(getattr(timing, "bitrate", 0)))
-    unused = [name for name in TIMING if name in merged and name not in options.settings]
-    if not unused:
-        return options
-    parts = ", ".join(f"{name}={merged[name]}" for name in unused)
-    if any(name in user for name in unused):
-        raise RequestError(
-            f"{options.name}: this bit timing is not complete, or impossible",
-            sent=parts,
-            expected=f"all of {', '.join(TIMING)}",
-        )
-    warning = f"python-can's configuration says {parts}, which is no whole bit timing: ignored"
-    return options._replace(warnings=(*options.warnings, warning))
-
-
-def _load(can: Any, port: str, given: dict[str, Any], context: str | None) -> dict[str, Any]:
+def _load(can: Any, port: str, given: dict[str, Any], context: object) -> dict[str, Any]:
     """The given settings on top of python-can's configuration. Raises RequestError."""
     try:
-        return dict(can.util.load_config(config=given, context=context))
+        return dict(can.util.load_config(config=given, context=None if context is None else str(context)))
     except can.CanInterfaceNotImplementedError:
         interface = str(given.get("interface", ""))
         known = sorted(can.VALID_INTERFACES)
-        if interface:
-            summary = f"{port!r}: python-can has no interface {interface!r}"
-            advice = _nearest(interface, known) or f"for example {EXAMPLES}"
-        else:
-            summary = f"{port!r} says no interface, and python-can's configuration names none that exists"
-            advice = f"write can://INTERFACE/CHANNEL, as {EXAMPLES}, or set CAN_INTERFACE and CAN_CHANNEL"
+        summary = f"{port!r}: python-can has no interface {interface!r}"
+        if not interface:
+            summary = f"{port!r} names no interface, nor does python-can's configuration"
+        advice = _nearest(interface, known) or f"for example {EXAMPLES}"
         raise RequestError(summary, expected=f"one of {', '.join(known)}", advice=advice) from None
     except Exception as error:  # its readers of INI and JSON raise many types
         raise RequestError(
@@ -193,13 +157,22 @@ def _load(can: Any, port: str, given: dict[str, Any], context: str | None) -> di
         ) from error
 
 
-def _check_names(port: str, interface: str, options: Collection[str], known: Collection[str]) -> None:
-    for name in options:
+def _check_options(
+    port: str, interface: str, user: Collection[str], settings: Collection[str], names: Collection[str]
+) -> None:
+    """Raise RequestError for an option that the interface does not have, or part of a bit timing."""
+    known = {*names, *_LINK_OPTIONS, *(_TIMING if "timing" in names else ())} - {"timing"}
+    for name in user:
         if name not in known:
             raise RequestError(
                 f"{port}: {interface} has no option {name!r}",
                 expected=f"one of {', '.join(sorted(known))}",
                 advice=_nearest(name, known),
+            )
+        if name in _TIMING and name not in names and "timing" not in settings:
+            raise RequestError(
+                f"{port}: this bit timing is not complete, or impossible",
+                expected=f"all of {', '.join(_TIMING)}",
             )
 
 
