@@ -11,7 +11,7 @@ import serialx
 from motorbus.errors import PortBusy, PortNotFound
 from motorbus.link.lock import holders
 from motorbus.link.serial import SerialLink, ports
-from motorbus.link.wait import wait_readable
+from motorbus.link.stream import wait_any
 from motorbus.simulation.pty import PtyMaster
 from tests.links.other import other_process, run
 from tests.links.usb import usb_port
@@ -43,7 +43,7 @@ def received(master: PtyMaster, count: int) -> bytes:
     """That many bytes at the simulator's end."""
     text = b""
     while len(text) < count:
-        assert wait_readable(master.fileno(), 30)
+        assert wait_any((master.fileno(),), 30)
         text += master.read()
     return text
 
@@ -100,7 +100,7 @@ def test_other_files_are_no_serial_ports(path: str, tmp_path: Path) -> None:
 FORBIDDEN = """
 import os, sys, tempfile
 from motorbus.errors import LinkError
-from motorbus.link import serial, usb_adapters, wait
+from motorbus.link import serial, stream, usb_adapters
 import serialx
 if os.geteuid() == 0:
     os.setgroups([])

@@ -12,8 +12,8 @@ import pytest
 
 from motorbus.errors import LinkError, LinkLost, PortBusy
 from motorbus.link.base import Link
+from motorbus.link.stream import wait_any
 from motorbus.link.url import open_link
-from motorbus.link.wait import wait_readable
 from motorbus.simulation.pty import PtyMaster
 
 ALL_BYTES = bytes(range(256))
@@ -55,7 +55,7 @@ def test_bytes_pass_both_ways_in_order(pair: tuple[Link, Far]) -> None:
         link.write(ALL_BYTES[start : start + 16])
     received = b""
     while len(received) < 256:
-        assert wait_readable(far.descriptor, 30)
+        assert wait_any((far.descriptor,), 30)
         received += far.receive()
     assert received == ALL_BYTES
     far.send(ALL_BYTES)
@@ -91,7 +91,7 @@ def test_the_other_end_closes_during_a_read(pair: tuple[Link, Far]) -> None:
 def test_bytes_before_the_end_are_read_first(pair: tuple[Link, Far]) -> None:
     link, far = pair
     far.send(b"last words")
-    assert wait_readable(link.fileno() or 0, 30)
+    assert wait_any((link.fileno() or 0,), 30)
     assert link.read(soon(link)) == [b"last words"]
     far.close()
     with pytest.raises(LinkLost):

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from motorbus.errors import LinkError, RequestError
-from motorbus.link.wait import wait_readable
+from motorbus.link.stream import wait_any
 from motorbus.simulation.pty import PtyMaster
 from tests.links.other import run
 
@@ -37,7 +37,7 @@ def test_every_byte_passes_both_ways(master: PtyMaster) -> None:
     assert master.write(ALL_BYTES) == 256
     assert os.read(descriptor, 1000) == ALL_BYTES
     os.write(descriptor, ALL_BYTES)
-    assert wait_readable(master.fileno(), 10)
+    assert wait_any((master.fileno(),), 10)
     assert master.read() == ALL_BYTES
     os.close(descriptor)
 
@@ -51,7 +51,7 @@ def test_a_client_may_come_and_go(master: PtyMaster) -> None:
         descriptor = client(master.slave_name)
         os.write(descriptor, bytes([number]))
         os.close(descriptor)
-        assert wait_readable(master.fileno(), 10)
+        assert wait_any((master.fileno(),), 10)
         assert master.read() == bytes([number])
     assert master.read() == b""
 

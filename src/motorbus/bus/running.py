@@ -13,7 +13,7 @@ from motorbus.bus.interrupts import interrupts
 from motorbus.bus.jobs import Since
 from motorbus.bus.tasks import Notify, TaskTree
 from motorbus.core.operation import Runnable
-from motorbus.link.wait import wait_any
+from motorbus.link.stream import wait_any
 
 T = TypeVar("T")
 

@@ -19,6 +19,7 @@ from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, TypeAlias
 
+from motorbus.core.operation import Data
 from motorbus.errors import LinkError, PortNotFound, RequestError
 from motorbus.link import usb_adapters
 from motorbus.link.errors import busy, lost, no_permission, not_a_port, not_found, unsupported_rate
@@ -27,7 +28,6 @@ from motorbus.link.port_users import find_user
 from motorbus.link.stream import CHUNK, StreamLink
 from motorbus.link.tcp import CONNECT_TIME, TcpLink, send_at_once, split_address
 from motorbus.link.usb_adapters import PortInfo
-from motorbus.link.wait import Readiness
 
 if TYPE_CHECKING:
     from serialx import BaseSerial, SerialPortInfo
@@ -100,12 +100,7 @@ class SerialLink(StreamLink):
         try:
             descriptor = self._serial.fileno()
             os.set_blocking(descriptor, False)
-            self._attach(
-                descriptor,
-                partial(os.read, descriptor),
-                partial(os.write, descriptor),
-                Readiness(descriptor).wait,
-            )
+            self.attach(descriptor, partial(os.read, descriptor), partial(os.write, descriptor))
             if self.paced:  # a pseudo-terminal would keep the mark while its simulator has it open
                 _set_exclusive(descriptor, True)
             _check_rate(self.name, descriptor, self.rate)
@@ -126,7 +121,7 @@ class SerialLink(StreamLink):
         if serial is not None:
             if self.paced:
                 _set_exclusive(serial.fileno(), False)
-            self._detach()
+            self.detach()
             with contextlib.suppress(OSError):
                 serial.close()
         self.lock.release()
@@ -152,48 +147,33 @@ class PolledLink(StreamLink):
         self.latency = REMOTE_LATENCY if remote else usb_adapters.WINDOWS_LATENCY
         self._failure = serialx.SerialException
         self._access = Lock()
-        self._arrived = b""
         with opening(port, lock) as self.lock:
             self._serial = _open_serial(port, port, rate, connect_time)
         connection = getattr(self._serial, "_socket", None)
         if connection is not None:
             send_at_once(connection)
-        self._attach(None, self._take, self._put, self._poll)
 
-    def _poll(self, until: float) -> bool:
-        while not self._arrived:
-            self._fill()
-            pause = until - time.monotonic()
-            if self._arrived or pause <= 0.0:
-                break
-            time.sleep(min(POLL_TIME, pause))
-        return bool(self._arrived)
-
-    def _fill(self) -> None:
+    def read(self, until: float) -> list[Data]:
         buffer = bytearray(CHUNK)
-        with self._access:
-            try:
-                self._arrived += buffer[: self._serial.readinto(buffer, timeout=0)]
-            except self._failure as error:
-                raise OSError(str(error)) from error
+        while True:
+            with self._access:
+                try:
+                    count = self._serial.readinto(buffer, timeout=0)
+                except (OSError, self._failure) as error:
+                    raise lost(self.name, error) from error
+            pause = until - time.monotonic()
+            if count or pause <= 0.0:
+                return [bytes(buffer[:count])] if count else []
+            time.sleep(min(POLL_TIME, pause))
 
-    def _take(self, size: int) -> bytes:
-        if not self._arrived:
-            self._fill()
-        with self._access:
-            data, self._arrived = self._arrived, b""
-        if not data:
-            raise BlockingIOError
-        return data
-
-    def _put(self, data: bytes) -> int:
+    def send(self, data: bytes) -> int:
         with self._access:
             try:
                 self._serial.write(data, timeout=0)
             except TimeoutError:
                 return 0
-            except self._failure as error:
-                raise OSError(str(error)) from error
+            except (OSError, self._failure) as error:
+                raise lost(self.name, error) from error
         return len(data)
 
     def tune(self, rate: int, listen_only: bool = False) -> None:
@@ -203,7 +183,6 @@ class PolledLink(StreamLink):
 
     def close(self) -> None:
         with self._access, contextlib.suppress(OSError):
-            self._detach()
             self._serial.close()
         self.lock.release()
 

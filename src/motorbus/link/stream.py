@@ -1,9 +1,10 @@
-"""What serial ports and TCP connections share: bytes through a port that does not block."""
+"""Byte streams: what serial ports and TCP connections share, and waiting for their descriptors."""
 
 from __future__ import annotations
 
 import errno
-from collections.abc import Callable
+import select
+from collections.abc import Callable, Sequence
 from time import monotonic
 from typing import Any
 
@@ -12,10 +13,12 @@ from motorbus.link.errors import full, lost
 from motorbus.link.lock import PortLock
 
 CHUNK = 4096
+SELECT_LIMIT = 1024  # FD_SETSIZE: select knows lower descriptors only
+LONGEST = 86_400.0  # s; some systems refuse longer waits
 
 
 class StreamLink:
-    """A link of bytes. `lock` is the lock of the port, released at `close`."""
+    """A link of bytes through a descriptor that does not block. `lock` is released at `close`."""
 
     name: str
     rate: int
@@ -25,27 +28,26 @@ class StreamLink:
     virtual = False
     simulated = False
     warnings: tuple[str, ...] = ()
-    _descriptor: int | None = None
+    _descriptor = -1
     _idle_at = 0.0
     """Moment (s) at which the last byte has left, at this rate."""
 
-    def _attach(
-        self,
-        descriptor: int | None,
-        receive: Callable[[int], bytes],
-        send: Callable[[bytes], int],
-        wait: Callable[[float], bool],
-    ) -> None:
-        """Use these functions of an open port, and its descriptor where it has one."""
+    def attach(self, descriptor: int, receive: Callable[[int], bytes], send: Callable[[bytes], int]) -> None:
+        """Use this open descriptor. It is registered once, so that a wait is one call of `poll`."""
         self._descriptor = descriptor
         self._receive = receive
         self._send = send
-        self._wait = wait
+        if hasattr(select, "poll"):
+            registered = select.poll()
+            registered.register(descriptor, select.POLLIN)
+            self._poll: Callable[[int], Any] = registered.poll
+        else:  # Windows
+            self._poll = lambda milliseconds: wait_any((descriptor,), milliseconds / 1000)
 
-    def _detach(self) -> None:
+    def detach(self) -> None:
         """Use no descriptor: its number may soon belong to another file."""
-        self._descriptor = None
-        self._receive = self._send = self._wait = _closed
+        self._descriptor = -1
+        self._receive = self._send = self._poll = _raise_closed
 
     def now(self) -> float:
         return monotonic()
@@ -66,32 +68,44 @@ class StreamLink:
             raise full(self.name, written, len(data))
         self._idle_at = max(self._idle_at, monotonic()) + 10 * written / self.rate
 
-    def wait(self, until: float) -> bool:
-        """Wait for data or the end of the stream until this moment (s); False when none came. Raises LinkLost."""
+    def read(self, until: float) -> list[Data]:
+        pause = until - monotonic()
         try:
-            return self._wait(until)
-        except (OSError, ValueError) as error:  # another thread has closed it
-            raise lost(self.name, error) from error
-
-    def receive(self) -> bytes:
-        """The bytes that have arrived, without waiting. Raises LinkLost."""
-        try:
+            ready = self._poll(int(min(pause, LONGEST) * 1000) if pause > 0.0 else 0)
+            if not ready and pause > 0.0:  # poll counts whole milliseconds; this waits for the rest
+                ready = wait_any((self._descriptor,), until - monotonic())
+            if not ready:
+                return []
             data = self._receive(CHUNK)
-        except BlockingIOError:
-            return b""
-        except OSError as error:
+        except (BlockingIOError, RuntimeError):  # another thread reads, and gets what comes
+            return []
+        except (OSError, ValueError) as error:
             raise lost(self.name, error) from error
         if not data:
             raise lost(self.name, "the other end hung up")
-        return data
-
-    def read(self, until: float) -> list[Data]:
-        data = self.receive() if self.wait(until) else b""
-        return [data] if data else []
+        return [data]
 
     def fileno(self) -> int | None:
-        return self._descriptor
+        """The descriptor; None when there is none, or it is closed."""
+        return self._descriptor if self._descriptor >= 0 else None
 
 
-def _closed(_: object) -> Any:
+def _raise_closed(_: object) -> Any:
     raise OSError(errno.EBADF, "it is closed")
+
+
+def wait_any(descriptors: Sequence[int], seconds: float) -> list[int]:
+    """Wait for data, or the end of a stream, and return all readable descriptors; none after the time-out.
+
+    Raises OSError or ValueError for a closed descriptor.
+    """
+    seconds = min(max(seconds, 0.0), LONGEST)
+    if max(descriptors) < SELECT_LIMIT:
+        return select.select(descriptors, (), (), seconds)[0]
+    ready = select.poll()
+    for descriptor in descriptors:
+        ready.register(descriptor, select.POLLIN)
+    events = ready.poll(seconds * 1000)
+    if any(event & select.POLLNVAL for _, event in events):
+        raise ValueError("a descriptor is closed")
+    return [descriptor for descriptor, _ in events]

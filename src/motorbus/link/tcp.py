@@ -13,7 +13,6 @@ from urllib.parse import urlsplit
 from motorbus.errors import LinkError, PortNotFound, RequestError
 from motorbus.link.lock import PortLock, opening
 from motorbus.link.stream import StreamLink
-from motorbus.link.wait import Readiness
 
 CONNECT_TIME = 5.0  # s; time-out for a host of the local network
 ACKNOWLEDGE_TIME: Final = 1.0  # s; the system drops a connection whose bytes are not acknowledged by then
@@ -61,8 +60,7 @@ class TcpLink(StreamLink):
         host, port = split_address(url)
         with opening(url, lock) as self.lock:
             self._socket = connection = _connect(url, host, port, connect_time)
-        descriptor = connection.fileno()
-        self._attach(descriptor, connection.recv, connection.send, Readiness(descriptor).wait)
+        self.attach(connection.fileno(), connection.recv, connection.send)
         address = ipaddress.ip_address(connection.getpeername()[0].partition("%")[0])
         self.latency = LOOPBACK_LATENCY if address.is_loopback else NETWORK_LATENCY
 
@@ -74,7 +72,7 @@ class TcpLink(StreamLink):
             )
 
     def close(self) -> None:
-        self._detach()
+        self.detach()
         self._socket.close()
         self.lock.release()
 

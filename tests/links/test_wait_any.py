@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import fcntl
 import os
-import time
 from collections.abc import Iterator
 
 import pytest
 
-from motorbus.link.wait import Readiness, wait_any
+from motorbus.link.stream import wait_any
 
 
 @pytest.fixture
@@ -23,12 +22,13 @@ def pipe() -> Iterator[tuple[int, int]]:
 def test_a_descriptor_above_the_limit_of_select(pipe: tuple[int, int]) -> None:
     high = fcntl.fcntl(pipe[0], fcntl.F_DUPFD, 1500)
     try:
-        ready = Readiness(high)
-        assert not ready.wait(time.monotonic() + 0.0005)
+        assert wait_any((high,), 0.001) == []
         os.write(pipe[1], b"x")
-        assert ready.wait(float("inf"))
+        assert wait_any((high,), float("inf")) == [high]
     finally:
         os.close(high)
+    with pytest.raises(ValueError, match="closed"):
+        wait_any((high,), 1.0)
 
 
 def test_of_several_the_readable_ones_are_returned(pipe: tuple[int, int]) -> None:
