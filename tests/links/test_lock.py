@@ -82,29 +82,6 @@ def test_holders_lists_the_living_only() -> None:
     assert holders() == []
 
 
-# -- where there is no flock ------------------------------------------------------------------------------------
-
-WITHOUT_FLOCK = """
-import os, sys
-sys.modules["fcntl"] = None
-from motorbus.errors import PortBusy
-from motorbus.link.lock import PortLock
-dead = PortLock("dead")
-dead.path.write_text('{"pid": 999999999, "program": "x", "port": "dead"}')
-with dead, PortLock("port") as held:
-    try:
-        PortLock("port").acquire()
-    except PortBusy as error:
-        print(error.owner == os.getpid() == held.owner().pid)
-print(held.owner() is None, held.path.exists())
-PortLock("port").acquire()
-"""
-
-
-def test_without_flock_the_file_is_the_lock() -> None:
-    assert run(WITHOUT_FLOCK).split() == ["True", "True", "False"]
-
-
 FORK = """
 import os
 from motorbus.link.lock import PortLock

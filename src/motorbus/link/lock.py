@@ -1,7 +1,7 @@
 """One owner per port: a lock file that names the process which holds the port.
 
 Two programs on one half-duplex line destroy each other's frames. The operating system releases the lock of a process
-that died, so a lock is never stale. Beside the lock lie the socket for an emergency stop from other processes, and the
+that died, so a lock is never stale. Beside the lock are the socket for an emergency stop from other processes, and the
 journal of the bus.
 """
 
@@ -12,7 +12,6 @@ import hashlib
 import json
 import os
 import re
-import stat
 import sys
 import tempfile
 import time
@@ -26,7 +25,7 @@ from motorbus.link.errors import Owner, busy
 SOCKET_LIMIT = 107  # bytes of a path in struct sockaddr_un of Linux, without the terminating zero
 JOURNAL = ".journal"
 SIMULATED = ".simulated"
-TRIES = 50  # of 1 ms: a process that looks up the owner may hold the file for a moment
+TRIES = 20  # of 1 ms: a process that looks up the owner holds the file for a moment
 
 
 def state_folder() -> Path:
@@ -34,21 +33,24 @@ def state_folder() -> Path:
 
     It is `motorbus` in $XDG_STATE_HOME, in ~/.local/state, or in the local application data of Windows.
     """
+    if os.name == "nt":
+        home = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    else:
+        home = Path(os.environ.get("XDG_STATE_HOME", ""))
+        if not home.is_absolute():  # the XDG specification: a relative path is ignored
+            home = Path("~/.local/state").expanduser()
+    return _make_private(home / "motorbus")
+
+
+def _make_private(folder: Path) -> Path:
+    """Make this folder with mode 0700. Raises LinkError, also when it belongs to another user."""
     try:
-        if os.name == "nt":
-            home = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-        else:
-            home = Path(os.environ.get("XDG_STATE_HOME", ""))
-            if not home.is_absolute():  # the XDG specification: a relative path is ignored
-                home = Path.home() / ".local" / "state"
-        folder = home / "motorbus"
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if stat.S_IMODE(folder.stat().st_mode) & 0o077:
-            folder.chmod(0o700)
-    except (OSError, RuntimeError) as error:
+        folder.chmod(0o700)
+    except OSError as error:
         raise LinkError(
             f"no folder for the locks of ports: {error}",
-            advice="set XDG_STATE_HOME to a folder that you may write to",
+            advice="set XDG_STATE_HOME to a folder with a short path that you may write to",
         ) from error
     return folder
 
@@ -77,14 +79,7 @@ def socket_path(port: str) -> Path:
     if len(os.fsencode(path)) <= SOCKET_LIMIT:
         return path
     user = os.getuid() if hasattr(os, "getuid") else 0
-    folder = Path(tempfile.gettempdir()) / f"motorbus-{user}"
-    folder.mkdir(mode=0o700, exist_ok=True)
-    status = folder.lstat()
-    if not stat.S_ISDIR(status.st_mode) or (status.st_uid, stat.S_IMODE(status.st_mode)) != (user, 0o700):
-        raise LinkError(
-            f"{folder}: it belongs to another user, or others may enter it",
-            advice="set XDG_STATE_HOME to a shorter path",
-        )
+    folder = _make_private(Path(tempfile.gettempdir()) / f"motorbus-{user}")
     return folder / f"{hashlib.sha256(os.fsencode(path)).hexdigest()[:16]}.sock"
 
 
@@ -117,11 +112,8 @@ class PortLock:
                 os.ftruncate(self._descriptor, 0)
                 os.write(self._descriptor, json.dumps(owner._asdict()).encode())
                 return self
-            holder = _written_owner(self.path)
-            if holder is not None and is_alive(holder.pid):
-                raise busy(self.port, holder)
             time.sleep(0.001)
-        raise busy(self.port, None)
+        raise busy(self.port, _written_owner(self.path))
 
     def release(self) -> None:
         """Give the lock back, if it is held. In a forked child the file stays, for the parent."""
@@ -141,17 +133,9 @@ class PortLock:
         """Whether this object holds the lock."""
         return self._descriptor is not None
 
-    def covers(self, path: Path) -> bool:
-        """Whether a link may open the port of this lock file under this lock."""
-        return self.held and path == self.path
-
-    def borrow(self) -> PortLock:
-        """A lock for a link that opens the port under this lock; its release does nothing."""
-        return _BorrowedLock(self.port)
-
     def owner(self) -> Owner | None:
         """The process that holds the port now."""
-        return _owner(self.path)
+        return _written_owner(self.path) if _is_locked(self.path) else None
 
     def __enter__(self) -> Self:
         return self.acquire()
@@ -160,19 +144,15 @@ class PortLock:
         self.release()
 
 
-class _BorrowedLock(PortLock):
-    def acquire(self) -> Self:
-        return self
-
-    def covers(self, path: Path) -> bool:
-        return path == self.path
-
-
 @contextlib.contextmanager
 def opening(port: str, held: PortLock | None = None) -> Iterator[PortLock]:
-    """Lock this port, or borrow `held` if that is its lock; release it when the block raises. Raises PortBusy."""
+    """Lock this port, unless the caller holds its lock already; release it when the block raises. Raises PortBusy.
+
+    The lock of the block is not acquired when `held` is that of this port; its release does nothing.
+    """
     lock = PortLock(port)
-    lock = held.borrow() if held is not None and held.covers(lock.path) else lock.acquire()
+    if held is None or held.path != lock.path:
+        lock.acquire()
     try:
         yield lock
     except BaseException:
@@ -196,16 +176,19 @@ def is_simulated(port: str) -> bool:
 
 def holders() -> list[Owner]:
     """The owner of every port that a running motorbus process of this user holds."""
-    owners = (_owner(path) for path in sorted(state_folder().glob("*.lock")))
-    return [owner for owner in owners if owner is not None]
+    locked = (path for path in sorted(state_folder().glob("*.lock")) if _is_locked(path))
+    return [owner for path in locked if (owner := _written_owner(path)) is not None]
 
 
 def _open_locked(path: Path) -> int | None:
-    """The descriptor of this file with our lock on it, or None."""
-    try:
-        import fcntl
-    except ImportError:
-        return _create(path)
+    """The descriptor of this file with our lock on it; None while another process has the lock."""
+    if os.name == "nt":  # the open file is the lock: Windows does not remove it
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
+            return os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL)
+        return None
+    import fcntl
+
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -217,16 +200,20 @@ def _open_locked(path: Path) -> int | None:
     return None
 
 
-def _create(path: Path) -> int | None:
-    """Where there is no flock, the file itself is the lock."""
-    owner = _written_owner(path)
-    if os.name == "nt" or (owner is not None and not is_alive(owner.pid)):
-        with contextlib.suppress(OSError):  # Windows does not remove an open file
-            path.unlink(missing_ok=True)
+def _is_locked(path: Path) -> bool:
+    """Whether a process holds the lock; a file alone may be left over."""
+    if os.name == "nt":
+        return path.exists()
+    import fcntl
+
     try:
-        return os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
-    except FileExistsError:
-        return None
+        with path.open() as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        pass
+    return False
 
 
 def _written_owner(path: Path) -> Owner | None:
@@ -236,43 +223,6 @@ def _written_owner(path: Path) -> Owner | None:
         return Owner(int(about["pid"]), str(about["program"]), str(about["port"]))
     except (OSError, ValueError, KeyError, TypeError):
         return None
-
-
-def _owner(path: Path) -> Owner | None:
-    owner = _written_owner(path)
-    return owner if owner is not None and is_alive(owner.pid) and _is_locked(path) else None
-
-
-def _is_locked(path: Path) -> bool:
-    """Whether a process holds the lock; a file alone may be left over."""
-    try:
-        import fcntl
-    except ImportError:
-        return path.exists()
-    try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
-    except OSError:
-        return False
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    finally:
-        os.close(descriptor)
-    return False
-
-
-def is_alive(pid: int) -> bool:
-    """Whether a process with this id exists. Always True on Windows, where the question would end the process."""
-    if os.name == "nt":
-        return True
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except (PermissionError, OverflowError):
-        return True
-    return True
 
 
 def program_name() -> str:

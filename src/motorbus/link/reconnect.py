@@ -14,7 +14,6 @@ import os
 import re
 import time
 from collections.abc import Callable, Iterable, Mapping
-from functools import partial
 from pathlib import Path
 from threading import Lock
 from typing import Any, Final, NamedTuple
@@ -24,14 +23,13 @@ from motorbus.errors import AnotherAdapter, LinkLost, MotorbusError, PortNotFoun
 from motorbus.link import usb_adapters
 from motorbus.link.base import Link
 from motorbus.link.errors import lost
-from motorbus.link.lock import PortLock
+from motorbus.link.lock import PortLock, real_name
 from motorbus.link.serial import list_ports
 from motorbus.link.url import open_link
 
 FIRST_RETRY: Final = 0.05  # s after the first failure; then twice as long each time
 LAST_RETRY: Final = 0.5  # s at most
 CONNECT_TIME: Final = 0.1  # s for a host of the network: the caller has other work
-MOST_LINKS: Final = 16  # symbolic links in a row
 RETRY_ADVICE: Final = (
     "it is looked for again whenever something is asked for; nothing of before is sent again"
 )
@@ -56,32 +54,31 @@ class Identity(NamedTuple):
 
 def identities(lister: Lister, sysfs: Path = Path("/sys")) -> list[Identity]:
     """The identity of every serial port that the system lists."""
-    return [_identity(port, sysfs) for port in lister()]
-
-
-def _identity(port: Any, sysfs: Path) -> Identity:
-    device: str = port.resolved_device
-    if port.vid is None:
-        return Identity((device,), "", device, f"the port {device}")
-    place = usb_socket(device, sysfs)
-    adapter = f"the adapter {port.vid:04x}:{port.pid or 0:04x}"
-    kind = port.vid, port.pid, port.interface_num, port.port_number  # one adapter may have several ports
-    if port.serial_number:
-        text = f"{adapter} with the serial number {port.serial_number}"
-        return Identity((*kind, port.serial_number), place, device, text)
-    text = f"{adapter} at the USB place {place}" if place else f"{adapter} at {device}"
-    return Identity((*kind, "", place or device), place, device, text)
-
-
-def usb_socket(device: str, sysfs: Path = Path("/sys")) -> str:
-    """The USB socket of the adapter of this device; "" when unknown."""
-    parts = Path(os.path.realpath(sysfs / "class" / "tty" / Path(device).name / "device")).parts
-    return next((part for part in reversed(parts) if _USB_SOCKET.fullmatch(part)), "")
+    found = []
+    for port in lister():
+        device = port.resolved_device
+        if port.vid is None:
+            found.append(Identity((device,), "", device, f"the port {device}"))
+            continue
+        parts = Path(os.path.realpath(sysfs / "class" / "tty" / Path(device).name / "device")).parts
+        place = next((part for part in reversed(parts) if _USB_SOCKET.fullmatch(part)), "")
+        mark = f"with the serial number {port.serial_number}"
+        if not port.serial_number:
+            mark = f"at the USB place {place}" if place else f"at {device}"
+        key = (
+            port.vid,
+            port.pid,
+            port.interface_num,
+            port.port_number,
+            mark,
+        )  # an adapter may have several ports
+        found.append(Identity(key, place, device, f"the adapter {port.vid:04x}:{port.pid or 0:04x} {mark}"))
+    return found
 
 
 def identify(device: str, lister: Lister, sysfs: Path = Path("/sys")) -> Identity:
     """The identity of a port that is present; `device` is a path without symbolic links."""
-    found = (one for one in identities(lister, sysfs) if _same_name(one.device, device))
+    found = (one for one in identities(lister, sysfs) if real_name(one.device) == real_name(device))
     return next(found, Identity((device,), "", device, f"the port {device}"))
 
 
@@ -104,16 +101,31 @@ def find_adapter(name: str, wanted: Identity, lister: Lister, sysfs: Path = Path
             )
     if same:
         return same[0].device
-    other = next((one for one in present if _same_name(one.device, wanted.device)), None)
-    if other is not None:
-        raise another_adapter(name, wanted.text, other.text)
+    for other in present:
+        if real_name(other.device) == real_name(wanted.device):
+            raise _another_adapter(name, wanted.text, other.text)
     if wanted.key == (wanted.device,) and os.path.exists(wanted.device):  # the system does not list it
         return wanted.device
     raise PortNotFound(f"{name}: {wanted.text} is not there")
 
 
-def another_adapter(name: str, wanted: str, present: str) -> AnotherAdapter:
-    """Another adapter has the name of the lost port."""
+def find_terminal(name: str, device: str) -> str:
+    """The address `name` of a pseudo-terminal, when the symbolic link `device` leads to one for which it was made.
+
+    A link that is older than its terminal was left over from a simulator that was killed. Raises PortNotFound or
+    AnotherAdapter.
+    """
+    real = os.path.realpath(device)
+    if not os.path.exists(real):
+        raise PortNotFound(f"{device} leads nowhere")
+    if not real.startswith(usb_adapters.PSEUDO_TERMINALS):
+        raise _another_adapter(device, f"a pseudo-terminal, behind {device}", real)
+    if os.lstat(device).st_ctime_ns < os.stat(real).st_ctime_ns:
+        raise PortNotFound(f"{device} has not been made again")
+    return name
+
+
+def _another_adapter(name: str, wanted: str, present: str) -> AnotherAdapter:
     return AnotherAdapter(
         f"{name} is gone, and there is another in its place: {present}",
         expected=wanted,
@@ -122,30 +134,25 @@ def another_adapter(name: str, wanted: str, present: str) -> AnotherAdapter:
     )
 
 
-def _same_name(one: str, other: str) -> bool:
-    return one.upper() == other.upper() if os.name == "nt" else one == other
-
-
-Reopen = Callable[[int, bool, PortLock], Link]
-"""Opens a port again: rate (bit/s), listen-only, and the lock that is kept for it.
-
-It raises PortNotFound while the port is absent, LinkLost for another adapter, or what opening raises.
-"""
+Open = Callable[[str, int, bool, PortLock], Link]
+"""Opens a port: address, rate (bit/s), listen-only, and the lock that is kept for it."""
 
 
 class Reconnecting:
-    """A link that is reopened after a loss. `link` holds its lock; see `reconnecting`.
+    """A link that is reopened after a loss; see `reconnecting`. It keeps the lock of `link`.
 
+    `find` returns the present address. It raises PortNotFound while the port is absent, LinkLost for another adapter.
     `on_rename` is called with the new name of the lock, and with "" when another adapter has the name of the port.
     """
 
     virtual = False
     simulated = False
 
-    def __init__(self, link: Any, reopen: Reopen) -> None:
+    def __init__(self, link: Any, find: Callable[[], str], reopen: Open) -> None:
         self.name: str = link.name
         self.paced: bool = link.paced
         self.on_rename: Callable[[str], object] = str
+        self._find = find
         self._reopen = reopen
         self._access = Lock()
         self._closed = False
@@ -153,12 +160,14 @@ class Reconnecting:
         self._pause = 0.0
         self._retry_at = 0.0
         self._error: BaseException | None = None
-        self._lock: PortLock = link.lock
-        link.lock = self._lock.borrow()
         self._use(link)
 
     def _use(self, link: Any) -> None:
         """Use this link from now on; its methods become our attributes, which costs no extra call."""
+        if link.lock.held:
+            self._lock: PortLock = link.lock
+            link.lock = PortLock(link.lock.port)  # closing the link releases nothing
+        link.name = self.name
         self._link = link
         self.rate: int = link.rate
         self.warnings: tuple[str, ...] = link.warnings
@@ -217,13 +226,19 @@ class Reconnecting:
             self._link.close()
             for method in ("read", "write"):  # ours raise the reason
                 self.__dict__.pop(method, None)
+            before = self._lock
             try:
-                link: Any = self._reopen(self.rate, getattr(self._link, "listen_only", False), self._lock)
+                self._use(
+                    self._reopen(self._find(), self.rate, getattr(self._link, "listen_only", False), before)
+                )
             except (MotorbusError, OSError) as error:
                 self._fail(error)
                 raise self._loss() from error
-            self._accept(link)
+            self._error = None
             self._repaired, self._pause, self._retry_at = losses, 0.0, time.monotonic() + FIRST_RETRY
+            if self._lock is not before:
+                before.release()
+                self.on_rename(self.lock_name)
 
     def _fail(self, error: BaseException) -> None:
         self._pause = min(2 * self._pause or FIRST_RETRY, LAST_RETRY)
@@ -233,34 +248,20 @@ class Reconnecting:
             self._lock.release()
             self.on_rename("")
 
-    def _accept(self, link: Any) -> None:
-        """Use the new link, and keep its lock when the name has changed."""
-        link.name = self.name
-        self._error = None
-        renamed = link.lock.held
-        if renamed:
-            before, self._lock = self._lock, link.lock
-            link.lock = self._lock.borrow()
-            before.release()
-        self._use(link)
-        if renamed:
-            self.on_rename(self.lock_name)
-
     def rest(self, until: float) -> None:
         """See `Renewable.rest`."""
         retry = max(self._retry_at, time.monotonic() + FIRST_RETRY / 10)
         time.sleep(max(0.0, min(until, retry) - time.monotonic()))
 
     def _loss(self) -> LinkLost:
+        """The error of the lost port, with the reason why it was not reopened."""
         error = self._error
+        found = lost(self.name, getattr(error, "summary", error) or "it went away")
+        if isinstance(error, LinkLost):
+            found.summary = error.summary
         if isinstance(error, MotorbusError) and not isinstance(error, PortNotFound):
-            summary = error.summary
-            if not isinstance(error, LinkLost):
-                summary = f"{self.name} is gone: {summary}"
-            advice = f"{error.advice or 'check the other end'}; {RETRY_ADVICE}"
-            return LinkLost(summary, expected=error.expected, cause=error.cause, advice=advice)
-        found = lost(self.name, error.summary if isinstance(error, PortNotFound) else error or "it went away")
-        found.advice = f"check the other end; {RETRY_ADVICE}"
+            found.expected, found.cause, found.advice = error.expected, error.cause, error.advice
+        found.advice = f"{found.advice or 'check the other end'}; {RETRY_ADVICE}"
         return found
 
 
@@ -282,68 +283,26 @@ def reconnecting(
     if getattr(link, "lock", None) is None or not opened.lock.held:
         return link
     given = dict(options or {})
+    name, first_rate = link.name, link.rate
 
-    def open_again(port: str, new_rate: int, listen_only: bool, lock: PortLock) -> Link:
+    def reopen(port: str, new_rate: int, listen_only: bool, lock: PortLock) -> Link:
         return open_link(
             port,
             rate=rate if new_rate == first_rate else new_rate,  # a rate that was not given is not forced
             default_rate=default_rate,
             kind=kind,
             options={**given, "listen_only": listen_only} if kind == "frames" else given,
-            lock=lock,
+            lock=lock if lock.held else None,
             connect_time=CONNECT_TIME,
         )
 
-    name, first_rate = link.name, link.rate
     device: str = opened.device if kind == "frames" else "" if "://" in name else name
     if not device:
-        return Reconnecting(link, partial(open_again, name))
+        return Reconnecting(link, lambda: name, reopen)
     real = os.path.realpath(device)
     if real.startswith(usb_adapters.PSEUDO_TERMINALS):
         is_number = os.path.abspath(device) == real
-        return link if is_number else Reconnecting(link, _Terminal(device, partial(open_again, name)))
+        return link if is_number else Reconnecting(link, lambda: find_terminal(name, device), reopen)
     known = identify(real, lister, sysfs)
     port_at: Callable[[str], str] = opened.port_at if kind == "frames" else str
-
-    def adapter(new_rate: int, listen_only: bool, lock: PortLock) -> Link:
-        present = find_adapter(name, known, lister, sysfs)
-        found = open_again(port_at(present), new_rate, listen_only, lock)
-        now = identify(present, lister, sysfs)
-        if now.key != known.key:  # exchanged meanwhile
-            found.close()
-            raise another_adapter(name, known.text, now.text)
-        return found
-
-    return Reconnecting(link, adapter)
-
-
-class _Terminal:
-    """Opens a pseudo-terminal behind a symbolic link again, once the link has been made again."""
-
-    def __init__(self, device: str, open_again: Reopen) -> None:
-        self._device = device
-        self._open = open_again
-        self._links = _symbolic_links(device)
-
-    def __call__(self, rate: int, listen_only: bool, lock: PortLock) -> Link:
-        real = os.path.realpath(self._device)
-        if not os.path.exists(real):
-            raise PortNotFound(f"{self._device} leads nowhere")
-        if not real.startswith(usb_adapters.PSEUDO_TERMINALS):
-            raise another_adapter(self._device, f"a pseudo-terminal, behind {self._device}", real)
-        links = _symbolic_links(self._device)
-        if links == self._links:  # left over from a killed simulator, whose number the next terminal gets
-            raise PortNotFound(f"{self._device} has not been made again")
-        found = self._open(rate, listen_only, lock)
-        self._links = links
-        return found
-
-
-def _symbolic_links(path: str) -> list[tuple[int, int]]:
-    """The symbolic links from this path to the device: for each its inode and its time of change."""
-    found: list[tuple[int, int]] = []
-    while os.path.islink(path) and len(found) < MOST_LINKS:
-        status = os.lstat(path)
-        found.append((status.st_ino, status.st_ctime_ns))
-        path = os.path.join(os.path.dirname(path), os.readlink(path))
-    return found
+    return Reconnecting(link, lambda: port_at(find_adapter(name, known, lister, sysfs)), reopen)

@@ -111,7 +111,7 @@ class SlcanChannel(TextChannel):
     def __init__(self, options: CanOptions, connect_time: float | None) -> None:
         port, _, baud = str(options.channel).partition("@")
         rate = int(baud or options.settings.get("tty_baudrate", DEFAULT_BAUD))
-        lock = PortLock(port).borrow()  # the caller has locked it
+        lock = PortLock(port)  # the caller has locked it
         link = open_stream(port, rate=rate, lock=lock, connect_time=connect_time)
         super().__init__(options.name, link, SlcanCodec())
         self._first_reply = FIRST_REPLY + link.latency

@@ -76,7 +76,7 @@ def open_socketcand(options: CanOptions, connect_time: float | None) -> TextChan
             f"{options.name}: the server is missing", expected="can://socketcand/HOST:PORT/CHANNEL"
         )
     url = f"socket://{host}:{port}"
-    lock = PortLock(url).borrow()  # the caller has locked the channel; a server may have several
+    lock = PortLock(url)  # the caller has locked the channel; a server may have several
     link = TcpLink(url, rate=RATE, lock=lock, connect_time=connect_time or CONNECT_TIME)
     try:
         _expect(options.name, link, "< hi >", "it does not greet as a socketcand server does")
