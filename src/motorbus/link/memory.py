@@ -18,7 +18,7 @@ from motorbus.core.operation import CanFrame, Data
 from motorbus.errors import LinkError, LinkLost, RequestError
 from motorbus.link.base import Line, PerfectLine, Side
 
-BACKLOG = 1 << 20  # deliveries under way; more means that the program writes without reading
+BITS_PER_BYTE = 10  # with start and stop bits
 
 
 class VirtualClock:
@@ -55,13 +55,12 @@ def share_clock(links: Iterable[MemoryLink]) -> None:
 class MemoryLink:
     """A `Link` to a simulator, for bytes or CAN frames.
 
-    `rate`           bit/s, also of the simulator
-    `line`           the wire between them
-    `virtual`        time passes only inside `read`; False uses the monotonic clock
-    `pace`           data takes its air time and queues behind earlier data: of its direction, or for CAN frames of the
-                     bus. A simulator with `paced` does this itself
-    `bits_per_byte`  with start and stop bits
-    `start`          first moment (s) of the virtual clock
+    `rate`     bit/s, also of the simulator
+    `line`     the wire between them
+    `virtual`  time passes only inside `read`; False uses the monotonic clock
+    `pace`     data takes its air time and queues behind earlier data: of its direction, or for CAN frames of the bus.
+               A simulator with `paced` does this itself
+    `start`    first moment (s) of the virtual clock
     """
 
     latency = 0.0
@@ -77,7 +76,6 @@ class MemoryLink:
         virtual: bool = True,
         pace: bool = False,
         name: str = "memory",
-        bits_per_byte: int = 10,
         start: float = 0.0,
     ) -> None:
         self.simulator = simulator
@@ -86,7 +84,6 @@ class MemoryLink:
         self.pace = pace
         self.paced = pace or bool(getattr(simulator, "paced", False))
         self.name = name
-        self.bits_per_byte = bits_per_byte
         self.clock = VirtualClock(start)
         self._under_way: list[tuple[float, int, Side, Data]] = []
         self._arrived: list[Data] = []
@@ -106,10 +103,6 @@ class MemoryLink:
             self._check(now)
             if self.listen_only:
                 raise LinkError(f"{self.name} only listens and cannot send")
-            if len(self._under_way) >= BACKLOG:
-                raise LinkError(
-                    f"{self.name}: {BACKLOG} requests are under way and their replies are not read"
-                )
             self._send(Side.HOST, data, now)
             self._changed.notify_all()
 
@@ -138,8 +131,6 @@ class MemoryLink:
                     self.simulator.receive(data, max(at, self.now()))
             self._closed = True
             self._changed.notify_all()
-
-    # -- what tests and simulations do with it ------------------------------------------------------------------
 
     def unplug(self, at: float = -inf, seconds: float = inf) -> None:
         """Unplug the adapter now or at a later moment (s), for so many seconds. Data under way is lost.
@@ -181,19 +172,6 @@ class MemoryLink:
             end = self.clock.now + seconds
             self._happen_until(end)
             self._move_clock(end)
-
-    @property
-    def quiet(self) -> bool:
-        """Nothing is under way or unread, and the adapter is plugged in."""
-        return not (self._under_way or self._arrived) and self._gone_at == inf
-
-    def inject(self, data: Data, seconds: float = 0.0) -> None:
-        """Deliver data of a foreign sender to the host after so many seconds."""
-        with self._changed:
-            self._deliver(self.now() + seconds, Side.HOST, data)
-            self._changed.notify_all()
-
-    # -- events -------------------------------------------------------------------------------------------------
 
     def _read_virtual(self, until: float) -> list[Data]:
         clock = self.clock
@@ -255,15 +233,7 @@ class MemoryLink:
 
     def _happen(self, moment: float) -> None:
         """Process all events of this moment: devices begin to send, and data under way arrives."""
-        begun = self.simulator.advance(moment)
-        other = self._under_way[0][0] if self._under_way else inf
-        is_plain = type(self.line) is PerfectLine and not self.pace
-        if (
-            begun and is_plain and begun[-1][0] <= moment < other
-        ):  # fast path: all of it arrives now, nothing else
-            self._arrived += [data for _, data in begun]
-            return
-        for when, data in begun:
+        for when, data in self.simulator.advance(moment):
             self._send(Side.DEVICE, data, when)
         while self._under_way and self._under_way[0][0] <= moment:
             at, _, to, data = heappop(self._under_way)
@@ -273,16 +243,13 @@ class MemoryLink:
                 self.simulator.receive(data, at)
 
     def _send(self, sender: Side, data: Data, at: float) -> None:
+        """Put data on the wire at this moment (s), or when the wire is free."""
         if self.pace:
-            wire = Side.HOST if isinstance(data, CanFrame) else sender  # CAN has one wire for both directions
-            at = self._free[wire] = max(at, self._free[wire]) + self._air_time(data)
-        for delivery in self.line.carry(sender, data, at):
-            self._deliver(*delivery)
-
-    def _air_time(self, data: Data) -> float:
-        size = bits(data) if isinstance(data, CanFrame) else len(data) * self.bits_per_byte
-        return size / self.rate
-
-    def _deliver(self, at: float, to: Side, data: Data) -> None:
-        self._sequence += 1  # data of one moment arrives in the order in which it was sent
-        heappush(self._under_way, (at, self._sequence, to, data))
+            if isinstance(data, CanFrame):  # one wire for both directions
+                wire, size = Side.HOST, bits(data)
+            else:
+                wire, size = sender, len(data) * BITS_PER_BYTE
+            at = self._free[wire] = max(at, self._free[wire]) + size / self.rate
+        for arrival, to, received in self.line.carry(sender, data, at):
+            self._sequence += 1  # data of one moment arrives in the order in which it was sent
+            heappush(self._under_way, (arrival, self._sequence, to, received))
