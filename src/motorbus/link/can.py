@@ -21,7 +21,7 @@ from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Data
 from motorbus.errors import LinkError, LinkLost, MotorbusError, PortNotFound, RequestError
 from motorbus.link import usb_adapters
 from motorbus.link.can_options import SHARED, CanOptions, read_options
-from motorbus.link.can_rates import check_rate, ip_command, kernel_rate
+from motorbus.link.can_rates import check_rate, kernel_rate
 from motorbus.link.can_text import TextChannel
 from motorbus.link.errors import busy, lost
 from motorbus.link.lock import PortLock, opening
@@ -184,26 +184,26 @@ class CanLink:
         if frames and self._options.interface in _KERNEL_ERRORS:
             for frame in frames:
                 if isinstance(frame, CanFrame) and frame.id & ERROR_FLAG and frame.id & BUS_OFF:
-                    raise _bus_off(self.name, frame)
+                    raise LinkLost(
+                        f"{self.name} is off the bus: its controller has counted too many errors",
+                        received=frame,
+                        cause="a short circuit, another bit rate on the bus, no terminating resistors, no other node",
+                        advice="check the bus; SocketCAN without restart-ms needs `ip link set can0 type can restart`",
+                    )
         return frames
 
     def tune(self, rate: int, listen_only: bool = False) -> None:
         if rate < 0:
             raise RequestError(f"{rate} is not a rate in bit/s")
-        before = self.rate, self.listen_only
-        wanted = rate or self.rate, listen_only
+        before, wanted = (self.rate, self.listen_only), (rate or self.rate, listen_only)
         if wanted == before:
             return
-        is_unknown = self._check_settings(*wanted)
-        options = self._options
-        if is_unknown and (options.interface == "socketcan" or wanted[0] != self.rate):
+        if self._check_settings(*wanted):
             raise LinkError(
-                f"{self.name}: the bit rate of {options.interface} cannot be changed to {wanted[0]} bit/s from here",
-                advice=ip_command(str(options.channel), *wanted)
-                if options.interface == "socketcan"
-                else "set it where the adapter is",
+                f"{self.name}: the bit rate of {self._options.interface} cannot be changed to {rate} bit/s from here",
+                advice="set it where the adapter is: `ip link set` for SocketCAN",
             )
-        if options.sets_rate:
+        if self._options.sets_rate:
             try:
                 self._channel.configure(*wanted)
             except MotorbusError:
@@ -217,15 +217,6 @@ class CanLink:
     def close(self) -> None:
         self._channel.close()
         self.lock.release()
-
-
-def _bus_off(name: str, frame: CanFrame) -> LinkLost:
-    return LinkLost(
-        f"{name} is off the bus: its controller has counted too many errors",
-        received=frame,
-        cause="a short circuit, another bit rate on the bus, no terminating resistors, or no other node",
-        advice="check the bus; an interface without restart-ms needs `ip link set can0 type can restart`",
-    )
 
 
 class BusChannel:
@@ -268,20 +259,24 @@ class BusChannel:
         while not frames:
             pause = max(0.0, min(until - time.monotonic(), SLICE))
             with self._access:
-                for _ in range(MOST_FRAMES):
-                    try:
-                        message = self._open_bus().recv(0.0 if frames else pause)
-                    except LinkLost:
-                        raise
-                    except Exception as error:  # each back end has its own types
-                        raise lost(self.name, error) from error
-                    if message is None:
-                        break
-                    frame = frame_of(message)
-                    if frame is not None:
-                        frames.append(frame)
+                frames = self._receive(pause)
             if time.monotonic() >= until:
                 break
+        return frames
+
+    def _receive(self, pause: float) -> list[Data]:
+        """The frames that are there; waits so long (s) for the first."""
+        bus = self._open_bus()
+        frames: list[Data] = []
+        for _ in range(MOST_FRAMES):
+            try:
+                message = bus.recv(0.0 if frames else pause)
+            except Exception as error:  # each back end has its own types
+                raise lost(self.name, error) from error
+            if message is None:
+                break
+            if (frame := frame_of(message)) is not None:
+                frames.append(frame)
         return frames
 
     def _open_bus(self) -> Any:

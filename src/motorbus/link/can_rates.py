@@ -93,18 +93,10 @@ def kernel_rate(options: CanOptions, rate: int, listen_only: bool) -> int | None
         problem = f"the kernel {'only listens' if listens else 'takes full part'} on {channel}"
     else:
         return actual
+    mode = "on" if listen_only else "off"
     raise LinkError(
         f"{options.name}: {problem}",
         cause="the system sets up a SocketCAN interface, not the program that uses it",
-        advice=ip_command(channel, rate or actual, listen_only),
-    )
-
-
-def ip_command(channel: str, rate: int, listen_only: bool) -> str:
-    """The shell commands that set up this interface."""
-    mode = "on" if listen_only else "off"
-    bitrate = rate or "BITRATE"
-    return (
-        f"sudo ip link set {channel} down; "
-        f"sudo ip link set {channel} up type can bitrate {bitrate} listen-only {mode}"
+        advice=f"sudo ip link set {channel} down; "
+        f"sudo ip link set {channel} up type can bitrate {rate or actual or 'RATE'} listen-only {mode}",
     )

@@ -25,26 +25,23 @@ class Owner(NamedTuple):
 
 def not_found(port: str, others: Sequence[PortInfo]) -> PortNotFound:
     """There is no such port; `others` are the ports of this machine."""
-    relative = os.name != "nt" and "://" not in port and not os.path.isabs(port)
     advice = "is the adapter plugged in, the simulator running? `motorbus ports` lists what there is"
-    if relative and port.startswith("tty") and os.path.exists(f"/dev/{port}"):
-        advice = f"did you mean /dev/{port}? {advice}"
     cause = ""
     if os.path.islink(port):
         cause = f"it leads to {os.readlink(port)}, which is gone"
-    elif relative:
-        cause = (
-            f"it does not begin with /, so it is relative to the working directory: {os.path.abspath(port)}"
-        )
+    elif os.name != "nt" and "://" not in port and not os.path.isabs(port):
+        cause = f"it is relative to the working directory: {os.path.abspath(port)}"
+        if os.path.exists(f"/dev/{port}"):
+            advice = f"did you mean /dev/{port}? {advice}"
     return PortNotFound(
         f"{port}: there is no such port", expected=_listed(others), cause=cause, advice=advice
     )
 
 
-def not_a_port(port: str, others: Sequence[PortInfo], device: str = "") -> PortNotFound:
-    """The port, or the `device` in it, exists but is not a serial port."""
+def not_a_port(port: str, others: Sequence[PortInfo]) -> PortNotFound:
+    """The port exists but is not a serial port."""
     return PortNotFound(
-        f"{port}{device and f': {device}'} is not a serial port",
+        f"{port} is not a serial port",
         expected=_listed(others),
         advice="`motorbus ports` lists what there is",
     )

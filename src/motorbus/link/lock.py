@@ -120,13 +120,10 @@ class PortLock:
         if self._descriptor is None:
             return
         descriptor, self._descriptor = self._descriptor, None
-        if os.name == "nt":  # Windows cannot remove an open file
-            os.close(descriptor)
-            self.path.unlink(missing_ok=True)
-        else:
-            if self._pid == os.getpid():
+        if self._pid == os.getpid():
+            with contextlib.suppress(PermissionError):  # Windows does not remove an open file
                 self.path.unlink(missing_ok=True)
-            os.close(descriptor)
+        os.close(descriptor)
 
     @property
     def held(self) -> bool:
@@ -203,7 +200,10 @@ def _open_locked(path: Path) -> int | None:
 def _is_locked(path: Path) -> bool:
     """Whether a process holds the lock; a file alone may be left over."""
     if os.name == "nt":
-        return path.exists()
+        descriptor = _open_locked(path)
+        if descriptor is not None:
+            os.close(descriptor)
+        return descriptor is None
     import fcntl
 
     try:

@@ -94,16 +94,20 @@ def find_adapter(name: str, wanted: Identity, lister: Lister, sysfs: Path = Path
         same = [one for one in same if wanted.place and one.place == wanted.place]
         if len(same) != 1:
             raise LinkLost(
-                f"{name} is gone, and several adapters could be it",
+                f"{name} is gone, and several adapters with one serial number could be it",
                 expected=wanted.text,
-                cause="their maker gave all of them one serial number",
                 advice="plug it in where it was, or open the bus again with the right name",
             )
     if same:
         return same[0].device
     for other in present:
         if real_name(other.device) == real_name(wanted.device):
-            raise _another_adapter(name, wanted.text, other.text)
+            raise AnotherAdapter(
+                f"{name} is gone, and there is another in its place: {other.text}",
+                expected=wanted.text,
+                cause="another adapter was plugged in and got the name of the lost one",
+                advice="plug in the first one, or open the bus again with the right name",
+            )
     if wanted.key == (wanted.device,) and os.path.exists(wanted.device):  # the system does not list it
         return wanted.device
     raise PortNotFound(f"{name}: {wanted.text} is not there")
@@ -112,26 +116,14 @@ def find_adapter(name: str, wanted: Identity, lister: Lister, sysfs: Path = Path
 def find_terminal(name: str, device: str) -> str:
     """The address `name` of a pseudo-terminal, when the symbolic link `device` leads to one for which it was made.
 
-    A link that is older than its terminal was left over from a simulator that was killed. Raises PortNotFound or
-    AnotherAdapter.
+    A link that is older than its terminal was left over from a simulator that was killed. Raises PortNotFound.
     """
     real = os.path.realpath(device)
-    if not os.path.exists(real):
+    if not (os.path.exists(real) and real.startswith(usb_adapters.PSEUDO_TERMINALS)):
         raise PortNotFound(f"{device} leads nowhere")
-    if not real.startswith(usb_adapters.PSEUDO_TERMINALS):
-        raise _another_adapter(device, f"a pseudo-terminal, behind {device}", real)
     if os.lstat(device).st_ctime_ns < os.stat(real).st_ctime_ns:
         raise PortNotFound(f"{device} has not been made again")
     return name
-
-
-def _another_adapter(name: str, wanted: str, present: str) -> AnotherAdapter:
-    return AnotherAdapter(
-        f"{name} is gone, and there is another in its place: {present}",
-        expected=wanted,
-        cause="another adapter was plugged in and got the name of the lost one",
-        advice="plug in the first one, or open the bus again with the right name",
-    )
 
 
 Open = Callable[[str, int, bool, PortLock], Link]

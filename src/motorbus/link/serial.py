@@ -37,9 +37,8 @@ POLL_TIME = 0.001  # s between two reads of a port that has no descriptor
 NEGOTIATION_TIME = 0.5  # s; the least time-out for the options of an RFC 2217 server, a few round trips
 REMOTE_LATENCY = 0.020  # s for an RFC 2217 server: the network and the adapter behind it
 MEMORY_DEVICES = 1  # major number of /dev/null and the like; Linux Documentation/admin-guide/devices.txt
-CLOCK_RESOLUTION = 1e-4  # s; a coarser clock cannot measure the time of a frame
 NO_DEVICE = (errno.ENOENT, errno.ENODEV, errno.ENXIO)
-UNREACHABLE = (errno.EHOSTUNREACH, errno.ENETUNREACH)
+UNREACHABLE = (errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ECONNREFUSED)
 TCGETS2 = 0x802C542A  # asm-generic/ioctls.h, sizeof(struct termios2) = 44; MIPS, PowerPC and SPARC differ
 TERMIOS2 = struct.Struct("=4I20s2I")
 
@@ -55,7 +54,7 @@ def ports(lister: Callable[[], Iterable[SerialPortInfo]] | None = None) -> list[
             serial_number=port.serial_number or "",
             manufacturer=port.manufacturer or "",
             product=port.product or "",
-            guess=usb_adapters.guess(port.vid, port.pid),
+            guess=usb_adapters.ADAPTERS.get((port.vid, port.pid), ""),
         )
         for port in (lister or list_ports)()
     ]
@@ -86,7 +85,9 @@ class SerialLink(StreamLink):
         self.paced = not device.startswith(usb_adapters.PSEUDO_TERMINALS)
         if not os.path.exists(device):
             raise not_found(port, ports())
-        if not _could_be_a_port(device):
+        status = os.stat(device)
+        is_memory = sys.platform == "linux" and os.major(status.st_rdev) == MEMORY_DEVICES
+        if is_memory or not stat.S_ISCHR(status.st_mode):
             raise not_a_port(port, ports())
         with opening(port, lock) as self.lock:
             self._open(device)
@@ -133,6 +134,8 @@ class PolledLink(StreamLink):
     `connect_time` is a time-out in s for a server. Other arguments and errors as for `SerialLink`.
     """
 
+    paced = False  # what is behind a server is unknown, and the clock of Windows is coarse
+
     def __init__(
         self, port: str, *, rate: int, lock: PortLock | None = None, connect_time: float = CONNECT_TIME
     ) -> None:
@@ -143,7 +146,6 @@ class PolledLink(StreamLink):
             split_address(port)
         self.name = port
         self.rate = rate
-        self.paced = not remote and has_fine_clock()  # what is behind a server is unknown
         self.latency = REMOTE_LATENCY if remote else usb_adapters.WINDOWS_LATENCY
         self._failure = serialx.SerialException
         self._access = Lock()
@@ -205,18 +207,6 @@ def open_stream(
     return SerialLink(port, rate=rate, lock=lock)
 
 
-def has_fine_clock() -> bool:
-    """Whether the clock can measure the time of a frame; that of Windows before Python 3.13 ticks every 15.6 ms."""
-    return time.get_clock_info("monotonic").resolution <= CLOCK_RESOLUTION
-
-
-def _could_be_a_port(device: str) -> bool:
-    """Whether it is a character device other than /dev/null and the like."""
-    status = os.stat(device)
-    is_memory = sys.platform == "linux" and os.major(status.st_rdev) == MEMORY_DEVICES
-    return stat.S_ISCHR(status.st_mode) and not is_memory
-
-
 def _open_serial(port: str, target: str, rate: int, connect_time: float = CONNECT_TIME) -> BaseSerial:
     import serialx
 
@@ -224,9 +214,7 @@ def _open_serial(port: str, target: str, rate: int, connect_time: float = CONNEC
         serial = serialx.serial_for_url(target, baudrate=rate, connect_timeout=connect_time)
         serial.open()
     except OSError as error:
-        raise (
-            _remote_error(port, connect_time, error) if "://" in port else _open_error(port, target, error)
-        ) from error
+        raise _open_error(port, target, connect_time, error) from error
     except serialx.UnsupportedSetting as error:
         raise unsupported_rate(port, rate, error) from error
     except (serialx.SerialException, ValueError) as error:
@@ -234,7 +222,16 @@ def _open_serial(port: str, target: str, rate: int, connect_time: float = CONNEC
     return serial
 
 
-def _open_error(port: str, device: str, error: OSError) -> LinkError:
+def _open_error(port: str, device: str, connect_time: float, error: OSError) -> LinkError:
+    """The error for what serialx has raised at open."""
+    if "://" in port and isinstance(error, TimeoutError):
+        return LinkError(
+            f"{port}: no RFC 2217 answer within {connect_time:g} s",
+            cause="the host is off, or it passes bytes on without that protocol",
+            advice="try socket:// in place of rfc2217://",
+        )
+    if isinstance(error, socket.gaierror) or error.errno in UNREACHABLE:
+        return PortNotFound(f"{port} cannot be reached: {error}", advice="is the server running?")
     if error.errno in NO_DEVICE:
         return not_found(port, ports())
     if error.errno == errno.EBUSY or (os.name == "nt" and isinstance(error, PermissionError)):
@@ -244,18 +241,6 @@ def _open_error(port: str, device: str, error: OSError) -> LinkError:
     if error.errno == errno.ENOTTY:
         return not_a_port(port, ports())
     return LinkError(f"{port} cannot be opened: {error.strerror or error}")
-
-
-def _remote_error(port: str, connect_time: float, error: OSError) -> LinkError:
-    if isinstance(error, TimeoutError):
-        return LinkError(
-            f"{port}: no RFC 2217 answer within {connect_time:g} s",
-            cause="the host is off, or it passes bytes on without that protocol",
-            advice="try socket:// in place of rfc2217://",
-        )
-    if isinstance(error, (ConnectionRefusedError, socket.gaierror)) or error.errno in UNREACHABLE:
-        return PortNotFound(f"{port} cannot be reached: {error}", advice="is the server running?")
-    return LinkError(f"{port} cannot be opened: {error}")
 
 
 def _set_exclusive(descriptor: int, exclusive: bool) -> None:
@@ -288,27 +273,15 @@ def _check_rate(port: str, descriptor: int, rate: int) -> None:
 
 
 def line_speed(descriptor: int) -> int | None:
-    """Rate (bit/s) of a terminal, or of the pseudo-terminal of a master; None when the system does not tell.
-
-    Linux reports any number, such as 76 800 and 128 000; other systems only the rates that have a constant.
-    """
+    """Rate (bit/s) of a terminal, or of the pseudo-terminal of a master; None when the system does not tell."""
+    import fcntl
     import termios
 
-    if sys.platform == "linux" and (speed := _termios2_speed(descriptor)):
-        return speed
     try:
-        code = termios.tcgetattr(descriptor)[5]
-    except termios.error:
+        if sys.platform == "linux":  # any number, such as 76 800 and 128 000
+            speed: int = TERMIOS2.unpack(fcntl.ioctl(descriptor, TCGETS2, bytes(TERMIOS2.size)))[-1]
+        else:
+            speed = termios.tcgetattr(descriptor)[5]
+    except (OSError, termios.error):
         return None
-    names = (name for name in vars(termios) if name[:1] == "B" and name[1:].isdigit())
-    return next((int(name[1:]) for name in names if getattr(termios, name) == code), None) or None
-
-
-def _termios2_speed(descriptor: int) -> int:
-    import fcntl
-
-    try:
-        speed: int = TERMIOS2.unpack(fcntl.ioctl(descriptor, TCGETS2, bytes(TERMIOS2.size)))[-1]
-    except OSError:
-        return 0
-    return speed
+    return speed or None

@@ -20,9 +20,9 @@ from motorbus.link.tcp import CONNECT_TIME, TcpLink
 
 REPLY_TIME: Final = 2.0  # s for each reply of the server
 RATE: Final = 1_000_000  # bit/s; the line behind the server is a CAN bus, so this has no effect
-_IDENTIFIER: Final = re.compile(rb"[0-9A-Fa-f]{1,3}|[0-9A-Fa-f]{8}")
-_SIZE: Final = re.compile(rb"[0-8]?")
-_DATA: Final = re.compile(rb"(?:[0-9A-Fa-f]{2}){0,8}")
+_FRAME: Final = re.compile(
+    rb"\s*(frame|rtr|error)\s+([0-9A-Fa-f]{1,3}|[0-9A-Fa-f]{8})\s+[\d.]+\s*([0-9A-Fa-f\s]*)"
+)
 
 
 class SocketcandCodec(TextCodec):
@@ -40,32 +40,28 @@ class SocketcandCodec(TextCodec):
 
     def decode(self, line: re.Match[bytes]) -> CanFrame | None:
         before, begin, element = line[1].rpartition(b"<")
-        name, *words = element.split() or [b""]
+        name = element.split(None, 1)[:1]
         if before.strip() or not begin:
             self.damaged += 1
-        if begin and name in (b"frame", b"rtr", b"error"):
-            try:
-                return _decode_frame(name, words)
-            except ValueError:
-                self.refused += name == b"error"  # an error that is no frame answers a command
-                self.damaged += name != b"error"
+        if begin and (match := _FRAME.fullmatch(element)):
+            with contextlib.suppress(ValueError):
+                return _decode_frame(match)
+        self.damaged += name in ([b"frame"], [b"rtr"])
+        self.refused += name == [b"error"]
         return None
 
 
-def _decode_frame(name: bytes, words: list[bytes]) -> CanFrame:
+def _decode_frame(match: re.Match[bytes]) -> CanFrame:
     """Raises ValueError for what is no frame."""
-    identifier, moment, *rest = [*words, b"", b""][: max(len(words), 2)]
-    float(moment)
+    name, identifier, rest = match.groups()
     number, extended = int(identifier, 16), len(identifier) == 8
-    if name == b"error" and len(words) == 2:
+    digits = b"".join(rest.split())
+    if name == b"error":
         return CanFrame(number & (ERROR_FLAG - 1) | ERROR_FLAG, bytes(8))
-    digits = b"".join(rest)
-    is_valid = _IDENTIFIER.fullmatch(identifier) and (_SIZE if name == b"rtr" else _DATA).fullmatch(digits)
-    if not is_valid or number > (0x1FFF_FFFF if extended else 0x7FF):
-        raise ValueError(words)
-    if name == b"rtr":
-        return CanFrame(number | REMOTE_FLAG, bytes(int(digits or b"0")), extended)
-    return CanFrame(number, bytes.fromhex(digits.decode()), extended)
+    data = bytes(int(digits or b"0")) if name == b"rtr" else bytes.fromhex(digits.decode())
+    if len(data) > 8 or number > (0x1FFF_FFFF if extended else 0x7FF):
+        raise ValueError(rest)
+    return CanFrame(number | REMOTE_FLAG if name == b"rtr" else number, data, extended)
 
 
 def open_socketcand(options: CanOptions, connect_time: float | None) -> TextChannel:

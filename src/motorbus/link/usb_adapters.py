@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
 from typing import Final, NamedTuple
 
 USB_TIME = 0.003  # s; one USB full-speed frame each way and the host's own time
@@ -14,45 +13,30 @@ TERMINAL_LATENCY = 0.002  # s; a pseudo-terminal has no adapter, but two process
 PSEUDO_TERMINALS = ("/dev/pts/", "/dev/ttys")
 FAST_TIMER = 1  # ms; the lowest FTDI latency timer
 
-KERNEL_CH341 = "Linux drivers/usb/serial/ch341.c"
-KERNEL_FTDI = "Linux drivers/usb/serial/ftdi_sio_ids.h"
-KERNEL_CP210X = "Linux drivers/usb/serial/cp210x.c"
-KERNEL_PL2303 = "Linux drivers/usb/serial/pl2303.h"
-WCH_DRIVER = "WCH ch343ser_linux driver"
-
-
-class Adapter(NamedTuple):
-    """A kind of adapter: its chip, where it is common, and the source of its ids."""
-
-    chip: str
-    common: str
-    source: str
-
-
-ADAPTERS: Final[Mapping[tuple[int, int], Adapter]] = MappingProxyType(
-    {
-        (0x1A86, 0x55D3): Adapter("CH343", "usual on FEETECH and Waveshare servo boards", WCH_DRIVER),
-        (0x1A86, 0x55D2): Adapter("CH342", "two ports in one", WCH_DRIVER),
-        (0x1A86, 0x55D4): Adapter("CH9102", "usual on ESP32 boards with a serial bus", WCH_DRIVER),
-        (0x1A86, 0x7523): Adapter("CH340", "usual on FEETECH URT boards and RS-485 sticks", KERNEL_CH341),
-        (0x1A86, 0x7522): Adapter("CH340K", "", KERNEL_CH341),
-        (0x1A86, 0x5523): Adapter("CH341", "", KERNEL_CH341),
-        (0x0403, 0x6001): Adapter(
-            "FT232R", "usual in USB-RS485 cables; check its latency timer", KERNEL_FTDI
-        ),
-        (0x0403, 0x6010): Adapter("FT2232", "two ports in one; check its latency timer", KERNEL_FTDI),
-        (0x0403, 0x6011): Adapter("FT4232H", "four ports in one; check its latency timer", KERNEL_FTDI),
-        (0x0403, 0x6014): Adapter("FT232H", "usual in ROBOTIS U2D2; check its latency timer", KERNEL_FTDI),
-        (0x0403, 0x6015): Adapter("FT230X", "check its latency timer", KERNEL_FTDI),
-        (0x10C4, 0xEA60): Adapter("CP210x", "usual on ESP32 boards", KERNEL_CP210X),
-        (0x067B, 0x2303): Adapter("PL2303", "", KERNEL_PL2303),
-        (0x0483, 0x5740): Adapter(
-            "STM32", "usual on controller boards with own USB", "craigm26/OpenCastor#527"
-        ),
-        (0x2E8A, 0x000A): Adapter("RP2040", "a board that passes bytes on", "Raspberry Pi Pico SDK, usb_pid"),
-        (0x303A, 0x1001): Adapter("ESP32", "its own USB port", "Espressif USB Serial/JTAG, ESP-IDF"),
-    }
-)
+ADAPTERS: Final[Mapping[tuple[int | None, int | None], str]] = {
+    # WCH driver ch343ser_linux
+    (0x1A86, 0x55D3): "CH343: usual on FEETECH and Waveshare servo boards",
+    (0x1A86, 0x55D2): "CH342: two ports in one",
+    (0x1A86, 0x55D4): "CH9102: usual on ESP32 boards with a serial bus",
+    # Linux drivers/usb/serial/ch341.c
+    (0x1A86, 0x7523): "CH340: usual on FEETECH URT boards and RS-485 sticks",
+    (0x1A86, 0x7522): "CH340K",
+    (0x1A86, 0x5523): "CH341",
+    # Linux drivers/usb/serial/ftdi_sio_ids.h
+    (0x0403, 0x6001): "FT232R: usual in USB-RS485 cables; check its latency timer",
+    (0x0403, 0x6010): "FT2232: two ports in one; check its latency timer",
+    (0x0403, 0x6011): "FT4232H: four ports in one; check its latency timer",
+    (0x0403, 0x6014): "FT232H: usual in ROBOTIS U2D2; check its latency timer",
+    (0x0403, 0x6015): "FT230X: check its latency timer",
+    # Linux drivers/usb/serial/cp210x.c and pl2303.h
+    (0x10C4, 0xEA60): "CP210x: usual on ESP32 boards",
+    (0x067B, 0x2303): "PL2303",
+    # craigm26/OpenCastor#527; Raspberry Pi Pico SDK, usb_pid; Espressif USB Serial/JTAG, ESP-IDF
+    (0x0483, 0x5740): "STM32: usual on controller boards with own USB",
+    (0x2E8A, 0x000A): "RP2040: a board that passes bytes on",
+    (0x303A, 0x1001): "ESP32: its own USB port",
+}
+"""What an adapter probably is, by vendor and product."""
 
 
 class PortInfo(NamedTuple):
@@ -75,14 +59,6 @@ class PortInfo(NamedTuple):
     def description(self) -> str:
         """Manufacturer and product as the adapter reports them."""
         return " ".join(part for part in (self.manufacturer, self.product) if part)
-
-
-def guess(vid: int | None, pid: int | None) -> str:
-    """What an adapter with these ids probably is; "" for unknown ids."""
-    adapter = ADAPTERS.get((vid, pid)) if vid is not None and pid is not None else None
-    if adapter is None:
-        return ""
-    return f"{adapter.chip}: {adapter.common}" if adapter.common else adapter.chip
 
 
 def latency_timer(device: str, sysfs: Path = Path("/sys")) -> int | None:
