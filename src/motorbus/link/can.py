@@ -13,6 +13,7 @@ import logging
 import time
 import warnings
 from collections.abc import Mapping
+from contextlib import nullcontext
 from threading import Lock
 from types import ModuleType
 from typing import Any, Final
@@ -72,15 +73,11 @@ def describe(port: str, options: Mapping[str, object]) -> CanOptions:
 
 
 class CanLink:
-    """An open CAN channel.
+    """An open CAN channel. Arguments as for `open_link`.
 
-    `rate`          bit/s from the user; 0 when not given
-    `default_rate`  bit/s of the family
-    `options`       `listen_only` (yes, no), `config_context` (a section of python-can's configuration), and what the
-                    back end's constructor takes
-    `shared`        takes part beside a host of this machine, as simulated devices do: SocketCAN is not locked
-    `lock`          a lock that the caller already holds
-    `connect_time`  time-out in s for a host of the network
+    `options`  `listen_only` (yes, no), `config_context` (a section of python-can's configuration), and what the back
+               end's constructor takes
+    `shared`   the caller takes part beside a host of this machine, as simulated devices do: SocketCAN is not locked
 
     `lock_name` names the adapter for its lock and its emergency stop; "" for a shared channel. `no_wire`: no device
     can be real. `device` is the serial port of the adapter; "" for any other channel. Raises RequestError for an
@@ -113,11 +110,8 @@ class CanLink:
         if self.rate <= 0:
             raise RequestError(f"{port}: the bit rate is missing", expected="bitrate=500000, for example")
         warning = self._check_settings(found.rate, self.listen_only)
-        if self.lock_name and not (shared and found.interface == "socketcan"):
-            with opening(self.lock_name, lock) as self.lock:
-                self._channel = self._open(connect_time)
-        else:
-            self.lock = PortLock(port)
+        is_free = not self.lock_name or (shared and found.interface == "socketcan")
+        with nullcontext(PortLock(port)) if is_free else opening(self.lock_name, lock) as self.lock:
             self._channel = self._open(connect_time)
         self.latency = self._channel.latency
         self.warnings = self._channel.warnings + warning
@@ -200,7 +194,7 @@ class CanLink:
             return
         if self._check_settings(*wanted):
             raise LinkError(
-                f"{self.name}: the bit rate of {self._options.interface} cannot be changed to {rate} bit/s from here",
+                f"{self.name}: the bit rate cannot be changed to {wanted[0]} bit/s from here",
                 advice="set it where the adapter is: `ip link set` for SocketCAN",
             )
         if self._options.sets_rate:
@@ -312,7 +306,7 @@ class BusChannel:
         return self._descriptor
 
     def close(self) -> None:
-        bus, self._bus = self._bus, None
+        bus, self._bus, self._descriptor = self._bus, None, None
         if bus is not None:
             with self._access, contextlib.suppress(Exception):  # it may be broken already
                 bus.shutdown()
@@ -331,13 +325,11 @@ def frame_of(message: Any) -> CanFrame | None:
 
 def open_error(options: CanOptions, error: Exception) -> MotorbusError:
     """The error for what python-can has raised at open: a missing driver is an ImportError here, a NameError there."""
-    name, interface = options.name, options.interface
-    code = _error_code(error)
+    name, interface, code = options.name, options.interface, _error_code(error)
     if isinstance(error, (NotImplementedError, ImportError, NameError)) or "library not found" in str(error):
-        extra = interface.replace("_", "-")
         return LinkError(
             f"{name}: the driver of {interface} is missing: {error}",
-            advice=f'install the driver of the adapter, or pip install "python-can[{extra}]"',
+            advice=f'install that of the maker, or pip install "python-can[{interface.replace("_", "-")}]"',
         )
     if isinstance(error, (ValueError, TypeError)):
         return RequestError(f"{name}: python-can's {interface} refuses this: {error}")

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 from motorbus.errors import LinkError, LinkLost, PortBusy, PortNotFound
@@ -54,16 +56,13 @@ def _listed(others: Sequence[PortInfo]) -> str:
 
 def busy(port: str, owner: Owner | None) -> PortBusy:
     """Another program holds the port; None when it is unknown which one."""
-    if owner is None:
-        holder = "another program"
-    elif owner.pid == os.getpid():
-        holder = f"this very program (process {owner.pid})"
-    else:
+    holder, advice = "another program", "close it there: a bus has one owner at a time"
+    if owner is not None:
         holder = f"process {owner.pid} ({owner.program})"
-    advice = "close it there: a bus has one owner at a time"
-    error = PortBusy(
-        f"{port} is held by {holder}", advice=ADVICE.get(owner.program, advice) if owner else advice
-    )
+        advice = ADVICE.get(owner.program, advice)
+        if owner.pid == os.getpid():
+            holder = f"this very program (process {owner.pid})"
+    error = PortBusy(f"{port} is held by {holder}", advice=advice)
     error.owner = owner.pid if owner else None
     return error
 
@@ -71,14 +70,10 @@ def busy(port: str, owner: Owner | None) -> PortBusy:
 def no_permission(port: str, device: str) -> LinkError:
     """The user has no permission for the port."""
     group = "dialout"
-    try:
-        import grp
-
-        name = grp.getgrgid(os.stat(device).st_gid).gr_name
-        if name not in ("root", "tty"):  # joining these is bad advice
-            group = name
-    except (ImportError, KeyError, OSError):
-        pass
+    with contextlib.suppress(KeyError, OSError, NotImplementedError):
+        group = Path(device).group()
+    if group in ("root", "tty"):  # joining these is bad advice
+        group = "dialout"
     return LinkError(
         f"{port}: no permission to open it",
         cause=f"you are not in the group {group}",

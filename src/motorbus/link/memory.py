@@ -108,7 +108,30 @@ class MemoryLink:
 
     def read(self, until: float) -> list[Data]:
         with self._changed:
-            return self._read_virtual(until) if self.virtual else self._read_real(until)
+            end = max(until, self.now())
+            while not self._arrived:
+                now = self.now()
+                self._check(now)
+                moment = self._next_event()
+                if self.virtual:
+                    moment = max(moment, now)
+                if moment > now:
+                    moment = min(moment, end)
+                    if now >= end or not self._pass_time(moment):
+                        break
+                if moment <= self.now():
+                    self._happen(moment)
+            self._check(self.now())
+            arrived, self._arrived = self._arrived, []
+            return arrived
+
+    def _pass_time(self, until: float) -> bool:
+        """Wait until this moment (s), or for a change; False for a virtual clock when nothing will ever happen."""
+        if not self.virtual:
+            self._changed.wait(until - time.monotonic() if until < inf else None)
+        elif until < inf:
+            self._move_clock(until)
+        return until < inf or not self.virtual
 
     def tune(self, rate: int, listen_only: bool = False) -> None:
         self.rate = rate
@@ -160,11 +183,10 @@ class MemoryLink:
 
     def rest(self, until: float) -> None:
         with self._changed:
-            moment = until if self.now() >= self._back_at else min(until, self._back_at)
-            if self.virtual:
-                self._move_clock(max(self.clock.now, moment))
-            elif moment > self.now():
-                self._changed.wait(moment - self.now())
+            now = self.now()
+            moment = until if now >= self._back_at else min(until, self._back_at)
+            if moment > now:
+                self._pass_time(moment)
 
     def advance(self, seconds: float) -> None:
         """Let virtual time pass without reading; what arrives is kept for the next `read`."""
@@ -173,42 +195,12 @@ class MemoryLink:
             self._happen_until(end)
             self._move_clock(end)
 
-    def _read_virtual(self, until: float) -> list[Data]:
-        clock = self.clock
-        limit = max(until, clock.now)
-        while not self._arrived:
-            self._check(clock.now)
-            moment = max(self._next_event(), clock.now)
-            if moment > limit:
-                break
-            self._move_clock(moment)
-            self._happen(moment)
-        self._check(clock.now)
-        if not self._arrived and clock.now < limit < inf:
-            self._move_clock(limit)
-            self._happen(limit)
-        return self._take()
-
     def _move_clock(self, moment: float) -> None:
         """Let time pass on all links of the clock; what arrives on others is kept for their next `read`."""
         for link in self.clock.links:
             if link is not self:
                 link._happen_until(moment)
         self.clock.now = moment
-
-    def _read_real(self, until: float) -> list[Data]:
-        while True:
-            now = time.monotonic()
-            self._check(now)
-            self._happen_until(now)
-            if self._arrived or now >= until:
-                return self._take()
-            pause = min(self._next_event(), until) - now
-            self._changed.wait(pause if pause < inf else None)
-
-    def _take(self) -> list[Data]:
-        arrived, self._arrived = self._arrived, []
-        return arrived
 
     def _check(self, now: float) -> None:
         if self._closed:

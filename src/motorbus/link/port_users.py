@@ -6,6 +6,7 @@ On other systems it finds no program.
 
 from __future__ import annotations
 
+import contextlib
 import os
 from pathlib import Path
 
@@ -21,31 +22,23 @@ def find_user(device: str, proc: Path = Path("/proc")) -> Owner | None:
     Only processes that this user may inspect are seen. The process at the other end of a pseudo-terminal is its
     simulator and does not count.
     """
-    try:
-        names = os.listdir(proc)
-    except OSError:
-        return None
-    for name in names:
-        if not name.isdigit() or name == str(os.getpid()):
-            continue
-        process = proc / name
-        opened = _open_files(process)
-        uses = any(
-            target == device and _is_same(process / "fd" / number, device) for number, target in opened
-        )
-        if uses and not _serves(process, opened, device):
-            return Owner(int(name), _program(process), device)
+    with contextlib.suppress(OSError):
+        for name in os.listdir(proc):
+            if not name.isdigit() or name == str(os.getpid()):
+                continue
+            opened = _open_files(proc / name)
+            is_open = any(target == device and _is_same(path, device) for path, target in opened)
+            if is_open and not _serves(opened, device):
+                return Owner(int(name), _program(proc / name), device)
     return None
 
 
-def _open_files(process: Path) -> list[tuple[str, str]]:
-    """Number and target of every descriptor; what could be read when the process ended or denied access."""
+def _open_files(process: Path) -> list[tuple[Path, str]]:
+    """Path and target of every descriptor; what could be read when the process ended or denied access."""
     found = []
-    try:
-        for number in os.listdir(process / "fd"):
-            found.append((number, os.readlink(process / "fd" / number)))  # noqa: PERF401 - keeps what was read
-    except OSError:
-        pass
+    with contextlib.suppress(OSError):
+        for path in (process / "fd").iterdir():
+            found.append((path, os.readlink(path)))  # noqa: PERF401 - keeps what was read
     return found
 
 
@@ -58,20 +51,19 @@ def _is_same(descriptor: Path, device: str) -> bool:
     return (theirs.st_dev, theirs.st_rdev) == (ours.st_dev, ours.st_rdev)
 
 
-def _serves(process: Path, opened: list[tuple[str, str]], device: str) -> bool:
-    """Whether this process holds the master of the pseudo-terminal."""
+def _serves(opened: list[tuple[Path, str]], device: str) -> bool:
+    """Whether a process with these files holds the master of the pseudo-terminal."""
     if not device.startswith(PTY_FOLDER):
         return False
-    for number, target in opened:
+    number = device.removeprefix(PTY_FOLDER)
+    for path, target in opened:
         if target in PTY_MASTERS:
-            index = ""  # older kernels do not report it
-            try:
-                lines = (process / "fdinfo" / number).read_text().splitlines()
-                index = next((line.split()[1] for line in lines if line.startswith("tty-index:")), "")
-            except OSError:
-                pass
-            if index in (device.removeprefix(PTY_FOLDER), ""):
-                return True
+            with contextlib.suppress(OSError):
+                about = (path.parents[1] / "fdinfo" / path.name).read_text()
+                if (
+                    "tty-index:" not in about or f"tty-index:\t{number}\n" in about
+                ):  # older kernels do not tell
+                    return True
     return False
 
 

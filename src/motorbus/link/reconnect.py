@@ -224,21 +224,18 @@ class Reconnecting:
                     self._reopen(self._find(), self.rate, getattr(self._link, "listen_only", False), before)
                 )
             except (MotorbusError, OSError) as error:
-                self._fail(error)
+                self._error = error
+                self._pause = min(2 * self._pause or FIRST_RETRY, LAST_RETRY)
+                self._retry_at = time.monotonic() + self._pause
+                if isinstance(error, AnotherAdapter) and before.held:  # any program may open that one
+                    before.release()
+                    self.on_rename("")
                 raise self._loss() from error
             self._error = None
             self._repaired, self._pause, self._retry_at = losses, 0.0, time.monotonic() + FIRST_RETRY
             if self._lock is not before:
                 before.release()
                 self.on_rename(self.lock_name)
-
-    def _fail(self, error: BaseException) -> None:
-        self._pause = min(2 * self._pause or FIRST_RETRY, LAST_RETRY)
-        self._retry_at = time.monotonic() + self._pause
-        self._error = error
-        if isinstance(error, AnotherAdapter) and self._lock.held:  # any program may open that one
-            self._lock.release()
-            self.on_rename("")
 
     def rest(self, until: float) -> None:
         """See `Renewable.rest`."""

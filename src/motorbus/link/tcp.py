@@ -5,6 +5,7 @@ The socket carries bytes only: it can set no rate, and its delay is unknown.
 
 from __future__ import annotations
 
+import contextlib
 import ipaddress
 import socket
 from typing import Final
@@ -22,22 +23,14 @@ NETWORK_LATENCY: Final = 0.005  # s; one Wi-Fi hop each way, and the bridge itse
 
 def split_address(url: str) -> tuple[str, int]:
     """Host and port of `scheme://host:port`; an IPv6 address is in brackets. Raises RequestError."""
-    try:
-        parts = urlsplit(url)
-        host, port = parts.hostname, parts.port
-    except ValueError as error:
-        raise _bad_address(url, f": {error}") from None
-    if not host or not port:
-        raise _bad_address(url, ": the port is missing" if host else ": the host is missing")
-    if parts.path not in ("", "/") or parts.query or parts.username is not None:
-        raise _bad_address(url, "")
-    return host, port
-
-
-def _bad_address(url: str, reason: str) -> RequestError:
     scheme = url.partition("://")[0]
-    return RequestError(
-        f"{url!r} is not an address of a host and a port{reason}",
+    with contextlib.suppress(ValueError):
+        parts = urlsplit(url)
+        is_plain = parts.path in ("", "/") and not parts.query and parts.username is None
+        if parts.hostname and parts.port and is_plain:
+            return parts.hostname, parts.port
+    raise RequestError(
+        f"{url!r} is not an address of a host and a port",
         expected=f"{scheme}://HOST:PORT",
         advice=f"for example {scheme}://10.0.0.7:4000 or {scheme}://[fe80::1]:4000",
     )
