@@ -10,8 +10,7 @@ import can
 import pytest
 
 from motorbus.errors import LinkError
-from motorbus.link.can_options import CanOptions, read_options
-from motorbus.link.can_rates import kernel_rate
+from motorbus.link.can_options import CanOptions, kernel_rate, read_options
 from tests.links.can_peer import on_terminal, open_can
 
 BITS: dict[str, Any] = {"f_clock": 8000000, "brp": 1, "tseg1": 7, "tseg2": 2, "sjw": 1, "nof_samples": 1}

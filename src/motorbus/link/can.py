@@ -21,8 +21,7 @@ from typing import Any, Final
 from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Data
 from motorbus.errors import LinkError, LinkLost, MotorbusError, PortNotFound, RequestError
 from motorbus.link import usb_adapters
-from motorbus.link.can_options import SHARED, CanOptions, read_options
-from motorbus.link.can_rates import check_rate, kernel_rate
+from motorbus.link.can_options import SHARED, CanOptions, check_rate, kernel_rate, read_options
 from motorbus.link.can_text import TextChannel
 from motorbus.link.errors import busy, lost
 from motorbus.link.lock import PortLock, opening
@@ -187,8 +186,6 @@ class CanLink:
         return frames
 
     def tune(self, rate: int, listen_only: bool = False) -> None:
-        if rate < 0:
-            raise RequestError(f"{rate} is not a rate in bit/s")
         before, wanted = (self.rate, self.listen_only), (rate or self.rate, listen_only)
         if wanted == before:
             return

@@ -103,11 +103,19 @@ class SerialLink(StreamLink):
             os.set_blocking(descriptor, False)
             self.attach(descriptor, partial(os.read, descriptor), partial(os.write, descriptor))
             if self.paced:  # a pseudo-terminal would keep the mark while its simulator has it open
-                _set_exclusive(descriptor, True)
+                self._exclude_others(descriptor)
             _check_rate(self.name, descriptor, self.rate)
         except BaseException:
             self.close()
             raise
+
+    def _exclude_others(self, descriptor: int) -> None:
+        """Let the kernel refuse later opens of the port, except those of root."""
+        import fcntl
+        import termios
+
+        with contextlib.suppress(OSError):
+            fcntl.ioctl(descriptor, termios.TIOCEXCL)
 
     def tune(self, rate: int, listen_only: bool = False) -> None:
         time.sleep(max(0.0, self._idle_at - time.monotonic()))  # bytes on their way keep their rate
@@ -120,8 +128,6 @@ class SerialLink(StreamLink):
     def close(self) -> None:
         serial, self._serial = self._serial, None
         if serial is not None:
-            if self.paced:
-                _set_exclusive(serial.fileno(), False)
             self.detach()
             with contextlib.suppress(OSError):
                 serial.close()
@@ -241,15 +247,6 @@ def _open_error(port: str, device: str, connect_time: float, error: OSError) -> 
     if error.errno == errno.ENOTTY:
         return not_a_port(port, ports())
     return LinkError(f"{port} cannot be opened: {error.strerror or error}")
-
-
-def _set_exclusive(descriptor: int, exclusive: bool) -> None:
-    """Let the kernel refuse later opens of the port, except those of root."""
-    import fcntl
-    import termios
-
-    with contextlib.suppress(OSError, ValueError):
-        fcntl.ioctl(descriptor, termios.TIOCEXCL if exclusive else termios.TIOCNXCL)
 
 
 def _set_rate(port: str, serial: BaseSerial, rate: int) -> None:

@@ -13,8 +13,7 @@ from typing import Final
 
 from motorbus.core.operation import REMOTE_FLAG, CanFrame
 from motorbus.errors import LinkError
-from motorbus.link.can_options import CanOptions
-from motorbus.link.can_rates import SLCAN_RATES
+from motorbus.link.can_options import SLCAN_RATES, CanOptions
 from motorbus.link.can_text import TextChannel, TextCodec
 from motorbus.link.lock import PortLock
 from motorbus.link.serial import open_stream

@@ -61,18 +61,12 @@ class PortInfo(NamedTuple):
         return " ".join(part for part in (self.manufacturer, self.product) if part)
 
 
-def latency_timer(device: str, sysfs: Path = Path("/sys")) -> int | None:
-    """Milliseconds for which an FTDI adapter collects bytes; None for any other adapter."""
-    try:
-        return int((sysfs / "class" / "tty" / Path(device).name / "device" / "latency_timer").read_text())
-    except (OSError, ValueError):
-        return None
-
-
 def device_latency(device: str, sysfs: Path = Path("/sys")) -> tuple[float, tuple[str, ...]]:
     """Latency (s) of the adapter of a serial port, and a warning with the remedy where its latency timer is slow."""
-    timer = latency_timer(device, sysfs)
-    if timer is None:
+    file = sysfs / "class" / "tty" / Path(device).name / "device" / "latency_timer"
+    try:
+        timer = int(file.read_text())  # ms for which an FTDI adapter collects bytes
+    except (OSError, ValueError):  # another adapter
         return (TERMINAL_LATENCY if device.startswith(PSEUDO_TERMINALS) else DEVICE_LATENCY), ()
     latency = timer / 1000 + USB_TIME
     if timer <= FAST_TIMER:

@@ -132,8 +132,9 @@ def test_quirk_18_many_servos_are_read_at_the_price_of_one_question(tmp_path: Pa
     timer = tmp_path / "class" / "tty" / "ttyUSB0" / "device" / "latency_timer"
     timer.parent.mkdir(parents=True)
     timer.write_text("16\n")
-    assert usb_adapters.latency_timer("/dev/ttyUSB0", tmp_path) == 16
-    assert "16 ms" in usb_adapters.device_latency("/dev/ttyUSB0", tmp_path)[1][0]
+    latency, (warning,) = usb_adapters.device_latency("/dev/ttyUSB0", tmp_path)
+    assert latency == pytest.approx(0.019)
+    assert "16 ms" in warning
 
 
 def test_quirk_21_servos_without_sync_read_are_read_one_by_one() -> None:
