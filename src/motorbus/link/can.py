@@ -257,23 +257,17 @@ class BusChannel:
 
     def _receive(self, pause: float) -> list[Data]:
         """The frames that are there; waits so long (s) for the first."""
-        bus = self._open_bus()
         frames: list[Data] = []
-        for _ in range(MOST_FRAMES):
-            try:
-                message = bus.recv(0.0 if frames else pause)
-            except Exception as error:  # each back end has its own types
-                raise lost(self.name, error) from error
-            if message is None:
-                break
-            if (frame := frame_of(message)) is not None:
-                frames.append(frame)
-        return frames
-
-    def _open_bus(self) -> Any:
         if self._bus is None:
             raise lost(self.name, "it is closed")
-        return self._bus
+        try:
+            while len(frames) < MOST_FRAMES and (message := self._bus.recv(pause)) is not None:
+                pause = 0.0
+                if (frame := frame_of(message)) is not None:
+                    frames.append(frame)
+        except Exception as error:  # each back end has its own types
+            raise lost(self.name, error) from error
+        return frames
 
     def write(self, frame: CanFrame) -> None:
         message = self._can.Message(
@@ -283,9 +277,10 @@ class BusChannel:
             is_extended_id=frame.extended,
             is_remote_frame=bool(frame.id & REMOTE_FLAG),
         )
-        bus = self._open_bus()
+        if self._bus is None:
+            raise lost(self.name, "it is closed")
         try:
-            bus.send(message, 0)
+            self._bus.send(message, 0)
         except Exception as error:  # each back end has its own types
             text = str(error).lower()
             is_full = isinstance(error, TimeoutError) or _error_code(error) in _FULL

@@ -10,6 +10,7 @@ passes a number to its driver that means another rate. A wrong rate disturbs the
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import inspect
 import json
@@ -33,7 +34,7 @@ TEXT_OPTIONS: Final = {"slcan": {"tty_baudrate", "timing"}, "socketcand": {"host
 _TIMING: Final = ("f_clock", "brp", "tseg1", "tseg2", "sjw", "nof_samples")
 """The bit timing of python-can: controller clock (Hz), prescaler, two segments, jump width, samples."""
 _LINK_OPTIONS: Final = {"bitrate", "config_context", "listen_only"}
-_SET_HERE: Final = {"self", "channel", "args", "kwargs", "bitrate", "timeout", "listen_only"}
+_SET_HERE: Final = _LINK_OPTIONS | {"self", "channel", "args", "kwargs", "timeout"}
 """Constructor parameters that are no options."""
 _WORDS: Final[Mapping[str, object]] = {"yes": True, "no": False, "on": True, "off": False}
 
@@ -149,12 +150,15 @@ def read_options(can: Any, port: str, rate: int, options: Mapping[str, object]) 
         raise RequestError(f"listen_only={listen_only}: neither yes nor no", expected="yes or no")
     back_end, names = None, TEXT_OPTIONS.get(interface)
     if names is None:
-        try:
+        names = {*merged}
+        with contextlib.suppress(
+            can.CanInterfaceNotImplementedError
+        ):  # opening it says that the driver is missing
             back_end = can.interface._get_class_for_interface(interface)
-        except can.CanInterfaceNotImplementedError:  # opening it says that the driver is missing
-            names = {*merged}
-        else:
-            names = parameters(back_end) - _SET_HERE
+            known = {*inspect.signature(back_end.__init__).parameters}
+            if "bitrate" in known or interface in (*SHARED, "socketcan"):  # others take any keyword
+                names = known
+    names = names - _SET_HERE
     settings = {name: value for name, value in merged.items() if name in names}
     _check_options(port, interface, user, settings, names)
     timing_rate = getattr(settings.get("timing"), "bitrate", 0)
@@ -203,15 +207,6 @@ def _check_options(
 def _nearest(word: str, known: Collection[str]) -> str:
     close = difflib.get_close_matches(word, known, 1)
     return f"did you mean {close[0]}?" if close else ""
-
-
-def parameters(back_end: Any) -> set[str]:
-    """Parameter names of a back end's constructor; also the documented ones where it takes any keyword."""
-    names = set(inspect.signature(back_end.__init__).parameters)
-    if "bitrate" not in names and "kwargs" in names:
-        text = f"{back_end.__doc__ or ''}\n{back_end.__init__.__doc__ or ''}"
-        names |= set(re.findall(r":param(?:\s[^:\n]*?)?\s(\w+)\s*:", text))
-    return names
 
 
 def _with_switches(options: Mapping[str, object]) -> dict[str, Any]:

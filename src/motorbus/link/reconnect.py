@@ -126,26 +126,24 @@ def find_terminal(name: str, device: str) -> str:
     return name
 
 
-Open = Callable[[str, int, bool, PortLock], Link]
-"""Opens a port: address, rate (bit/s), listen-only, and the lock that is kept for it."""
-
-
 class Reconnecting:
     """A link that is reopened after a loss; see `reconnecting`. It keeps the lock of `link`.
 
-    `find` returns the present address. It raises PortNotFound while the port is absent, LinkLost for another adapter.
-    `on_rename` is called with the new name of the lock, and with "" when another adapter has the name of the port.
+    `find` returns the present address, and raises PortNotFound while the port is absent, LinkLost for another adapter.
+    `settings` are for `open_link`. `on_rename` is called with the new name of the lock, and with "" when another
+    adapter has the name of the port.
     """
 
     virtual = False
     simulated = False
 
-    def __init__(self, link: Any, find: Callable[[], str], reopen: Open) -> None:
+    def __init__(self, link: Any, find: Callable[[], str], settings: Mapping[str, Any]) -> None:
         self.name: str = link.name
         self.paced: bool = link.paced
         self.on_rename: Callable[[str], object] = str
         self._find = find
-        self._reopen = reopen
+        self._settings = dict(settings)
+        self._first_rate: int = link.rate
         self._access = Lock()
         self._closed = False
         self._repaired = 0  # losses of the caller that are repaired
@@ -220,9 +218,7 @@ class Reconnecting:
                 self.__dict__.pop(method, None)
             before = self._lock
             try:
-                self._use(
-                    self._reopen(self._find(), self.rate, getattr(self._link, "listen_only", False), before)
-                )
+                self._use(self._reopen())
             except (MotorbusError, OSError) as error:
                 self._error = error
                 self._pause = min(2 * self._pause or FIRST_RETRY, LAST_RETRY)
@@ -236,6 +232,16 @@ class Reconnecting:
             if self._lock is not before:
                 before.release()
                 self.on_rename(self.lock_name)
+
+    def _reopen(self) -> Link:
+        """Open the port with its present rate and mode; a rate that was not given is not forced."""
+        settings = self._settings
+        if self.rate != self._first_rate:
+            settings["rate"] = self.rate
+        if hasattr(self._link, "listen_only"):
+            settings["options"] = {**(settings.get("options") or {}), "listen_only": self._link.listen_only}
+        lock = self._lock if self._lock.held else None
+        return open_link(self._find(), lock=lock, connect_time=CONNECT_TIME, **settings)
 
     def rest(self, until: float) -> None:
         """See `Renewable.rest`."""
@@ -255,43 +261,23 @@ class Reconnecting:
 
 
 def reconnecting(
-    link: Link,
-    *,
-    rate: int = 0,
-    default_rate: int = 0,
-    kind: str = "bytes",
-    options: Mapping[str, object] | None = None,
-    lister: Lister = list_ports,
-    sysfs: Path = Path("/sys"),
+    link: Link, *, lister: Lister = list_ports, sysfs: Path = Path("/sys"), **settings: Any
 ) -> Link:
-    """The same link, reopened after a loss; the other arguments are those it was opened with.
+    """The same link, reopened after a loss; `settings` are those it was opened with, see `open_link`.
 
     Not for a pseudo-terminal opened by its number, which goes to the next terminal, nor for a port without a lock.
     """
-    opened: Any = link
-    if getattr(link, "lock", None) is None or not opened.lock.held:
-        return link
-    given = dict(options or {})
-    name, first_rate = link.name, link.rate
-
-    def reopen(port: str, new_rate: int, listen_only: bool, lock: PortLock) -> Link:
-        return open_link(
-            port,
-            rate=rate if new_rate == first_rate else new_rate,  # a rate that was not given is not forced
-            default_rate=default_rate,
-            kind=kind,
-            options={**given, "listen_only": listen_only} if kind == "frames" else given,
-            lock=lock if lock.held else None,
-            connect_time=CONNECT_TIME,
-        )
-
-    device: str = opened.device if kind == "frames" else "" if "://" in name else name
-    if not device:
-        return Reconnecting(link, lambda: name, reopen)
+    name = link.name
+    lock = getattr(link, "lock", None)
+    device: str = getattr(link, "device", "" if "://" in name else name)
     real = os.path.realpath(device)
-    if real.startswith(usb_adapters.PSEUDO_TERMINALS):
-        is_number = os.path.abspath(device) == real
-        return link if is_number else Reconnecting(link, lambda: find_terminal(name, device), reopen)
+    is_terminal = real.startswith(usb_adapters.PSEUDO_TERMINALS)
+    if lock is None or not lock.held or (is_terminal and os.path.abspath(device) == real):
+        return link
+    if not device:
+        return Reconnecting(link, lambda: name, settings)
+    if is_terminal:
+        return Reconnecting(link, lambda: find_terminal(name, device), settings)
     known = identify(real, lister, sysfs)
-    port_at: Callable[[str], str] = opened.port_at if kind == "frames" else str
-    return Reconnecting(link, lambda: port_at(find_adapter(name, known, lister, sysfs)), reopen)
+    port_at: Callable[[str], str] = getattr(link, "port_at", str)
+    return Reconnecting(link, lambda: port_at(find_adapter(name, known, lister, sysfs)), settings)

@@ -94,6 +94,9 @@ class SerialLink(StreamLink):
         self.latency, self.warnings = usb_adapters.device_latency(device, sysfs)
 
     def _open(self, device: str) -> None:
+        import fcntl
+        import termios
+
         user = find_user(device)
         if user is not None:
             raise busy(self.name, user)
@@ -103,19 +106,11 @@ class SerialLink(StreamLink):
             os.set_blocking(descriptor, False)
             self.attach(descriptor, partial(os.read, descriptor), partial(os.write, descriptor))
             if self.paced:  # a pseudo-terminal would keep the mark while its simulator has it open
-                self._exclude_others(descriptor)
+                fcntl.ioctl(descriptor, termios.TIOCEXCL)  # later opens fail, except those of root
             _check_rate(self.name, descriptor, self.rate)
         except BaseException:
             self.close()
             raise
-
-    def _exclude_others(self, descriptor: int) -> None:
-        """Let the kernel refuse later opens of the port, except those of root."""
-        import fcntl
-        import termios
-
-        with contextlib.suppress(OSError):
-            fcntl.ioctl(descriptor, termios.TIOCEXCL)
 
     def tune(self, rate: int, listen_only: bool = False) -> None:
         time.sleep(max(0.0, self._idle_at - time.monotonic()))  # bytes on their way keep their rate

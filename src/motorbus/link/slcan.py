@@ -126,10 +126,18 @@ class SlcanChannel(TextChannel):
                 break
         timeout = REPLY_TIME if replies else self._first_reply
         command = f"S{SLCAN_RATES.index(rate)}" if timing is None else f"s{timing.btr0:02X}{timing.btr1:02X}"
-        if self._command(command, timeout) is False:
-            raise self._refusal(f"refuses {rate} bit/s ({command})")
-        if self._command("L" if listen_only else "O", timeout) is False:
-            raise self._refusal("cannot only listen" if listen_only else "refuses to open its channel")
+        steps = (
+            (command, f"refuses {rate} bit/s ({command})"),
+            ("L", "cannot only listen") if listen_only else ("O", "refuses to open its channel"),
+        )
+        for command, refusal in steps:
+            if self._command(command, timeout) is False:
+                raise LinkError(
+                    f"{self.name}: the adapter {refusal}",
+                    received="BEL (07)",
+                    expected="CR (0D)",
+                    advice="choose what the adapter can do; its manual lists the commands of slcan it knows",
+                )
         codec.refused = codec.damaged = 0
 
     def _command(self, command: str, timeout: float) -> bool | None:
@@ -143,14 +151,6 @@ class SlcanChannel(TextChannel):
                 assert isinstance(data, bytes)
                 codec.feed(data)
         return codec.reply
-
-    def _refusal(self, what: str) -> LinkError:
-        return LinkError(
-            f"{self.name}: the adapter {what}",
-            received="BEL (07)",
-            expected="CR (0D)",
-            advice="choose what the adapter can do; its manual lists the commands of slcan it knows",
-        )
 
     def close(self) -> None:
         """Close the channel of the adapter, and the port."""

@@ -50,12 +50,7 @@ def open_link(
         from motorbus.link.can import CanLink
 
         return CanLink(
-            port,
-            rate=rate,
-            default_rate=default_rate,
-            options=options,
-            lock=lock,
-            connect_time=connect_time,
+            port, rate=rate, default_rate=default_rate, options=options, lock=lock, connect_time=connect_time
         )
     rate = rate or default_rate
     if rate <= 0:
