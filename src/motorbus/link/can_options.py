@@ -4,8 +4,8 @@ The address and options win over environment variables, and those over configura
 python-can passes every option to every back end, and most ignore unknown ones; here such an option of the user is an
 error. A setting of a configuration that the back end does not have is ignored.
 
-Back ends of python-can differ for a bit rate that they do not have: one raises, one takes 500 kbit/s instead, one
-passes a number to its driver that means another rate. A wrong rate disturbs the whole bus, so it is an error here.
+Some back ends take another bit rate silently for one that they do not have. A wrong rate disturbs the whole bus, so it
+is an error here.
 """
 
 from __future__ import annotations
@@ -46,15 +46,8 @@ SLCAN_ADVICE: Final = (
     "S7 is 800 kbit/s in the LAWICEL manual and 750 kbit/s in python-can, so neither is used; "
     "f_clock=8000000,brp=1,tseg1=7,tseg2=2,sjw=1,nof_samples=1 is 800 kbit/s"
 )
-_TABLES: Final = {
-    "pcan": "PCAN_BITRATES",
-    "kvaser": "BITRATE_OBJS",
-    "ixxat": "CHANNEL_BITRATES",
-    "systec": "BITRATES",
-    "iscan": "BAUDRATES",
-    "seeedstudio": "BITRATE",
-}
-"""Where the back ends of python-can keep their rates: an attribute of the class or of its module."""
+_TABLES: Final = {"pcan": "PCAN_BITRATES", "kvaser": "BITRATE_OBJS"}
+"""The tables in python-can's modules whose back ends take another rate silently for one that they do not have."""
 
 
 class CanOptions(NamedTuple):
@@ -214,15 +207,13 @@ def _with_switches(options: Mapping[str, object]) -> dict[str, Any]:
     return {name: _WORDS.get(str(value).lower(), value) for name, value in options.items()}
 
 
-def known_rates(options: CanOptions) -> frozenset[int]:
-    """The bit rates in the table of this back end; empty when it takes any number, or has no table."""
+def known_rates(options: CanOptions) -> set[int]:
+    """The bit rates that this back end has; empty when it takes any number, or refuses a wrong one itself."""
     if options.interface == "slcan":
-        return frozenset(SLCAN_RATES) - {0}
-    name, back_end = _TABLES.get(options.interface), options.back_end
-    if name is None or back_end is None:
-        return frozenset()
-    table: Any = getattr(back_end, name, None) or getattr(sys.modules[back_end.__module__], name, ())
-    return frozenset(table[0] if options.interface == "ixxat" and table else table)
+        return {*SLCAN_RATES} - {0}
+    if options.interface not in _TABLES or options.back_end is None:
+        return set()
+    return {*getattr(sys.modules[options.back_end.__module__], _TABLES[options.interface])}
 
 
 def check_rate(options: CanOptions, rate: int) -> None:

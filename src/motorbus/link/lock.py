@@ -80,6 +80,8 @@ def socket_path(port: str) -> Path:
         return path
     user = os.getuid() if hasattr(os, "getuid") else 0
     folder = _make_private(Path(tempfile.gettempdir()) / f"motorbus-{user}")
+    if folder.lstat().st_uid != user:  # root may change the mode of any folder
+        raise LinkError(f"{folder} belongs to another user", advice="set XDG_STATE_HOME to a shorter path")
     return folder / f"{hashlib.sha256(os.fsencode(path)).hexdigest()[:16]}.sock"
 
 
@@ -199,21 +201,12 @@ def _open_locked(path: Path) -> int | None:
 
 def _is_locked(path: Path) -> bool:
     """Whether a process holds the lock; a file alone may be left over."""
-    if os.name == "nt":
-        descriptor = _open_locked(path)
-        if descriptor is not None:
-            os.close(descriptor)
-        return descriptor is None
-    import fcntl
-
-    try:
-        with path.open() as file:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    except OSError:
-        pass
-    return False
+    if not path.exists():
+        return False
+    descriptor = _open_locked(path)
+    if descriptor is not None:
+        os.close(descriptor)
+    return descriptor is None
 
 
 def _written_owner(path: Path) -> Owner | None:

@@ -158,7 +158,8 @@ class Reconnecting:
             self._lock: PortLock = link.lock
             link.lock = PortLock(link.lock.port)  # closing the link releases nothing
         link.name = self.name
-        self._link = link
+        self._link: Link = link
+        self.listen_only = bool(getattr(link, "listen_only", False))
         self.rate: int = link.rate
         self.warnings: tuple[str, ...] = link.warnings
         self.latency: float = link.latency
@@ -182,11 +183,10 @@ class Reconnecting:
 
     def tune(self, rate: int, listen_only: bool = False) -> None:
         self._link.tune(rate, listen_only)
-        self.rate = self._link.rate
+        self.rate, self.listen_only = self._link.rate, listen_only
 
     def fileno(self) -> int | None:
-        descriptor: int | None = self._link.fileno()
-        return descriptor
+        return self._link.fileno()
 
     def trouble(self) -> str:
         """What the adapter has reported since the last call."""
@@ -198,11 +198,6 @@ class Reconnecting:
         with self._access:  # also a port that another thread is opening
             self._link.close()
             self._lock.release()
-
-    def __getattr__(self, name: str) -> Any:
-        if name == "_link":  # not assigned yet
-            raise AttributeError(name)
-        return getattr(self._link, name)
 
     def renew(self, losses: int) -> None:
         """See `Renewable.renew`. Waits for another thread that is reopening the port."""
@@ -238,8 +233,8 @@ class Reconnecting:
         settings = self._settings
         if self.rate != self._first_rate:
             settings["rate"] = self.rate
-        if hasattr(self._link, "listen_only"):
-            settings["options"] = {**(settings.get("options") or {}), "listen_only": self._link.listen_only}
+        if settings.get("kind") == "frames":
+            settings["options"] = {**(settings.get("options") or {}), "listen_only": self.listen_only}
         lock = self._lock if self._lock.held else None
         return open_link(self._find(), lock=lock, connect_time=CONNECT_TIME, **settings)
 

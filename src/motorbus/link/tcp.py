@@ -52,7 +52,18 @@ class TcpLink(StreamLink):
         self.rate = rate
         host, port = split_address(url)
         with opening(url, lock) as self.lock:
-            self._socket = connection = _connect(url, host, port, connect_time)
+            try:
+                self._socket = connection = socket.create_connection((host, port), timeout=connect_time)
+            except TimeoutError as error:
+                raise PortNotFound(f"{url}: no answer within {connect_time:g} s") from error
+            except (OSError, UnicodeError) as error:
+                raise PortNotFound(
+                    f"{url} cannot be reached: {error}",
+                    advice="is the bridge switched on, the simulator running, the port number right?",
+                ) from error
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        send_at_once(connection)
+        connection.setblocking(False)
         self.attach(connection.fileno(), connection.recv, connection.send)
         address = ipaddress.ip_address(connection.getpeername()[0].partition("%")[0])
         self.latency = LOOPBACK_LATENCY if address.is_loopback else NETWORK_LATENCY
@@ -68,22 +79,6 @@ class TcpLink(StreamLink):
         self.detach()
         self._socket.close()
         self.lock.release()
-
-
-def _connect(url: str, host: str, port: int, connect_time: float) -> socket.socket:
-    try:
-        connection = socket.create_connection((host, port), timeout=connect_time)
-    except TimeoutError as error:
-        raise PortNotFound(f"{url}: no answer within {connect_time:g} s") from error
-    except (OSError, UnicodeError) as error:
-        raise PortNotFound(
-            f"{url} cannot be reached: {error}",
-            advice="is the bridge switched on, the simulator running, the port number right?",
-        ) from error
-    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-    send_at_once(connection)
-    connection.setblocking(False)
-    return connection
 
 
 def send_at_once(connection: socket.socket) -> None:
