@@ -144,9 +144,7 @@ def read_options(can: Any, port: str, rate: int, options: Mapping[str, object]) 
     back_end, names = None, TEXT_OPTIONS.get(interface)
     if names is None:
         names = {*merged}
-        with contextlib.suppress(
-            can.CanInterfaceNotImplementedError
-        ):  # opening it says that the driver is missing
+        with contextlib.suppress(can.CanInterfaceNotImplementedError):  # opening says what is missing
             back_end = can.interface._get_class_for_interface(interface)
             known = {*inspect.signature(back_end.__init__).parameters}
             if "bitrate" in known or interface in (*SHARED, "socketcan"):  # others take any keyword

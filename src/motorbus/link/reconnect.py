@@ -41,15 +41,16 @@ Lister = Callable[[], Iterable[Any]]
 
 
 class Identity(NamedTuple):
-    """A port of an adapter. Ports with the same `key` are the same, or cannot be distinguished.
+    """A serial port. Ports with the same `text` and `interface` are the same, or cannot be distinguished.
 
-    `place` is the USB socket, "" when unknown; `device` is the present name; `text` describes it in messages.
+    `interface` is its number in an adapter with several ports, `place` the USB socket, "" when unknown; `device` is the
+    present name.
     """
 
-    key: tuple[object, ...]
+    text: str
+    interface: tuple[object, ...]
     place: str
     device: str
-    text: str
 
 
 def identities(lister: Lister, sysfs: Path = Path("/sys")) -> list[Identity]:
@@ -57,29 +58,22 @@ def identities(lister: Lister, sysfs: Path = Path("/sys")) -> list[Identity]:
     found = []
     for port in lister():
         device = port.resolved_device
-        if port.vid is None:
-            found.append(Identity((device,), "", device, f"the port {device}"))
-            continue
         parts = Path(os.path.realpath(sysfs / "class" / "tty" / Path(device).name / "device")).parts
         place = next((part for part in reversed(parts) if _USB_SOCKET.fullmatch(part)), "")
-        mark = f"with the serial number {port.serial_number}"
-        if not port.serial_number:
+        text = f"the port {device}"
+        if port.vid is not None:
             mark = f"at the USB place {place}" if place else f"at {device}"
-        key = (
-            port.vid,
-            port.pid,
-            port.interface_num,
-            port.port_number,
-            mark,
-        )  # an adapter may have several ports
-        found.append(Identity(key, place, device, f"the adapter {port.vid:04x}:{port.pid or 0:04x} {mark}"))
+            if port.serial_number:
+                mark = f"with the serial number {port.serial_number}"
+            text = f"the adapter {port.vid:04x}:{port.pid or 0:04x} {mark}"
+        found.append(Identity(text, (port.interface_num, port.port_number), place, device))
     return found
 
 
 def identify(device: str, lister: Lister, sysfs: Path = Path("/sys")) -> Identity:
     """The identity of a port that is present; `device` is a path without symbolic links."""
     found = (one for one in identities(lister, sysfs) if real_name(one.device) == real_name(device))
-    return next(found, Identity((device,), "", device, f"the port {device}"))
+    return next(found, Identity(f"the port {device}", (), "", device))
 
 
 def find_adapter(name: str, wanted: Identity, lister: Lister, sysfs: Path = Path("/sys")) -> str:
@@ -89,7 +83,7 @@ def find_adapter(name: str, wanted: Identity, lister: Lister, sysfs: Path = Path
     could be it.
     """
     present = identities(lister, sysfs)
-    same = [one for one in present if one.key == wanted.key]
+    same = [one for one in present if one[:2] == wanted[:2]]
     if len(same) > 1:  # some makers give one number to a whole batch
         same = [one for one in same if wanted.place and one.place == wanted.place]
         if len(same) != 1:
@@ -108,7 +102,7 @@ def find_adapter(name: str, wanted: Identity, lister: Lister, sysfs: Path = Path
                 cause="another adapter was plugged in and got the name of the lost one",
                 advice="plug in the first one, or open the bus again with the right name",
             )
-    if wanted.key == (wanted.device,) and os.path.exists(wanted.device):  # the system does not list it
+    if not wanted.interface and os.path.exists(wanted.device):  # the system does not list it
         return wanted.device
     raise PortNotFound(f"{name}: {wanted.text} is not there")
 
