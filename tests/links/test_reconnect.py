@@ -176,6 +176,17 @@ def test_the_rate_is_kept(usb: Usb, master: PtyMaster) -> None:
     link.close()
 
 
+def test_the_first_rate_can_be_had_again(usb: Usb, master: PtyMaster) -> None:
+    link = adapter(master, usb)
+    link.tune(500_000)
+    link.renew(1)
+    link.tune(RATE)
+    link.rest(link.now() + 30)
+    link.renew(2)
+    assert (link.rate, master.rate()) == (RATE, RATE)
+    link.close()
+
+
 # -- servers -------------------------------------------------------------------------------------------------------
 
 

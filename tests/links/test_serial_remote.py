@@ -63,3 +63,14 @@ def test_no_server_is_no_port(server: Server) -> None:
     server.close()
     with pytest.raises(PortNotFound, match="cannot be reached"):
         open_stream(server.url, rate=1_000_000)
+
+
+def test_a_closed_link_is_lost(remote: PolledLink) -> None:
+    remote.close()
+    remote.close()
+    with pytest.raises(LinkLost, match="closed"):
+        remote.read(remote.now())
+    with pytest.raises(LinkLost, match="closed"):
+        remote.write(PING)
+    with pytest.raises(LinkLost, match="closed"):
+        remote.tune(9600)

@@ -136,7 +136,7 @@ class Reconnecting:
         self.paced: bool = link.paced
         self.on_rename: Callable[[str], object] = str
         self._find = find
-        self._settings = dict(settings)
+        self._settings = settings
         self._first_rate: int = link.rate
         self._access = Lock()
         self._closed = False
@@ -224,7 +224,7 @@ class Reconnecting:
 
     def _reopen(self) -> Link:
         """Open the port with its present rate and mode; a rate that was not given is not forced."""
-        settings = self._settings
+        settings = dict(self._settings)
         if self.rate != self._first_rate:
             settings["rate"] = self.rate
         if settings.get("kind") == "frames":

@@ -106,7 +106,8 @@ class SerialLink(StreamLink):
             os.set_blocking(descriptor, False)
             self.attach(descriptor, partial(os.read, descriptor), partial(os.write, descriptor))
             if self.paced:  # a pseudo-terminal would keep the mark while its simulator has it open
-                fcntl.ioctl(descriptor, termios.TIOCEXCL)  # later opens fail, except those of root
+                with contextlib.suppress(OSError):
+                    fcntl.ioctl(descriptor, termios.TIOCEXCL)  # later opens fail, except those of root
             _check_rate(self.name, descriptor, self.rate)
         except BaseException:
             self.close()
@@ -150,6 +151,7 @@ class PolledLink(StreamLink):
         self.latency = REMOTE_LATENCY if remote else usb_adapters.WINDOWS_LATENCY
         self._failure = serialx.SerialException
         self._access = Lock()
+        self._closed = False
         with opening(port, lock) as self.lock:
             self._serial = _open_serial(port, port, rate, connect_time)
         connection = getattr(self._serial, "_socket", None)
@@ -160,8 +162,9 @@ class PolledLink(StreamLink):
         buffer = bytearray(CHUNK)
         while True:
             with self._access:
+                port = self._open_port()
                 try:
-                    count = self._serial.readinto(buffer, timeout=0)
+                    count = port.readinto(buffer, timeout=0)
                 except (OSError, self._failure) as error:
                     raise lost(self.name, error) from error
             pause = until - time.monotonic()
@@ -171,8 +174,9 @@ class PolledLink(StreamLink):
 
     def send(self, data: bytes) -> int:
         with self._access:
+            port = self._open_port()
             try:
-                self._serial.write(data, timeout=0)
+                port.write(data, timeout=0)
             except TimeoutError:
                 return 0
             except (OSError, self._failure) as error:
@@ -181,10 +185,16 @@ class PolledLink(StreamLink):
 
     def tune(self, rate: int, listen_only: bool = False) -> None:
         with self._access:
-            _set_rate(self.name, self._serial, rate)
+            _set_rate(self.name, self._open_port(), rate)
         self.rate = rate
 
+    def _open_port(self) -> BaseSerial:
+        if self._closed:
+            raise lost(self.name, "it is closed")
+        return self._serial
+
     def close(self) -> None:
+        self._closed = True
         with self._access, contextlib.suppress(OSError):
             self._serial.close()
         self.lock.release()

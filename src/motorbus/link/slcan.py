@@ -119,26 +119,26 @@ class SlcanChannel(TextChannel):
             self.latency += 2 * LINE_BITS / rate
 
     def configure(self, rate: int, listen_only: bool) -> None:
-        codec, timing = self._codec, self._timing
+        timing = self._timing
         replies = self._command("C", self._first_reply) is not None  # BEL: it is closed already
         for _ in range(MOST_READS):  # frames of the old rate, and replies to a program that was killed
             if not self._link.read(time.monotonic() + SILENT_PAUSE):
                 break
         timeout = REPLY_TIME if replies else self._first_reply
-        command = f"S{SLCAN_RATES.index(rate)}" if timing is None else f"s{timing.btr0:02X}{timing.btr1:02X}"
-        steps = (
-            (command, f"refuses {rate} bit/s ({command})"),
-            ("L", "cannot only listen") if listen_only else ("O", "refuses to open its channel"),
-        )
-        for command, refusal in steps:
-            if self._command(command, timeout) is False:
-                raise LinkError(
-                    f"{self.name}: the adapter {refusal}",
-                    received="BEL (07)",
-                    expected="CR (0D)",
-                    advice="choose what the adapter can do; its manual lists the commands of slcan it knows",
-                )
-        codec.refused = codec.damaged = 0
+        setting = f"S{SLCAN_RATES.index(rate)}" if timing is None else f"s{timing.btr0:02X}{timing.btr1:02X}"
+        refusal = ""
+        if self._command(setting, timeout) is False:
+            refusal = f"refuses {rate} bit/s ({setting})"
+        elif self._command("L" if listen_only else "O", timeout) is False:
+            refusal = "cannot only listen" if listen_only else "refuses to open its channel"
+        if refusal:
+            raise LinkError(
+                f"{self.name}: the adapter {refusal}",
+                received="BEL (07)",
+                expected="CR (0D)",
+                advice="choose what the adapter can do; its manual lists the commands of slcan it knows",
+            )
+        self.trouble()  # a refused C is none
 
     def _command(self, command: str, timeout: float) -> bool | None:
         """Send a command; whether the adapter accepts it, or None when it does not reply in time (s)."""
