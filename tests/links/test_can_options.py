@@ -32,7 +32,7 @@ def config(port: str, rate: int = 0, **options: object) -> CanOptions:
         ("can://SLCAN/COM7", "slcan", {"channel": "COM7"}),
         ("can://slcan/socket://127.0.0.1:4000", "slcan", {"channel": "socket://127.0.0.1:4000"}),
         ("can://socketcan/can0", "socketcan", {"channel": "can0"}),
-        ("can://socketcand/box:4/can0", "socketcand", {"channel": "can0", "host": "box", "port": 4}),
+        ("can://socketcand/box:4/can0", "socketcand", {"channel": "can0", "host": "box", "port": "4"}),
         ("can://socketcand/box/can0", "socketcand", {"channel": "can0", "host": "box", "port": 29536}),
         ("can://virtual", "virtual", {}),
         ("can://", "", {}),

@@ -106,13 +106,7 @@ def parse_port(port: str) -> tuple[str, dict[str, Any]]:
     if interface == "socketcand" and channel:
         host, _, channel = channel.partition("/")
         host, _, number = host.partition(":")
-        if not host or not channel or not (number or "0").isdecimal():
-            raise RequestError(
-                f"{port!r} does not name a channel of a server",
-                expected="can://socketcand/HOST:PORT/CHANNEL",
-                advice="for example can://socketcand/localhost:29536/can0",
-            )
-        return interface, {"channel": channel, "host": host, "port": int(number or SOCKETCAND_PORT)}
+        return interface, {"channel": channel, "host": host, "port": number or SOCKETCAND_PORT}
     has_name = channel.startswith("/") or "://" in channel or re.fullmatch(r"COM\d+(@\d+)?", channel)
     if interface in SERIAL_PORTS and channel and not has_name and os.name != "nt":
         channel = f"/{channel}"

@@ -206,9 +206,7 @@ class MemoryLink:
         if self._closed:
             raise LinkLost(f"{self.name}: the port is closed")
         if now >= self._gone_at:
-            raise LinkLost(
-                f"{self.name}: the adapter was unplugged", cause="the simulated adapter was unplugged"
-            )
+            raise LinkLost(f"{self.name}: the simulated adapter was unplugged")
 
     def _next_event(self) -> float:
         if self.now() >= self._gone_at:

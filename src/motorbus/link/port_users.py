@@ -43,12 +43,11 @@ def _open_files(process: Path) -> list[tuple[Path, str]]:
 
 
 def _is_same(descriptor: Path, device: str) -> bool:
-    """The same device number too: in a container the same name can be another device."""
+    """Whether it is the same file too: in a container the same name can be another device."""
     try:
-        theirs, ours = descriptor.stat(), Path(device).stat()
+        return os.path.samefile(descriptor, device)
     except OSError:
         return False
-    return (theirs.st_dev, theirs.st_rdev) == (ours.st_dev, ours.st_rdev)
 
 
 def _serves(opened: list[tuple[Path, str]], device: str) -> bool:

@@ -67,9 +67,10 @@ def _decode_frame(match: re.Match[bytes]) -> CanFrame:
 def open_socketcand(options: CanOptions, connect_time: float | None) -> TextChannel:
     """Connect to the server and open the channel in raw mode. Raises RequestError, PortNotFound or LinkError."""
     host, port = options.settings.get("host"), options.settings.get("port")
-    if not host or not port or options.channel is None:
+    if not host or not port or not options.channel:
         raise RequestError(
-            f"{options.name}: the server is missing", expected="can://socketcand/HOST:PORT/CHANNEL"
+            f"{options.name} does not name a channel of a server",
+            expected="can://socketcand/HOST:PORT/CHANNEL, as can://socketcand/localhost:29536/can0",
         )
     url = f"socket://{host}:{port}"
     lock = PortLock(url)  # the caller has locked the channel; a server may have several

@@ -58,6 +58,6 @@ def open_link(
     from motorbus.link.serial import open_stream
 
     link = open_stream(port, rate=rate, lock=lock, connect_time=connect_time)
-    latency: Any = (options or {}).get("latency", link.latency)
-    link.latency = latency
+    given: Mapping[str, Any] = options or {}
+    link.latency = given.get("latency", link.latency)
     return link
