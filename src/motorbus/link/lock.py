@@ -181,13 +181,13 @@ def holders() -> list[Owner]:
 
 def _open_locked(path: Path) -> int | None:
     """The descriptor of this file with our lock on it; None while another process has the lock."""
-    if os.name == "nt":  # the open file is the lock: Windows does not remove it
+    try:
+        import fcntl
+    except ImportError:  # Windows, which does not remove an open file: that is the lock
         with contextlib.suppress(OSError):
             path.unlink(missing_ok=True)
             return os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL)
         return None
-    import fcntl
-
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -115,7 +115,11 @@ def find_terminal(name: str, device: str) -> str:
     real = os.path.realpath(device)
     if not (os.path.exists(real) and real.startswith(usb_adapters.PSEUDO_TERMINALS)):
         raise PortNotFound(f"{device} leads nowhere")
-    if os.lstat(device).st_ctime_ns < os.stat(real).st_ctime_ns:
+    made, path = 0, device
+    while os.path.islink(path):  # the newest of a chain
+        made = max(made, os.lstat(path).st_ctime_ns)
+        path = os.path.join(os.path.dirname(path), os.readlink(path))
+    if made < os.stat(real).st_ctime_ns:
         raise PortNotFound(f"{device} has not been made again")
     return name
 
