@@ -23,6 +23,7 @@ class Context(Protocol):
     statistics: Statistics
     time: float
     stopping: bool
+    latched_by: str
     diagnosis: Callable[[], str]
 
     @property
@@ -54,8 +55,10 @@ def carry_out(engine: Context, request: Exchange[Any]) -> Policy:
         fault = attempt.fault
         if attempt.accepted is not None:
             return attempt.accepted
+        if engine.stopping and request.rank is not Rank.STOP:
+            raise failures.latched(engine.latched_by)
         tries += 1
-        if not _may_repeat(request, fault) or tries > RETRIES or engine.stopping:
+        if not _may_repeat(request, fault) or tries > RETRIES:
             raise _error(engine, request, attempt, tries, sent)
         engine.statistics.retried(request.replies)
 
