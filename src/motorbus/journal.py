@@ -1,10 +1,9 @@
-"""What must survive a crash: how far a guarded change of a device has come, on disk before its next step.
+"""The crash journal: the state of a guarded change of a device, on disk before the next step of the change.
 
-A servo whose id is half changed answers to a name that nobody remembers, and a controller whose project is borrowed
-does something else than its owner wrote. So whoever changes one says first what it is about to do, then each step, then
-how it ended; each record is on disk before the next frame leaves. One file per port, beside its lock and held by it, so
-never two writers. It holds one change: beginning the next one replaces it, and nothing begins while another is
-unfinished.
+After a crash a servo may have an unknown id, and a controller another project than its owner wrote. So a change is
+recorded before it begins, at each step and at its end; each record is on disk before the next frame leaves. There is
+one file per port, beside its lock. The holder of the lock is the only writer. A file holds one change: the next change
+replaces it, and none begins while another is unfinished.
 """
 
 from __future__ import annotations
@@ -81,9 +80,8 @@ class BusJournal:
     def __call__(self, event: object) -> None:
         """Record it; it is on disk when this returns.
 
-        Raises RequestError while another change is unfinished (one by another verb, or whose facts are others), for
-        a first record that does not say which device it is about, which nobody could recover, and for a file that a
-        later version wrote; LinkError when the file cannot be written.
+        Raises RequestError while another change is unfinished (by another verb, or with other facts), for a first
+        record without a device, and for a file of a later version; LinkError when the file cannot be written.
         """
         assert isinstance(event, Journal)
         open_change = self.unfinished()
@@ -133,7 +131,7 @@ class BusJournal:
             raise _unusable(self.path, "read", error) from error
 
     def _replace(self, content: bytes) -> None:
-        """The whole file anew: another one is made beside it and takes its name, so it is never half written."""
+        """Replace the file by a new one, so it is never half written."""
         if self.path is None:
             self._memory = content
             return
@@ -171,17 +169,16 @@ def everywhere() -> list[Change | MotorbusError]:
     return found
 
 
-def told_by(name: Callable[[str], bool]) -> list[Path]:
-    """The files of unfinished changes on buses whose address, as it was said then, is one that `name` knows.
+def find_files(matches: Callable[[str], bool]) -> list[Path]:
+    """The files of unfinished changes on buses whose address at that time `matches`. Unreadable files are left out.
 
-    A port may have lost the name by which its user knows it, as a link to an adapter that is gone. A file that cannot
-    be read is none of them.
+    A port may have lost its name: the user's link points to an adapter that is gone.
     """
     found = []
     for path in journals():
         with contextlib.suppress(MotorbusError, OSError):
             change = _read(path.read_bytes(), path)
-            if change is not None and name(change.bus):
+            if change is not None and matches(change.bus):
                 found.append(path)
     return found
 
@@ -264,22 +261,20 @@ def _sync_folder(folder: Path) -> None:
 
 
 def _hinders(change: Change, event: Journal) -> bool:
-    """Must this event not be, while that change is open?"""
+    """This event is refused while that change is open."""
     if event.state == ASKED:
         return not (event.facts.get(READABLE) and change.facts.get(READABLE))
     return event.state == INTENT or not _belongs(event, change)
 
 
 def _belongs(event: Journal, change: Change) -> bool:
-    """Is this a record of that change? It has the same verb, and no fact of it is another."""
+    """This is a record of that change: it has the same verb, and no fact differs."""
     return event.change == change.verb and all(
         change.facts.get(name, fact) == fact for name, fact in event.facts.items() if name != REACHED
     )
 
 
-_FORGET: Final = (
-    "when every device of that bus is as it should be, `motorbus recover {} --forget` gives it up"
-)
+_FORGET: Final = "if every device of that bus is in order, `motorbus recover {} --forget` removes the record"
 
 
 def _described(change: Change) -> str:
@@ -290,7 +285,7 @@ def _described(change: Change) -> str:
 def _advice(change: Change) -> str:
     if change.advice:
         return change.advice
-    ends = "gives it back" if change.what else "finishes it or takes it back"  # what has words is a loan
+    ends = "gives it back" if change.what else "finishes it or takes it back"
     return f"`motorbus recover {change.bus}` {ends}"
 
 

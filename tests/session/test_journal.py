@@ -213,13 +213,13 @@ def test_a_journal_with_odd_contents_is_borne_told_and_forgotten(path: Path, lin
 
 def test_a_file_is_found_by_the_name_that_the_bus_had(path: Path) -> None:
     begun(path)
-    assert journal.told_by(lambda bus: bus == BUS) == [path]
-    assert journal.told_by(lambda bus: bus == "feetech:COM7") == []
+    assert journal.find_files(lambda bus: bus == BUS) == [path]
+    assert journal.find_files(lambda bus: bus == "feetech:COM7") == []
     other = journal_path("COM7")
     other.write_bytes(b'{"format": 2}\n')
-    assert journal.told_by(lambda _: True) == [path], "what cannot be read is none, and hinders nobody"
+    assert journal.find_files(lambda _: True) == [path], "what cannot be read is none, and hinders nobody"
     BusJournal(BUS, path)(record(OUTCOME, outcome="old"))
-    assert journal.told_by(lambda _: True) == []
+    assert journal.find_files(lambda _: True) == []
 
 
 # -- at open ------------------------------------------------------------------------------------------------------

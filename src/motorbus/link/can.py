@@ -226,7 +226,7 @@ class BusChannel:
         self._access = Lock()
 
     def configure(self, rate: int, listen_only: bool) -> None:
-        """Open the bus anew, at this rate in bit/s. Raises LinkError, or RequestError for what it refuses."""
+        """Open the bus again, at this rate in bit/s. Raises LinkError, or RequestError for what it refuses."""
         self.close()
         options, can = self._options, self._can
         settings = dict(options.settings)

@@ -66,7 +66,7 @@ class TextChannel:
         """A line was sent in part. It must not become a frame later, so `cancel` is sent after it."""
 
     def configure(self, rate: int, listen_only: bool) -> None:
-        """Set up the adapter anew, at this rate in bit/s. Raises LinkError when it refuses."""
+        """Set up the adapter again, at this rate in bit/s. Raises LinkError when it refuses."""
 
     def read(self, until: float) -> list[Data]:
         frames: list[Data] = []

@@ -29,9 +29,7 @@ from motorbus.simulation.named import Faults, Simulation, find
 if TYPE_CHECKING:
     from motorbus.bus.aio import AsyncBus
 
-logging.getLogger("motorbus").addHandler(
-    logging.NullHandler()
-)  # silent until somebody asks; here, for nothing below logs
+logging.getLogger("motorbus").addHandler(logging.NullHandler())  # silent by default
 
 Notify = Callable[[object], None]
 AnyBus = TypeVar("AnyBus", bound=BaseBus)
@@ -41,7 +39,7 @@ def open(address: str, *, report: Notify | None = None, **options: object) -> Bu
     """Open a bus, blocking; use it in a `with`.
 
     `report` gets progress, early results and journal records, the latter when they are on disk. Options may also stand
-    in the address. A guarded change that was cut off is told as a warning of the bus, see `unfinished`. Raises
+    in the address. An unfinished guarded change is a warning of the bus, see `unfinished`. Raises
     RequestError for a bad address, PortNotFound, PortBusy (naming the owner) or LinkError for the port.
     """
     bus = _opened(Bus, address, report, options)
@@ -97,9 +95,9 @@ def simulate(
     faults: Faults = "",
     **options: object,
 ) -> Simulation:
-    """A simulated bus in this process; use it in a `with`, open it by its `url`, poke its nodes by `sim[3]`.
+    """A simulated bus in this process; use it in a `with`, open it by its `url`, get its nodes by `sim[3]`.
 
-    `clock` is "virtual" (time passes only while somebody waits) or "real"; `faults` is a script of what goes wrong, see
+    `clock` is "virtual" (time passes only while a caller waits) or "real"; `faults` is a script of faults, see
     `motorbus.simulation.faults`. Raises RequestError for an unknown family, model or option, and for a bad script.
     """
     found = families.load(family)

@@ -1,4 +1,4 @@
-"""Which journal belongs to a bus: where the guarded changes on it are recorded, and whether one was cut off."""
+"""The journal of a bus: where its guarded changes are recorded, and whether one is unfinished."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from weakref import WeakKeyDictionary
 
 from motorbus.bus.base import BaseBus
-from motorbus.journal import BusJournal, Change, told_by
+from motorbus.journal import BusJournal, Change, find_files
 from motorbus.link.base import Link
 from motorbus.link.lock import journal_path
 from motorbus.session.address import Address, parse_address
@@ -18,7 +18,7 @@ _simulated: WeakKeyDictionary[Simulation, BusJournal] = WeakKeyDictionary()
 
 
 def unfinished(bus: BaseBus) -> Change | None:
-    """The guarded change that was cut off on this bus, if there is one; `recover` of its device ends it.
+    """The unfinished guarded change of this bus, None if there is none; `recover` of its device ends it.
 
     Raises RequestError when the journal was written by a later version.
     """
@@ -33,19 +33,21 @@ def journal_of(address: str) -> BusJournal | None:
 
 
 def _journal_on(address: str, port: str) -> BusJournal:
-    """The journal of this port; when nothing is unfinished there, that of a port which had this address when a change
-    was cut off: the address may be a link, to an adapter that has come back under another name or not at all."""
+    """The journal of this port, or of a port that had this address when a change was left unfinished.
+
+    The address may be a link to an adapter that is gone or has another name now.
+    """
     kept = BusJournal(address, journal_path(port))
     if kept.warning():
         return kept
     spot = parse_address(address)
-    for path in told_by(lambda bus: parse_address(bus)[:2] == spot[:2]):
+    for path in find_files(lambda bus: parse_address(bus)[:2] == spot[:2]):
         return BusJournal(address, path)
     return kept
 
 
 def kept_for(spot: Address, options: Mapping[str, object], opening: Opening, link: Link) -> BusJournal | None:
-    """Who records the changes on this bus; None for a channel that belongs to nobody, where none can be guarded."""
+    """The journal of this bus; None for a channel that several programs share, where no change can be guarded."""
     merged = {**spot.options, **{name: str(value) for name, value in options.items()}}
     address = spot._replace(options=merged).bus
     if opening.port.startswith("sim:"):

@@ -1,4 +1,4 @@
-"""What an address comes to before a port is touched: family, port, rate, and options that somebody takes."""
+"""An address and its options, checked before a port is opened: family, port, rate, options."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from motorbus.simulation.faults import strike
 
 LATEST = 1.0  # s
 FAULTS = "faults"
-"""What goes wrong by script, for simulated devices only; see `motorbus.simulation.faults`."""
+"""The option for a script of faults, for simulated devices only; see `motorbus.simulation.faults`."""
 ADAPTER = "can://"
-"""Ports whose remaining options are the adapter's own; `link.can` knows which there are."""
+"""Ports whose remaining options belong to the adapter; `link.can` checks them."""
 
 LATENCY = "latency"
-"""The option of every serial port that says for how long its adapter holds bytes back, where the user knows better."""
+"""The option of every serial port for the time (s) that its adapter holds bytes back."""
 RECONNECT = "reconnect"
-"""The option of every bus that says whether a port that was lost is looked for."""
+"""The option of every bus for whether a lost port is opened again."""
 
 
 class Opening(NamedTuple):
-    """Everything needed to open a bus, found out and checked beforehand.
+    """All that is needed to open a bus.
 
-    `family` as this bus speaks it; `rate` in bit/s, 0 when nobody said; `options` for the simulator or the link.
-    `reconnect`: a port that is lost is opened anew when it is there again.
+    `family` is configured for this bus; `rate` in bit/s, 0 if not given; `options` are for the simulator or the link.
+    `reconnect`: a lost port is opened again when it is back.
     """
 
     family: Family
@@ -64,9 +64,9 @@ def prepare(address: str, options: dict[str, object]) -> Opening:
 
 
 def simulated(opening: Opening) -> MemoryLink:
-    """New simulated devices on a bus in memory, as an address with the port `sim` wants them.
+    """Make the simulated devices of an address with the port `sim`, on a bus in memory.
 
-    Raises RequestError for what they cannot be: ids, a model, the value of an option, faults.
+    Raises RequestError for bad ids, an unknown model, a bad option or bad faults.
     """
     family, options = opening.family, dict(opening.options)
     ids = parse_ids(str(options.pop("ids", "1")))
@@ -80,8 +80,8 @@ def simulated(opening: Opening) -> MemoryLink:
 
 
 def _unknown(address: str, option: str, known: Iterable[str]) -> RequestError:
-    """The error for an option that nobody takes; of those that are `known` the most usual come first."""
-    from motorbus.motion.machine.refusal import listed, nearest  # whoever opens a bus alone needs no machine
+    """The error for an unknown option; the most usual of the `known` come first."""
+    from motorbus.motion.machine.refusal import listed, nearest  # opening a bus imports no machine
 
     there = dict.fromkeys(known)
     return RequestError(
@@ -92,12 +92,12 @@ def _unknown(address: str, option: str, known: Iterable[str]) -> RequestError:
 
 
 def _is_serial(family: Family, port: str) -> bool:
-    """A port that carries bytes, and is no simulator in this process."""
+    """A port that carries bytes, and is not a simulator in this process."""
     return family.link.kind == "bytes" and port.partition(":")[0] != "sim"
 
 
 def _timing(merged: dict[str, object]) -> dict[str, object]:
-    """What is said of the time that answers take, as the link takes it; nothing of it is left behind."""
+    """Remove the options about reply times and return them as the link takes them."""
     return {LATENCY: _latency(merged.pop(LATENCY))} if LATENCY in merged else {}
 
 
@@ -146,9 +146,9 @@ def _rate(word: str, said: object) -> int:
 
 
 def lock_name(address: str, options: Mapping[str, object]) -> str:
-    """What names the port of this bus where it is locked and listens for an emergency stop, however it was written.
+    """The name of the port of this bus, for its lock and its stop socket, the same for all spellings of the address.
 
-    "" for a channel on which any number of programs meet, so that nobody owns it. Raises RequestError.
+    "" for a channel that several programs share. Raises RequestError.
     """
     opening = prepare(address, dict(options))
     if not opening.port.startswith(ADAPTER):
