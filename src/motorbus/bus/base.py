@@ -386,7 +386,7 @@ class BaseBus:
         """Refuse motion and torque until `reset`, as after an emergency stop; sends nothing."""
         with self.turn:
             self.engine.latch(self.link.now(), asked_by())
-            self.engine.stopped()
+            self.engine.stop_sent()
 
     def reset(self) -> None:
         """Take the latch off. Nothing is sent and nothing moves."""

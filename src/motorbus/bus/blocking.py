@@ -12,7 +12,7 @@ from motorbus.bus.interrupts import ELSEWHERE, INTERRUPTS, MAIN, Interrupts, int
 from motorbus.bus.jobs import Attempt, RequestJob, Since
 from motorbus.bus.positions import GATED
 from motorbus.bus.prepared import Prepared
-from motorbus.bus.running import BRIEF, run_here, run_on
+from motorbus.bus.running import TURN_TIMEOUT, run_here, run_on
 from motorbus.bus.tasks import Notify
 from motorbus.core.entry import shown
 from motorbus.core.operation import UNLIKE, Exchange, Operation, Rank, Runnable, Together
@@ -239,7 +239,7 @@ def exchange_on(
         try:
             for bus, requests in batches.items():
                 try:
-                    pending.append(bus.start(requests, -1.0 if not pending else BRIEF))
+                    pending.append(bus.start(requests, -1.0 if not pending else TURN_TIMEOUT))
                 except MotorbusError as error:
                     found[bus] = error
         finally:

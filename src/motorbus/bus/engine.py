@@ -1,9 +1,10 @@
 """The engine of a bus: requests in, frames out, data in, replies out. No I/O and no clock.
 
-One request is in flight per lane, on as many lanes as the window of the family allows. An attempt is recorded in
-`in_flight` before its request is written and removed when its reply is accepted or its time is over; nothing else
-records doubt. A deadline is fixed when the request leaves; only requests on other lanes, which share the wire, extend
-it. A link is first in, first out.
+At most one request is in flight per lane, on at most `window` lanes. A request with replies is in `in_flight` from
+before it is written until its attempt ends or the link fails; which nodes may still owe a reply is in `sync`. A
+deadline is fixed when the request leaves; requests on other lanes, which share the wire, extend it, and an emergency
+stop may shorten it. The engine relies on a link that is first in, first out: data read before a request cannot answer
+it.
 """
 
 from __future__ import annotations
@@ -53,9 +54,11 @@ STOP_DELAY: Final = 0.003
 
 
 class Engine:
-    """The engine of one bus. `rate` in bit/s and `latency` in s describe the link; `paced`: frames take their time.
+    """The engine of one bus. `rate` (bit/s) and `latency` (s) describe the link; `paced`: the link takes air
+    time, so nothing is sent before `free_at` (s).
 
-    `time` (s) is the moment of the last call.
+    `time` (s) is `now` of the last `submit`, `next_frame` or `feed`. `losses` and `latches` count lost ports and
+    emergency stops. An emergency stop is announced (`stopping`), sent (`stop_sent`), and stays `latched` until `reset`.
     """
 
     def __init__(
@@ -73,7 +76,7 @@ class Engine:
         self.paced = paced
         self.interlock = interlock
         self.before_motion: Callable[[], None] | None = None
-        """Called before the first request leaves that the interlock has passed."""
+        """Called when the interlock has passed a request; the bus sets it to None after the first."""
         self.always_listening = self.listening = listen_only
         self.diagnosis: Callable[[], str] = str
         self.trace: Feed[TraceRecord] = Feed()
@@ -100,7 +103,7 @@ class Engine:
         self.latency = latency
         """s that the adapter may hold data back; part of every deadline."""
         self.since = Since(self.positions.stops, self.latches, self.losses)
-        """What has happened so far. A caller keeps it for `check`."""
+        """Present counts of stops, emergency stops and losses. A caller keeps them; `check` compares."""
         self._serial = count()
         self._unacknowledged: list[Attempt] = []
         self.ready = False
@@ -119,7 +122,7 @@ class Engine:
     def reply_timeout(self, request: Exchange[Any]) -> float:
         """s from the end of the air time to the deadline.
 
-        A scan waits for what adapters hold back; where there is none, only as long as a device needs.
+        For a scan on a link that holds nothing back: the shorter of the normal and the scan turnaround, no margin.
         """
         if request.timeout is Timeout.SCAN and self.latency < DIRECT:
             plain: Exchange[Answer] = Exchange(request.request, request.replies)
@@ -134,7 +137,7 @@ class Engine:
     def check_ready(self) -> bool:
         """Set and return `ready`: a prepared request may be sent at once.
 
-        Nothing is in flight, waits, or must be looked at first. It stays so until something else is done here.
+        `ready` stays True until `submit`, `feed`, an emergency stop or a lost link clears it.
         """
         self.ready = not (self.in_flight or self.queue or self.stopping or self.listening or self.gone) and (
             self.exclusive is None and self.echo.is_out and not self.receiver.held
@@ -144,7 +147,7 @@ class Engine:
     # -- jobs --------------------------------------------------------------------------------------------------
 
     def submit(self, job: Job, now: float) -> None:
-        """Queue a job; it is sent by priority, in order within one."""
+        """Queue a job: by priority, then in order of submission. A refused job is settled at once."""
         self.time, self.ready = now, False
         self.note_last()
         job.serial = next(self._serial)
@@ -179,7 +182,10 @@ class Engine:
             self.exclusive = None
 
     def _resume(self, job: RequestJob, attempt: Attempt | None = None) -> None:
-        """Continue the policy of a job: with a finished attempt, or after a wait."""
+        """Ask the policy of a job for its next step, and queue the job with it.
+
+        `attempt` is the finished one; None to start, after a wait, or when the chosen attempt may not leave.
+        """
         assert job.policy is not None
         self._remove(job)
         try:
@@ -212,9 +218,9 @@ class Engine:
     # -- what is sent ------------------------------------------------------------------------------------------
 
     def next_frame(self, now: float) -> Data | RateJob | None:
-        """What to do now: write this data, or change the rate; None: nothing before `next_deadline`.
+        """What to do now: write this data, or change the rate; None: nothing until `next_deadline` or new data.
 
-        After a write call `written`, after a change of rate `rate_changed`.
+        After a write call `written`, after a change of rate `rate_changed`. Also grants exclusive use of the bus.
         """
         self.time = now
         for job in list(self.queue):
@@ -224,7 +230,7 @@ class Engine:
                 data = self._try_to_send(job, now)
                 if data is not None:
                     return data
-            elif self.in_flight:
+            elif self.in_flight:  # a rate change or exclusive use waits, and what is behind it waits, too
                 return None
             else:
                 self.queue.remove(job)
@@ -240,7 +246,7 @@ class Engine:
         return not self.stopping and (self.exclusive is None or self.exclusive is job.owner)
 
     def _try_to_send(self, job: RequestJob, now: float) -> Data | None:
-        """Begin the next attempt of this job, if its lane is free and it may leave."""
+        """Begin the next attempt of this job: its lane and the wire are free, its nodes are in sync, `check` passes."""
         if job.request.lane in self.in_flight or len(self.in_flight) >= self.window:
             return None
         if self.paced and now < self.free_at:
@@ -273,13 +279,13 @@ class Engine:
         return request.request
 
     def _earliest(self, step: Attempt | Wait) -> float:
-        """The moment (s) before which this step does nothing."""
+        """The earliest moment (s) for this step; -inf if it may be carried out now."""
         if isinstance(step, Wait):
             return step.until
         return self.sync.of(step.dues[0].node).quiet_until if step.is_probe else -inf
 
     def check(self, request: Exchange[Any], since: Since | None) -> None:
-        """Raise the error for which this request, which was decided at `since`, must not leave now."""
+        """Raise the error that forbids sending this request now. `since`: the counts when its caller decided."""
         if self.listening:
             raise failures.listen_only(request)
         if request.rank is Rank.STOP:
@@ -295,7 +301,10 @@ class Engine:
                 self.before_motion()
 
     def _check_stops(self, request: Exchange[Any], since: Since | None) -> None:
-        """Raise the error for a motion request while a stop is latched, or that a stop or a lost port has outdated."""
+        """Raise the error for a motion or torque request that must not leave.
+
+        A stop is latched; or the request moves something, and a stop of its nodes or a lost port came after `since`.
+        """
         if request.effect not in GATED or request.rank is Rank.STOP:
             return
         if self.latched:
@@ -308,7 +317,7 @@ class Engine:
             raise failures.outlived(request)
 
     def note_stop(self, request: Exchange[Any]) -> None:
-        """A request that stops something is about to leave; from any thread."""
+        """Count a stop request that will be sent, and inform the interlock; from any thread."""
         self.positions.sent(request)
         self._note_since()
         if self.interlock is not None and request.effect in GATED:
@@ -320,7 +329,7 @@ class Engine:
     def begin(self, attempt: Attempt, now: float) -> None:
         """Record an attempt before its request is written."""
         request = attempt.request
-        if self.receiver.held:  # it cannot belong to a reply to a request that has not left
+        if self.receiver.held:  # bytes from before the request are no part of its reply
             self._take_all(self.receiver.flush(), now)
         start, air = max(now, self.free_at), self.air_time(request)
         attempt.sent_at = now
@@ -341,7 +350,7 @@ class Engine:
             self.trace.put(TraceRecord(now, "tx", request.request))
 
     def adopt(self, attempt: Attempt) -> None:
-        """A prepared request that was written is an attempt like any other from now on."""
+        """Record of a written prepared request what `begin` records; it continues on the general path."""
         request = attempt.request
         self.note_last()
         self.sync.mark_sent(request, attempt.sent_at)
@@ -350,14 +359,17 @@ class Engine:
             self.echo.sent(request.request, testing=False)
 
     def written(self) -> None:
-        """The data of `next_frame` was written: a request without reply has ended."""
+        """The data of `next_frame` was written. If its request expects no reply, settle the job."""
         attempts, self._unacknowledged = self._unacknowledged, []
         for attempt in attempts:
             assert attempt.job is not None
             self._decode(attempt.job, attempt.answer(self.time))
 
     def _share_wire(self, attempt: Attempt, air: float) -> None:
-        """Whichever lane goes first, each attempt may have to wait for all the others once."""
+        """Extend this deadline by the air time of each attempt in flight, and theirs by `air`.
+
+        Each attempt counts each competitor once, and at most window - 1 of them.
+        """
         if self.window == 1:
             return
         attempt.air = air
@@ -369,7 +381,7 @@ class Engine:
                 other.competitors += 1
 
     def rate_changed(self, job: RateJob, error: MotorbusError | None = None) -> None:
-        """The link has the new rate, or has refused it."""
+        """A rate job has ended: the rate was set, or only read (0), or the link refused it (`error`)."""
         before = self.rate
         if error is None and job.tune.rate:
             self.rate = job.tune.rate
@@ -378,9 +390,9 @@ class Engine:
         job.settle(before, error)
 
     def alternate(self, request: Exchange[Any]) -> Exchange[Any]:
-        """The same request with a reply of another length, where the last reply of its node was as long.
+        """The equivalent request with another reply length, if the last reply of the node had the length of this one.
 
-        So a copy of the last reply is not taken for the next one.
+        A copy of the last reply then cannot pass for the new one.
         """
         if request.other is None or request.replies is ANY or len(request.replies) != 1:
             return request
@@ -391,7 +403,7 @@ class Engine:
     # -- what comes in -----------------------------------------------------------------------------------------
 
     def feed(self, chunks: Sequence[Data], now: float, looked: float | None = None) -> None:
-        """Take what the link delivered by `now`, then end what was overdue when the link was looked at."""
+        """Take the data of the link, then end attempts overdue at `looked`, when the link was read."""
         self.time, self.ready = now, False
         self.note_last()
         for data in chunks:
@@ -442,18 +454,18 @@ class Engine:
             self.statistics.other["echo"] += 1
         elif attempt.complete:
             if attempt.is_excluded(reply):
-                self._is_late(reply)
+                self._settle_late(reply)
             else:
                 attempt.surplus |= not self._take_for_all(reply)
-        elif not self._is_older(attempt, reply) and not attempt.take(reply):
+        elif not self._settle_older(attempt, reply) and not attempt.take(reply):
             self._take_unexpected(attempt, reply, now)
 
-    def _is_older(self, attempt: Attempt, reply: Reply) -> bool:
-        """A request that leaves without a probe can meet an owed reply of its own kind."""
+    def _settle_older(self, attempt: Attempt, reply: Reply) -> bool:
+        """True for an owed reply of an earlier request, which is settled; only an unprobed request can meet one."""
         unprobed = attempt.request.rank is Rank.STOP or attempt.request.replies is ANY
-        return unprobed and self._is_late(reply)
+        return unprobed and self._settle_late(reply)
 
-    def _is_late(self, reply: Reply) -> bool:
+    def _settle_late(self, reply: Reply) -> bool:
         late = self.sync.take_owed(reply.lane, reply.key, len(reply.data))
         self.statistics.other["late"] += late
         return late
@@ -464,10 +476,9 @@ class Engine:
         return attempt is not None and attempt.take(reply)
 
     def _take_unexpected(self, attempt: Attempt | None, reply: Reply, now: float) -> None:
-        if self._is_late(reply) or self._take_for_all(reply):
+        if self._settle_late(reply) or self._take_for_all(reply):
             return
-        known = attempt is not None and not attempt.is_probe
-        if attempt is not None and known and any(due.key == reply.key for due in attempt.dues):
+        if attempt is not None and not attempt.is_probe and any(due.key == reply.key for due in attempt.dues):
             attempt.exclude(reply)
             self.statistics.other["unexpected"] += 1
         else:
@@ -522,7 +533,7 @@ class Engine:
                 self._end(lane, attempt, now)
 
     def _end(self, lane: int, attempt: Attempt, now: float) -> None:
-        """Accept the replies, or those of a group that came; the job continues with them or with the fault."""
+        """End an attempt: accept its replies (of a group, those that came) or set its fault; resume its job."""
         request, dues = attempt.request, attempt.dues
         single = request.replies is not ANY and len(dues) == 1
         if (single and not attempt.complete) or (dues and (attempt.fault or attempt.surplus)):
@@ -530,7 +541,7 @@ class Engine:
         answer = attempt.answer(min(now, attempt.deadline))
         if attempt.is_probe and not attempt.fault and not (request.read is not None and request.read(answer)):
             attempt.fault = "unexpected"
-        answered = [due for index, due in enumerate(dues) if self._is_answered(attempt, index, due, now)]
+        answered = [due for index, due in enumerate(dues) if self._judge_reply(attempt, index, due, now)]
         del self.in_flight[lane]
         if attempt.fault in ("", "silence") or not dues:
             self._end_echo_test(attempt)
@@ -541,8 +552,8 @@ class Engine:
         if attempt.job is not None:
             self._resume(attempt.job, attempt)
 
-    def _is_answered(self, attempt: Attempt, index: int, due: Due, now: float) -> bool:
-        """Whether this reply counts; where it does not, its node is out of sync."""
+    def _judge_reply(self, attempt: Attempt, index: int, due: Due, now: float) -> bool:
+        """True if this reply counts. Else count the error, and note the quiet time or the owed reply of its node."""
         if not attempt.fault and index in attempt.replies and due.node not in attempt.excluded:
             return True
         quiet_until = now + self.quiet_time
@@ -556,17 +567,19 @@ class Engine:
     def _accept(self, attempt: Attempt, answer: Answer, answered: Sequence[Due], now: float) -> None:
         request = attempt.request
         if request.replies is ANY:
-            if request.lane == EVERY_LANE:  # a node that obeyed an order to all must be stopped, too
+            if (
+                request.lane == EVERY_LANE
+            ):  # on such a bus the lane is the node: a stop must reach all that answered
                 self.positions.add([reply.lane for reply in answer.replies])
             return
-        if request.rank is not Rank.STOP:  # a request that the stop cut short may still be answered
+        if request.rank is not Rank.STOP:  # an earlier reply may still come, so a stop puts no node in sync
             for due in answered:
                 self.sync.confirm(due, probe=attempt.is_probe)
         self.statistics.answered(answered, now - attempt.sent_at)
         self.positions.answered([due.node for due in answered], request, answer, self.rate)
 
     def _end_echo_test(self, attempt: Attempt) -> None:
-        """The test of the echo has ended: only its reply came, or nothing at all."""
+        """If this attempt shows that there is no echo, record that."""
         if self.echo.present is not None or attempt.noise:
             return
         if attempt.is_probe or attempt.request is self.echo.test or self.echo.disproved:
@@ -575,7 +588,7 @@ class Engine:
     # -- prepared requests -------------------------------------------------------------------------------------
 
     def prepare(self, request: Exchange[Any]) -> Prepared | None:
-        """Prepare a request that is repeated; None where only the general path can carry it out."""
+        """Prepare a request that is repeated; None if it needs the general path (queue, policy, receiver)."""
         if request.whole is None or request.rank is Rank.STOP or request.effect or not request.replies:
             return None
         prepared = self._prepare(request)
@@ -602,7 +615,10 @@ class Engine:
         prepared.rate, prepared.latency = self.rate, self.latency
 
     def note_last(self, record: Prepared | None = None) -> None:
-        """Another request follows the last prepared one: note when its nodes were asked, and what they replied."""
+        """Note what was put off for the last prepared request: when its nodes were asked, and the reply length.
+
+        `record` is the last one from now on.
+        """
         last, self.last = self.last, record
         if last is not None:
             for state in last.states:
@@ -623,7 +639,7 @@ class Engine:
         return min(moments, default=inf)
 
     def announce_stop(self, by: str) -> None:
-        """Refuse motion and torque from now on; from any thread. `by` of the first stop counts until `reset`."""
+        """Refuse motion and torque from now on; from any thread. `by` is kept from the first stop until `reset`."""
         self.latched_by = self.latched_by if self.latched else by
         self.latches += 1
         self.latched = self.stopping = True
@@ -638,7 +654,8 @@ class Engine:
     def latch(self, now: float, by: str) -> None:
         """Emergency stop: end motion that waits and what is in flight, refuse motion until `reset`.
 
-        Reads that wait, reads in flight on a full-duplex line, and the end of a guarded change follow the stop.
+        Requests that wait and neither move nor switch torque stay queued. With several lanes repeatable reads in flight
+        are sent again after the stop; anything else in flight fails.
         """
         self.announce_stop(by)
         error = failures.latched(self.latched_by)
@@ -659,13 +676,13 @@ class Engine:
                 caller.settle(error=error)
 
     def _remaining(self, attempt: Attempt, now: float) -> float:
-        """s that a stop waits for what is on the line: a reply, or on a full-duplex line the rest of a request."""
+        """s that a stop waits at most: the whole air time on a half-duplex line, else the rest of the request."""
         if not self.family.link.both_ways:
             return self.air_time(attempt.request)
         request: Exchange[Answer] = Exchange(attempt.request.request)
         return max(0.0, attempt.sent_at + self.air_time(request) - now)
 
-    def stopped(self) -> None:
+    def stop_sent(self) -> None:
         """The stop frames were sent: other requests may leave again, motion and torque stay refused."""
         self.stopping = False
 
@@ -687,18 +704,19 @@ class Engine:
         self._unacknowledged.clear()
         self.exclusive = None
         if isinstance(error, LinkLost):
-            is_new, self.gone = self.gone is None, error
-            self.losses += is_new
-            self._note_since()
+            if self.gone is None:
+                self.losses += 1
+                self._note_since()
+                for end in tuple(self.end_sleeps):
+                    end(error)
+            self.gone = error
             self.positions.forget()
-            for end in tuple(self.end_sleeps) if is_new else ():
-                end(error)
         for job in jobs:
             if job is not None:
                 job.settle(error=error)
 
     def reconnected(self, now: float, latency: float) -> None:
-        """The port is open again: nothing known of the devices counts, but which there were."""
+        """The port is open again: all nodes are out of sync and their positions unknown; the nodes stay known."""
         self.latency = latency
         self.receiver = self.family.receiver()
         self.echo.reset()

@@ -9,13 +9,16 @@ from motorbus.core.operation import Exchange, Runnable
 
 
 class Interlock(Protocol):
-    """What judges motion requests before they leave, as the safety gate does."""
+    """Judges requests that move a motor or switch its torque before they are sent. The safety gate is one."""
 
     def check(self, request: Exchange[Any], now: float, /) -> None:
-        """Raise MotorbusError if this request must not leave at `now` (s). Called at every attempt."""
+        """Raise MotorbusError if this request must not leave at `now` (s).
+
+        Called at every attempt, never for a stop.
+        """
 
     def required_reads(self, request: Exchange[Any], /) -> Sequence[Runnable[Any]]:
         """The reads that must be carried out before this request can be checked."""
 
     def stopped(self, nodes: Sequence[int], /) -> None:
-        """A stop for these nodes (empty: all) is about to leave; called from any thread."""
+        """A stop for these nodes (empty: all) was requested and will be sent. May be called from any thread."""

@@ -17,18 +17,21 @@ from motorbus.link.stream import wait_any
 
 T = TypeVar("T")
 
-LOOK: Final = 0.001
-"""s between two looks at a link without descriptor, while several buses are waited for."""
-SHORT: Final = 0.02
-"""s of a wait for a notification, after which other threads may use the bus."""
-BRIEF: Final = 0.002
-"""s of a wait for the turn of a bus while this thread has that of another, so that threads never block each other."""
+POLL_PERIOD: Final = 0.001
+"""s between polls of a link without a descriptor, or of a bus that another thread uses, with several buses."""
+LISTEN_TIME: Final = 0.02
+"""Longest wait (s) for a notice while holding the turn; then waiting threads get it."""
+TURN_TIMEOUT: Final = 0.002
+"""Longest wait (s) for the turn of a bus while holding another's: two threads never block each other."""
 
 
 def run_here(
     bus: BaseBus, procedure: Runnable[T], report: Notify | None = None, *, since: Since | None = None
 ) -> T:
-    """Run a procedure that was called at `since` (None: now) in this thread, also on a bus of an event loop."""
+    """Run a procedure in this thread; the bus may be an asyncio bus.
+
+    `since`: what had happened on the bus when the caller decided; None: as of now.
+    """
     with interrupts():
         part = _Part(bus, procedure, report, since)
         _run_parts([part])
@@ -40,12 +43,12 @@ def run_on(
 ) -> dict[BaseBus, Any]:
     """Run a procedure on each bus at the same time: what each returned, or the MotorbusError that it raised.
 
-    Any other error of one of them, and a signal, cancels all; it is raised when all have cleaned up.
+    An error that is not a MotorbusError, or a signal, cancels all; it is raised after all have cleaned up.
     """
     check_clocks(procedures)
     with interrupts():
-        moments = since or {}
-        parts = [_Part(bus, procedure, None, moments.get(bus)) for bus, procedure in procedures.items()]
+        sinces = since or {}
+        parts = [_Part(bus, procedure, None, sinces.get(bus)) for bus, procedure in procedures.items()]
         _run_parts(parts)
         return {part.bus: part.tree.outcome() for part in parts}
 
@@ -62,7 +65,7 @@ class _Part(Generic[T]):
         bus.check_thread()
         self.bus = bus
         self.news = True
-        self.sleeps = self.holds_turn = self.blocked = False
+        self.is_sleeping = self.holds_turn = self.blocked = False
         self.cancellations: list[BaseException] = []
         self.tree: TaskTree[T] = TaskTree(
             bus.engine,
@@ -75,7 +78,7 @@ class _Part(Generic[T]):
 
     def _settled(self) -> None:
         self.news = True
-        if self.sleeps:
+        if self.is_sleeping:
             with self.bus.settled:
                 self.bus.settled.notify_all()
 
@@ -85,7 +88,10 @@ class _Part(Generic[T]):
         self.news = True
 
     def advance(self, timeout: float) -> bool:
-        """Step the tree and send; True when it has ended. Does nothing if the turn is not free within `timeout` s."""
+        """Step the tree and send; True when it has ended.
+
+        Does nothing if the turn is not free within `timeout` s (-1: no limit).
+        """
         if self.tree.root.finished:
             return True
         self.holds_turn = self.holds_turn or self.bus.turn.acquire(timeout=timeout)
@@ -103,7 +109,10 @@ class _Part(Generic[T]):
         return self.tree.root.finished
 
     def release_turn(self) -> None:
-        """Let other threads use the bus, unless a request is in flight or the bus is used exclusively."""
+        """Release the turn if the tree has ended, a stop waits for it, or the bus is idle and not exclusive.
+
+        A tree that waits for a notice keeps it until another thread wants it.
+        """
         engine = self.bus.engine
         free = engine.idle and engine.exclusive is None and (not engine.listeners or self.bus.turn.wanted)
         if self.holds_turn and (self.tree.root.finished or free or self.bus.waits_for_stop):
@@ -111,34 +120,36 @@ class _Part(Generic[T]):
             self.bus.turn.release()
 
     def wait(self) -> None:
-        """Wait until something comes, a deadline, or a moment that the tree waits for."""
+        """Wait for data, a deadline, or the next moment of the tree; without the turn sleep for at most `IDLE`."""
         bus, moment = self.bus, self.tree.next_moment()
         if self.holds_turn:
             listens = bus.engine.idle and bus.engine.listeners and not bus.link.virtual
-            bus.receive(min(moment, bus.link.now() + SHORT) if listens else moment)
+            bus.receive(min(moment, bus.link.now() + LISTEN_TIME) if listens else moment)
         elif not bus.waits_for_stop:
             self._sleep(min(moment - bus.link.now(), IDLE))
         self.news = True
 
     def _sleep(self, seconds: float) -> None:
-        """Sleep, at most until a stop ends the sleeps of the tree."""
+        """Sleep this long, or until something that the tree waits for has ended."""
         with self.bus.settled:
-            self.news, self.sleeps = False, True
+            self.news, self.is_sleeping = False, True
             try:
                 self.bus.settled.wait_for(lambda: self.news, max(0.0, seconds))
             finally:
-                self.sleeps = False
+                self.is_sleeping = False
 
 
 def _run_parts(parts: Sequence[_Part[Any]]) -> None:
-    """Run all trees to their end. An interrupt, or an error that is none of ours, cancels them; they clean up."""
+    """Run all trees to their end. A signal, or an error that is not a MotorbusError, cancels them; they clean up."""
     signals = interrupts()
     try:
         while True:
             try:
                 if not (going := _advance(parts)):
                     return
-                signals.waiting = all(part.bus.engine.idle for part in going)
+                signals.waiting = all(
+                    part.bus.engine.idle for part in going
+                )  # from here the handler raises itself
                 if signals.pending is not None:
                     signals.waiting = False
                     signals.raise_pending()
@@ -150,18 +161,18 @@ def _run_parts(parts: Sequence[_Part[Any]]) -> None:
                 signals.waiting = False
     finally:
         for part in parts:
-            if not part.tree.root.finished:  # an error in the lines above
+            if not part.tree.root.finished:  # a second error, raised while cancelling
                 with part.bus.turn:
                     part.tree.drop()
             part.release_turn()
 
 
 def _advance(parts: Sequence[_Part[Any]]) -> list[_Part[Any]]:
-    """Step all trees; those that have not ended. An error that is none of ours is raised."""
+    """Step all trees and return the parts that have not ended. Raises an error that is not a MotorbusError."""
     going = []
     for part in parts:
         holds_another = any(other.holds_turn for other in parts if other is not part)
-        if not part.advance(BRIEF if holds_another else -1.0):
+        if not part.advance(TURN_TIMEOUT if holds_another else -1.0):
             going.append(part)
     for part in parts:
         if (error := part.tree.foreign_error()) is not None:
@@ -177,6 +188,7 @@ def _wait(parts: Sequence[_Part[Any]]) -> None:
     if len(parts) == 1:
         parts[0].wait()
     elif all(part.bus.link.virtual for part in parts):
+        # one shared clock: read every bus up to the earliest event, first the bus that has it
         events = {part: part.bus.next_event(part.tree.next_moment()) for part in parts}
         for part in sorted(parts, key=events.__getitem__):
             part.bus.receive(min(events.values()))
@@ -191,7 +203,7 @@ def _poll(parts: Sequence[_Part[Any]]) -> None:
     for part in parts:
         descriptor = part.bus.link.fileno()
         if part.blocked or (part.holds_turn and descriptor is None):
-            seconds = min(seconds, LOOK)
+            seconds = min(seconds, POLL_PERIOD)
         elif part.holds_turn and descriptor is not None:
             descriptors.append(descriptor)
         moment = min(part.tree.next_moment(), part.bus.engine.next_deadline())

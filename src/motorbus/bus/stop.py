@@ -133,7 +133,7 @@ class EmergencyStop:
                 bus.link.write(request.request)
         if bus.turn.acquire(Rank.STOP, STOP_TIMEOUT):
             return self._stop_with_turn(by)
-        engine.stopped()
+        engine.stop_sent()
         silent = tuple(sorted(engine.positions.nodes))
         return StopOutcome((), silent, 1, f"{stop.promise}; sent once, no acknowledgement could be read")
 
@@ -149,7 +149,7 @@ class EmergencyStop:
                     bus.receive(tree.next_moment())
             return tree.result()
         finally:
-            engine.stopped()
+            engine.stop_sent()
             bus.turn.release()
 
     def _restore_rate(self) -> None:

@@ -20,7 +20,8 @@ from motorbus.core.operation import Answer, Data, Event, Exchange, Operation, Ru
 class Option(NamedTuple):
     """An option `name=value` of a family, in a bus string or a flag.
 
-    `choices` are all valid values, () if not listed; `source` is the source of the behaviour, where it needs one.
+    `choices` are all valid values, () if not listed. `source`: where the simulated behaviour is documented, or that it
+    is assumed; "" where it needs none.
     """
 
     name: str
@@ -32,17 +33,18 @@ class Option(NamedTuple):
 
 
 class LinkNeeds(NamedTuple):
-    """Requirements of a family on its link, and its options.
+    """Facts of a family that are needed before a bus is opened.
 
     `kind`      "bytes" or "frames"
-    `rate`      default rate (bit/s); `rates`: those that a scan tries
-    `options`   of the simulator: `sim,name=value`
-    `settings`  of a bus, simulated or not: arguments of `Family.configured`
+    `rate`      default rate (bit/s)
+    `rates`     rates (bit/s) that a device may have, for a scan of all rates
+    `options`   options of the simulator: `sim,name=value`
+    `settings`  options of a bus, simulated or not: arguments of `Family.configured`
     `window`    maximum number of lanes in flight
     `only`      id of the only device on a line of this family; None: there may be several
-    `both_ways` full duplex: a stop does not wait for a reply
+    `both_ways` full duplex: a stop waits only for the request being sent, not for its reply
     `stops`     possible actions of an emergency stop on an axis, "torque_off" and "hold", the default first; () if
-                unknown. A family with both has a setting `estop_hold`: the ids that it holds
+                unknown. A family with both has a setting `estop_hold`: the ids that an emergency stop holds
     `captures`  decoders of recordings; None: the receiver decodes them
     """
 
@@ -60,7 +62,7 @@ class LinkNeeds(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """The identity that a device reports. `table` is "" for unknown firmware: it is read but never written."""
+    """The identity that a device reports. `table` is "" for unknown firmware: the device is never written."""
 
     node: int
     model: str
@@ -78,7 +80,7 @@ class Found(NamedTuple):
 
 
 class Readdressed(NamedTuple):
-    """An event for `Report` before a device gets another id: requests to id `new` will also reach the device `node`.
+    """An event for `Report` before a device gets another id: from now on `new` may reach the device `node`.
 
     `node` is None if the device is unknown. The event precedes the first write.
     """
@@ -88,7 +90,13 @@ class Readdressed(NamedTuple):
 
 
 class Quality(Enum):
-    """Reliability of a sample."""
+    """Reliability of a sample.
+
+    FRESH      new and plausible
+    REPEATED   an older sample again
+    CONFIRMED  implausible after the last one, but equal to a suspect one before it
+    SUSPECT    implausible and not confirmed
+    """
 
     FRESH = "fresh"
     REPEATED = "repeated"
@@ -115,10 +123,10 @@ class State(NamedTuple):
 
 
 class Health(NamedTuple):
-    """Health of a device, from one cheap exchange; None, also in `state`, for values it does not report.
+    """Health of a device, from one cheap exchange. Values that it does not report are None, in `state` too.
 
-    `torque`: torque is on; None without a torque switch. `blank`: the settings that the device keeps until power-off
-    have their power-up values. `restarts`: number of start-up messages received from the device.
+    `torque`: torque is on; None without a torque switch. `blank`: volatile settings have their power-up values, as
+    after a restart. `restarts`: number of start-up messages received from the device.
     """
 
     state: State
@@ -138,9 +146,10 @@ class Positions(NamedTuple):
 class Train(Protocol):
     """Devices of one bus in a control loop, with all data that a cycle needs; see `Family.axis`.
 
-    Its exchanges need no further requests. Those on different lanes may be in flight at once. Before `begin` runs or
-    goals are sent, nothing is written. After settings of a device were written through the same object, earlier goals
-    do not leave; later ones are computed from the new settings or raise RequestError.
+    Its exchanges can run without reading anything first. Those on different lanes may be in flight at once. Before
+    `begin` runs or goals are sent, nothing is written. If settings of a device are written through the object that
+    `train` was given, goal exchanges made before are refused; `goals` then uses the new settings or raises
+    RequestError.
     """
 
     @property
@@ -151,7 +160,7 @@ class Train(Protocol):
     def positions(self) -> Sequence[Exchange[Positions]]:
         """Exchanges that together read all positions; may be kept and run again.
 
-        Each reads some of the nodes and lists the silent ones as missing; one for a single node raises NoReply instead.
+        An exchange that reads several nodes lists silent ones as missing; an exchange for one node raises NoReply.
         """
 
     def goals(self, to: Mapping[int, float]) -> Sequence[Exchange[Any]]:
@@ -162,11 +171,11 @@ class Train(Protocol):
         """
 
     def begin(self, speeds: Mapping[int, float]) -> Operation[None]:
-        """Prepare these nodes for goals: torque on without a jump, and maximum tracking speed.
+        """Prepare every node of this train for goals: torque on without a jump.
 
-        The value is the limit of that speed (rad/s, above 0), rounded up to what the device supports; a device without
-        such a setting ignores it. A device without torque switch holds its position. Every node is visited, then the
-        first error is raised, with a note for each other. Errors as `enable_torque`.
+        `speeds` gives a maximum tracking speed (rad/s, above 0) for some nodes. A device rounds it up to a value that
+        it supports; a device without such a setting ignores it. A device without torque switch holds its position.
+        Every node is visited, then the first error is raised, with a note for each other. Errors as `enable_torque`.
         """
 
 
@@ -187,7 +196,7 @@ class Part(NamedTuple):
 
 
 class Explanation(NamedTuple):
-    """One frame, or a run of bytes that is none: `fault` is "" for a valid frame, else the reason."""
+    """One frame, or a run of bytes that is not a frame: `fault` is "" for a valid frame, else the reason."""
 
     data: bytes
     title: str
@@ -310,7 +319,9 @@ class Device(Protocol):
 
 
 class Devices(NamedTuple):
-    """Device classes of a family, called with a bus and a node id. `assures`: None if the family does not state it."""
+    """Device classes of a family, called with a bus and a node id. `assures`: the safety properties of
+    these devices; None if the family declares none.
+    """
 
     blocking: Callable[[Any, int], Any]
     awaiting: Callable[[Any, int], Any]
@@ -318,7 +329,7 @@ class Devices(NamedTuple):
 
 
 class Family(Protocol):
-    """A device family: eighteen members, no state (but see `configured`)."""
+    """A device family. It has no state, except what `configured` describes."""
 
     @property
     def name(self) -> str:
@@ -341,19 +352,19 @@ class Family(Protocol):
     def devices(self) -> Devices: ...
 
     def lane(self, node: int) -> int:
-        """The lane of this node; a half-duplex line has one lane."""
+        """The lane of this node. Requests on one lane never overlap; all nodes of a serial line have lane 0."""
 
     def air_time(self, exchange: Exchange[Any], rate: int) -> float:
         """Time (s) on the wire of the request and all expected replies, with the gaps of the protocol."""
 
     def turnaround(self, exchange: Exchange[Any]) -> float:
-        """Maximum time (s) that devices take before and between their replies, by `exchange.timeout`."""
+        """Maximum total time (s) of devices before and between their replies; depends on `exchange.timeout`."""
 
     def quiet_time(self, rate: int) -> float:
-        """Time (s) without a request to a node that is out of sync, before it is probed."""
+        """Time (s) after which no part of an old reply can still arrive; then a node out of sync is probed."""
 
     def echo_test(self) -> Exchange[Any] | None:
-        """An exchange whose echo differs from its reply, sent when a bus is opened; None: the link has no echo."""
+        """An exchange whose reply has another length than its echo, sent when a bus is opened; None: no echo."""
 
     def explain(self, data: bytes) -> list[Explanation]:
         """Explain all frames in these bytes, field by field; a CAN frame is serialized by `CanFrame.flat()`."""
@@ -363,11 +374,15 @@ class Family(Protocol):
     def probe(self, node: int, attempt: int) -> Exchange[bool]:
         """An exchange without effect; its value is True for the expected content of the reply.
 
-        Replies to different attempts differ in key or length, and from the echo of the request.
+        Attempts cycle through several probes whose replies differ in key or length. No reply has the length of the echo
+        of its request.
         """
 
     def stop(self, nodes: Mapping[int, Answer | None]) -> Stop:
-        """Requests that stop these nodes, by node with its latest answer that contains a position, or None."""
+        """Requests that stop these nodes.
+
+        `nodes` maps each node to the last answer with its position, None if there is no valid one.
+        """
 
     def identify(self, node: int) -> Runnable[Identity]: ...
 
@@ -384,18 +399,21 @@ class Family(Protocol):
 
             state position velocity load current voltage temperature    its `State`, or one number
             health(device)                      its `Health`; for an identified device an exchange that can be kept
-            enable_torque(device)  disable_torque(device)               without a jump; without torque
-            move(device, to, *, wait)  stop(device)                     to rad; decelerate and hold, returns a promise
+            enable_torque(device)               torque on without a jump
+            disable_torque(device)              torque off
+            move(device, to, *, wait)           to a position (rad)
+            stop(device)                        decelerate and hold; gives a promise, see `Stop`
             move_by(device, angle, *, velocity, wait)                   rad from the present position
-            jog(device, velocity, seconds)  home(device, *, deadline)   for a time; to the home switch
-            run(device, number, *, timeout)                             a stored program
+            jog(device, velocity, seconds)      turn for a time
+            home(device, *, deadline)           to the home switch
+            run(device, number, *, timeout)     a stored program
             limits(device)                      lowest and highest position (rad) in its settings; read if unknown
             travel(device)                      range (rad) in which its limits must lie; None: unknown
             cap_torque(device, fraction)  cap_current(device, ampere)   limit until power-off
             train(devices, *, rate) -> Operation[Train]                 for a control loop; rate in bit/s
             keep_time(device, angle, timing, *, velocity, acceleration) -> Operation[Turned]
-                rad from the present position, by its own profile, in the duration of the others; at most `velocity`
-                (rad/s) and `acceleration` (rad/s²) where the device supports that
+                turn by `angle` (rad) with its own profile, begin and end with the other devices of `timing`; at most
+                `velocity` (rad/s) and `acceleration` (rad/s²) where the device supports that
         """
 
     def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:

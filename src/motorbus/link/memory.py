@@ -1,7 +1,8 @@
 """A link to a simulator in this process.
 
-In virtual time the link never sleeps: its clock moves only inside `read`, from one event to the next, and the same
-seed gives the same bytes. On the real clock it waits.
+In virtual time the link never sleeps: its clock moves only inside `read`, `rest` and `advance`, from one event to the
+next, so a run with the same seeds of simulator and line gives the same bytes. With `virtual=False` it uses the
+monotonic clock and waits.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ BITS_PER_BYTE = 10  # with start and stop bits
 
 
 class VirtualClock:
-    """A clock that moves only while a link on it is read. It belongs to the thread that uses a link on it first."""
+    """A clock that only its links move. It belongs to the thread that first calls `check_thread`, as a bus does."""
 
     def __init__(self, now: float = 0.0) -> None:
         self.now = now
@@ -30,20 +31,20 @@ class VirtualClock:
         self._thread: int | None = None
 
     def check_thread(self) -> None:
-        """Raise RequestError in any thread but the first that called this."""
+        """Make the thread of the first caller the owner; raise RequestError in any other."""
         me = get_ident()
         if self._thread is None:
             self._thread = me
         elif self._thread != me:
             raise RequestError(
                 "a simulated bus in virtual time is used by a second thread",
-                cause="its time passes only while one thread waits",
+                cause="virtual time moves only while its thread waits, so two threads cannot share it",
                 advice='simulate with clock="real", or use the bus in one thread',
             )
 
 
 def share_clock(links: Iterable[MemoryLink]) -> None:
-    """Put these links on one virtual clock, which shows the latest of their times."""
+    """Advance these links to the latest of their times and put them on one clock."""
     found = list(links)
     clock = VirtualClock(max((link.now() for link in found), default=0.0))
     for link in found:
@@ -57,9 +58,9 @@ class MemoryLink:
 
     `rate`     bit/s, also of the simulator
     `line`     the wire between them
-    `virtual`  time passes only inside `read`; False uses the monotonic clock
-    `pace`     data takes its air time and queues behind earlier data: of its direction, or for CAN frames of the bus.
-               A simulator with `paced` does this itself
+    `virtual`  time passes only inside `read`, `rest` and `advance`; False uses the monotonic clock
+    `pace`     data takes its air time and waits until the wire is free. Bytes have one wire per direction, CAN frames
+               share one. Not for a simulator that does this itself, which has an attribute `paced`
     `start`    first moment (s) of the virtual clock
     """
 
@@ -91,23 +92,23 @@ class MemoryLink:
         self._free = {Side.HOST: -inf, Side.DEVICE: -inf}
         self._gone_at = self._back_at = inf
         self._closed = False
-        self._changed = Condition()
+        self._condition = Condition()
         self.tune(rate)
 
     def now(self) -> float:
         return self.clock.now if self.virtual else time.monotonic()
 
     def write(self, data: Data) -> None:
-        with self._changed:
+        with self._condition:
             now = self.now()
             self._check(now)
             if self.listen_only:
                 raise LinkError(f"{self.name} only listens and cannot send")
             self._send(Side.HOST, data, now)
-            self._changed.notify_all()
+            self._condition.notify_all()
 
     def read(self, until: float) -> list[Data]:
-        with self._changed:
+        with self._condition:
             end = max(until, self.now())
             while not self._arrived:
                 now = self.now()
@@ -120,15 +121,15 @@ class MemoryLink:
                     if now >= end or not self._pass_time(moment):
                         break
                 if moment <= self.now():
-                    self._happen(moment)
+                    self._process(moment)
             self._check(self.now())
             arrived, self._arrived = self._arrived, []
             return arrived
 
     def _pass_time(self, until: float) -> bool:
-        """Wait until this moment (s), or for a change; False for a virtual clock when nothing will ever happen."""
+        """Wait until this moment (s) or a change. False: time is virtual and the moment is inf, nothing can happen."""
         if not self.virtual:
-            self._changed.wait(until - time.monotonic() if until < inf else None)
+            self._condition.wait(until - time.monotonic() if until < inf else None)
         elif until < inf:
             self._move_clock(until)
         return until < inf or not self.virtual
@@ -142,32 +143,32 @@ class MemoryLink:
         return None
 
     def due(self) -> float:
-        """Moment (s) of the next event if nothing is sent before; inf when there is none."""
-        with self._changed:
+        """Moment (s) of the next event if nothing is sent before; inf without one, -inf if data waits to be read."""
+        with self._condition:
             return -inf if self._arrived else self._next_event()
 
     def close(self) -> None:
-        with self._changed:
+        with self._condition:
             while self._under_way:  # a real port sends its buffer before it closes
                 at, _, to, data = heappop(self._under_way)
                 if to is Side.DEVICE and not self._closed and self.now() < self._gone_at:
                     self.simulator.receive(data, max(at, self.now()))
             self._closed = True
-            self._changed.notify_all()
+            self._condition.notify_all()
 
     def unplug(self, at: float = -inf, seconds: float = inf) -> None:
-        """Unplug the adapter now or at a later moment (s), for so many seconds. Data under way is lost.
+        """Unplug the adapter at a moment (s; default: now) for so many seconds. Data under way is lost.
 
         The link raises LinkLost until it is renewed.
         """
-        with self._changed:
+        with self._condition:
             self._gone_at = at
             self._back_at = max(at, self.now()) + seconds
-            self._changed.notify_all()
+            self._condition.notify_all()
 
     def plug(self) -> None:
-        """Plug the adapter in again; old data does not arrive any more."""
-        with self._changed:
+        """Plug the adapter in again, or cancel a planned unplug. Data in flight and unread is dropped."""
+        with self._condition:
             now = self.now()
             if now >= self._gone_at:
                 self._under_way.clear()
@@ -176,13 +177,13 @@ class MemoryLink:
             self._gone_at = self._back_at = inf
 
     def renew(self, losses: int) -> None:
-        with self._changed:
+        with self._condition:
             if self._closed or self.now() < self._back_at:
                 self._check(self.now())
             self.plug()
 
     def rest(self, until: float) -> None:
-        with self._changed:
+        with self._condition:
             now = self.now()
             moment = until if now >= self._back_at else min(until, self._back_at)
             if moment > now:
@@ -190,16 +191,16 @@ class MemoryLink:
 
     def advance(self, seconds: float) -> None:
         """Let virtual time pass without reading; what arrives is kept for the next `read`."""
-        with self._changed:
+        with self._condition:
             end = self.clock.now + seconds
-            self._happen_until(end)
+            self._process_until(end)
             self._move_clock(end)
 
     def _move_clock(self, moment: float) -> None:
-        """Let time pass on all links of the clock; what arrives on others is kept for their next `read`."""
+        """Move the clock. Events of the other links up to then are processed; those of this link are the caller's."""
         for link in self.clock.links:
             if link is not self:
-                link._happen_until(moment)
+                link._process_until(moment)
         self.clock.now = moment
 
     def _check(self, now: float) -> None:
@@ -209,19 +210,20 @@ class MemoryLink:
             raise LinkLost(f"{self.name}: the simulated adapter was unplugged")
 
     def _next_event(self) -> float:
+        """Moment (s) of the next arrival, device event or unplugging; while unplugged, of plugging in again."""
         if self.now() >= self._gone_at:
             return self._back_at
         due = self.simulator.due()
         moment = self._gone_at if due is None else min(due, self._gone_at)
         return min(moment, self._under_way[0][0]) if self._under_way else moment
 
-    def _happen_until(self, end: float) -> None:
+    def _process_until(self, end: float) -> None:
         while (moment := self._next_event()) <= end and moment < self._gone_at:
-            self._happen(moment)
+            self._process(moment)
         if end < self._gone_at:
-            self._happen(end)
+            self._process(end)
 
-    def _happen(self, moment: float) -> None:
+    def _process(self, moment: float) -> None:
         """Process all events of this moment: devices begin to send, and data under way arrives."""
         for when, data in self.simulator.advance(moment):
             self._send(Side.DEVICE, data, when)

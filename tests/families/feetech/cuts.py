@@ -76,8 +76,8 @@ class Doomed(MemoryLink):
             super().write(data)
             self.advance(0.0)
 
-    def _happen(self, moment: float) -> None:
-        super()._happen(moment)
+    def _process(self, moment: float) -> None:
+        super()._process(moment)
         self.commits.update(commit.moment for commit in self.world.servo.memory.commits)
 
     def read(self, until: float) -> list[Data]:

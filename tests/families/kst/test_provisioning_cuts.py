@@ -65,7 +65,7 @@ class Doomed(MemoryLink):
             self.strike()
         super().write(data)
         if here and cut.sent:  # type: ignore[union-attr]
-            self._happen_until(self.now())
+            self._process_until(self.now())
             self.strike()
         if cut is not None and cut.later is not None and "#22101001" in str(data):
             self.strikes_at = self.now() + cut.later

@@ -61,7 +61,7 @@ class Doomed(MemoryLink):
         if self.cut is not None and self.count == self.cut.request:
             if self.cut.sent:
                 super().write(data)
-                self._happen_until(self.now())
+                self._process_until(self.now())
             self.dead = True
         self.count += 1
         self.alive()
