@@ -19,6 +19,7 @@ from motorbus.bus.blocking import exchange_on
 from motorbus.bus.running import run_on
 from motorbus.core.operation import Operation, Pause
 from motorbus.errors import Interrupted, LinkLost
+from motorbus.families.feetech.driver.torque import disable_torque_everyone
 from tests.bus.test_batches import Arm
 
 LIMIT = 20.0
@@ -69,9 +70,10 @@ def test_a_bus_whose_procedure_has_ended_is_free_while_others_run(arms: list[Arm
     work.join(LIMIT)
 
 
+@pytest.mark.parametrize("stop", ["torque off", "batch"])
 @pytest.mark.parametrize("kind", ["run", "exchange", "procedure"])
 def test_an_order_that_waited_for_the_bus_does_not_leave_after_a_torque_off(
-    arms: list[Arm], kind: str
+    arms: list[Arm], kind: str, stop: str
 ) -> None:
     arm, errors = arms[0], []
     order, read = arm.batch(1.0)
@@ -91,8 +93,11 @@ def test_an_order_that_waited_for_the_bus_does_not_leave_after_a_torque_off(
     with arm.bus.lock:
         waiting = started(call)
         time.sleep(0.1)
-        for node in (1, 2, 3):
-            feetech.Servo(arm.bus, node).disable_torque()
+        if stop == "torque off":
+            for node in (1, 2, 3):
+                feetech.Servo(arm.bus, node).disable_torque()
+        else:
+            arm.bus.exchange([disable_torque_everyone(), read])
     waiting.join(LIMIT)
     assert len(errors) == 1
     assert arm.sim[1].memory["torque_enable"] == 0
@@ -166,3 +171,41 @@ def test_closing_an_asyncio_bus_ends_the_calls_that_wait(call: str) -> None:
                 await asyncio.wait_for(task, LIMIT)
 
     asyncio.run(main())
+
+
+def test_a_cancelled_read_of_a_silent_servo_leaves_the_bus_idle() -> None:
+    async def cancelled() -> tuple[bool, list[float]]:
+        with motorbus.simulate("feetech", ids="1-2", clock="real") as sim:
+            async with motorbus.open_async(sim.url) as bus:
+                servo = feetech.AsyncServo(bus, 1)
+                await servo.position()
+                sim[1].unplug()
+                with pytest.raises(TimeoutError):
+                    await asyncio.wait_for(servo.position(), 0.005)
+                await asyncio.sleep(0.5)
+                sim[1].plug()
+                return bus.engine.idle, [await servo.position() for _ in range(3)]
+
+    idle, positions = asyncio.run(cancelled())
+    assert idle
+    assert len(set(positions)) == 1
+
+
+def test_an_emergency_stop_ends_the_calls_of_a_loop_that_is_closed() -> None:
+    with motorbus.simulate("feetech", ids="1", clock="real") as sim:
+        bus = motorbus.open_async(sim.url)
+        loop = asyncio.new_event_loop()
+        pending: list[asyncio.Task[None]] = []
+
+        def reading_for_ever() -> Operation[None]:
+            yield from Pause(60.0)
+
+        async def begin() -> None:
+            await bus.run(feetech.Servo.position.function(feetech.AsyncServo(bus, 1)))
+            pending.append(loop.create_task(bus.run(reading_for_ever())))
+            await asyncio.sleep(0.05)
+
+        loop.run_until_complete(begin())
+        loop.close()
+        assert bus.estop().acknowledged == (1,)
+        bus._hang_up()

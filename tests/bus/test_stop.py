@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 from motorbus.bus.blocking import Bus
-from motorbus.bus.stop_socket import request_estop
-from motorbus.core.operation import Effect
+from motorbus.bus.stop_socket import STOP_TIMEOUT, request_estop
+from motorbus.core.operation import Effect, Exchange, Operation, Tune
 from motorbus.errors import LinkError, LinkLost, PortNotFound
 from motorbus.families.feetech import FAMILY
 from motorbus.link.memory import MemoryLink
@@ -60,6 +60,46 @@ def test_the_interlock_learns_of_every_stop_from_any_thread(turn_is_free: bool) 
         assert outcome.result().acknowledged == (1,)
     assert set(check.stops) == {(), (1,)}
     bus.close()
+
+
+def test_a_stop_reads_nothing_first_whatever_the_interlock_requires() -> None:
+    class Cautious(Check):
+        def required_reads(self, request: Exchange[Any]) -> list[Exchange[int]]:
+            return [position(1)]
+
+    bus, responder = memory_bus(virtual=False)
+    bus.interlock = Cautious(lambda request: None)
+    known(bus, 1)
+    assert bus.estop().acknowledged == (1,)
+    assert torque_offs(responder) == [254, 1]
+    bus.close()
+
+
+def test_a_stop_of_many_silent_nodes_ends_in_time_and_says_what_was_sent() -> None:
+    bus, responder = memory_bus(virtual=True)
+    known(bus, *range(1, 21))
+    bus.latency, responder.dead = 0.05, set(range(1, 21))
+    begun = bus.now()
+    outcome = bus.estop()
+    assert bus.now() - begun < STOP_TIMEOUT - 1
+    assert (outcome.silent, outcome.acknowledged) == (tuple(range(1, 21)), ())
+    assert "torque off" in outcome.promise
+
+
+def test_a_stop_is_sent_at_the_rate_of_the_last_prepared_reply() -> None:
+    bus, responder = memory_bus()
+    read = position(1)
+    kept = Exchange(read.request, read.replies, read.read, repeatable=True, whole=lambda data, at: data[5])
+    for rate in (1_000_000, 500_000):
+        bus.run(set_rate(rate))
+        for _ in range(3):
+            assert bus.run(kept) == 1
+    bus.estop()
+    assert (bus.rate, responder.rate) == (500_000, 500_000)
+
+
+def set_rate(rate: int) -> Operation[int]:
+    return (yield from Tune(rate))
 
 
 def test_a_port_that_is_full_for_a_while_does_not_lose_the_stop() -> None:
@@ -113,6 +153,19 @@ def test_what_is_not_a_request_stops_nothing(tmp_path: Path, garbage: bytes) -> 
             assert client.recv(10) == b""
     assert torque_offs(responder) == []
     assert request_estop(path).acknowledged == (1,), "and the stop still works"
+    bus.close()
+
+
+def test_a_client_may_take_its_time_between_connecting_and_asking(tmp_path: Path) -> None:
+    path = tmp_path / "stop"
+    bus, _ = served(path)
+    with socket.socket(socket.AF_UNIX) as client:
+        client.settimeout(10)
+        client.connect(str(path))
+        time.sleep(0.2)
+        client.sendall(b"estop\n")
+        assert b'"acknowledged": [1]' in client.recv(1000)
+    assert bus.latched
     bus.close()
 
 

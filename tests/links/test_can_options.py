@@ -8,8 +8,8 @@ from typing import Any
 import can
 import pytest
 
-from motorbus.errors import RequestError
-from motorbus.link.can_options import CanOptions, parse_port, read_options
+from motorbus.errors import LinkError, RequestError
+from motorbus.link.can_options import CanOptions, check_rate, parse_port, read_options
 
 BITS: dict[str, Any] = {
     "f_clock": "8000000",
@@ -85,6 +85,17 @@ def test_an_unknown_option_comes_with_those_that_exist() -> None:
         config("can://slcan/dev/ttyACM0", tty_baud="9600")
     with pytest.raises(RequestError, match="expected: one of .*receive_own_messages"):
         config("can://virtual/a", sleep_after_open="1")
+
+
+def test_an_slcan_adapter_behind_a_url_is_locked_without_its_baud_rate() -> None:
+    found = config("can://slcan/socket://127.0.0.1:4000@115200")
+    assert found.lock_name == "socket://127.0.0.1:4000"
+
+
+@pytest.mark.parametrize("rate", [12_345, 1_500_000])
+def test_a_rate_that_python_can_would_round_is_refused(rate: int) -> None:
+    with pytest.raises(LinkError, match="usb2can has no bit rate"):
+        check_rate(config("can://usb2can/ED000001"), rate)
 
 
 def test_a_bit_timing_sets_the_rate() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import signal
 import stat
@@ -10,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from motorbus.errors import PortBusy
-from motorbus.link.lock import PortLock, holders, program_name, state_folder
+from motorbus.link.lock import PortLock, holders, is_simulated, program_name, state_folder
 from tests.links.other import other_process, run
 
 PORT = "/dev/ttyACM7"
@@ -80,6 +81,15 @@ def test_holders_lists_the_living_only() -> None:
         PortLock("/dev/ttyACM8").path.write_text('{"pid": 999999999, "program": "x", "port": "y"}')
         assert sorted(owner.port for owner in holders()) == [PORT, "socket://bridge:4000"]
     assert holders() == []
+
+
+def test_two_that_look_at_a_lock_do_not_see_each_other() -> None:
+    port = PortLock("/dev/ttyACM8")
+    port.path.write_text('{"pid": 999999999, "program": "x", "port": "y"}')
+    with port.path.open("rb") as looked_at:
+        fcntl.flock(looked_at, fcntl.LOCK_SH)
+        assert port.owner() is None
+        assert not is_simulated("/dev/ttyACM8")
 
 
 FORK = """

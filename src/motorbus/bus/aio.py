@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import signal
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import inf
 from threading import get_ident
 from typing import Any, Final, Generic, Self, TypeVar
@@ -177,6 +177,12 @@ class AsyncBus(BaseBus):
         await self.close()
 
 
+def call_in(loop: asyncio.AbstractEventLoop, function: Callable[[], object]) -> None:
+    """Call this function in the thread of the loop, from the stop thread; a closed loop needs no call."""
+    with contextlib.suppress(RuntimeError):
+        loop.call_soon_threadsafe(function)
+
+
 class _Call(RequestJob):
     """A request whose value a task of the running loop awaits."""
 
@@ -189,8 +195,8 @@ class _Call(RequestJob):
     def _settled(self) -> None:
         if get_ident() == self.thread:
             self._complete()
-        else:  # the stop thread
-            self.loop.call_soon_threadsafe(self._complete)
+        else:
+            call_in(self.loop, self._complete)
 
     def _complete(self) -> None:
         if self.future.done():
@@ -229,9 +235,10 @@ class _Part(Generic[T]):
         )
 
     def _settled(self) -> None:
-        self.news.set()
-        if get_ident() != self._thread:  # the stop thread: wake the loop
-            self._loop.call_soon_threadsafe(self.news.set)
+        if get_ident() == self._thread:
+            self.news.set()
+        else:
+            call_in(self._loop, self.news.set)
 
     def advance(self) -> bool:
         """Step the tree and send, until it waits for something; True when it has ended."""

@@ -22,7 +22,7 @@ from motorbus.bus.tasks import Notify, TaskTree
 from motorbus.bus.trace import TraceRecord
 from motorbus.bus.turn import Turn
 from motorbus.core.family import Family, Readdressed
-from motorbus.core.operation import UNLIKE, Data, Exchange, Journal, Runnable
+from motorbus.core.operation import UNLIKE, Data, Exchange, Journal, Rank, Runnable
 from motorbus.errors import LinkError, LinkLost, MotorbusError, RequestError
 from motorbus.link.base import Link, Renewable
 from motorbus.link.memory import MemoryLink
@@ -244,7 +244,10 @@ class BaseBus:
         engine = self.engine
         engine.time = now
         engine.check(order, since)
-        engine.positions.sent(order)
+        if order.rank is Rank.STOP:
+            engine.note_stop(order)
+        else:
+            engine.positions.sent(order)
         engine.statistics.other["sent"] += 1
         engine.free_at = now + engine.air_time(order)
         if engine.trace.subscriptions:
@@ -272,6 +275,7 @@ class BaseBus:
         prepared.times[int(1e6 * (at - sent_at)).bit_length()] += 1
         record.data, record.at, record.source, record.kept = chunks[0], at, prepared, None
         record.orders = engine.positions.orders
+        engine.positions.rate = engine.rate
         del engine.in_flight[prepared.lane]
         return value
 

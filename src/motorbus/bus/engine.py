@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from bisect import insort
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from itertools import count
 from math import inf
 from typing import Any, Final, TypeVar
@@ -188,6 +189,8 @@ class Engine:
         """
         assert job.policy is not None
         self._remove(job)
+        if job.done:  # its caller waits no more
+            return
         try:
             step = job.policy.send(attempt)
             while isinstance(step, Wait) and step.until <= self.time:
@@ -258,9 +261,8 @@ class Engine:
         if job.done or not isinstance(job.step, Attempt):
             return None
         attempt, request = job.step, job.step.request
-        if now < self._earliest(
-            attempt
-        ):  # another request to this node has failed since the probe was chosen
+        # Another request to this node may have failed since the probe was chosen: its quiet time runs again.
+        if now < self._earliest(attempt):
             return None
         unprobed = attempt.is_probe or request.rank is Rank.STOP or request.timeout is Timeout.SCAN
         doubtful = [] if unprobed else self.sync.doubtful(request)
@@ -321,7 +323,8 @@ class Engine:
         self.positions.sent(request)
         self._note_since()
         if self.interlock is not None and request.effect in GATED:
-            self.interlock.stopped(tuple(addressed(request)))
+            with suppress(Exception):  # the stop must go out
+                self.interlock.stopped(tuple(addressed(request)))
 
     def _note_since(self) -> None:
         self.since = Since(self.positions.stops, self.latches, self.losses)

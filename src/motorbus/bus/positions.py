@@ -155,6 +155,10 @@ class LastPositions(Mapping[int, Reading]):
                 if due.node in resting:
                     self.accepted(due.node)
 
+    def forget_stop_replies(self) -> None:
+        """A new stop begins: replies to an earlier one do not count for it."""
+        self._stop_replies.clear()
+
     def accepted(self, node: int) -> None:
         """This node acknowledged a stop."""
         self._stop_replies.pop(node, None)

@@ -1,6 +1,7 @@
 """Counters per node: requests, replies, retries, errors, latencies.
 
-`sent = ok + errors + what is in flight` balances per node; a retry counts as sent again. Counters are never reset.
+`sent = ok + errors + what is in flight` per node, but for a prepared request during which the port was lost. A retry
+counts as sent again. Counters are never reset.
 """
 
 from __future__ import annotations
@@ -39,9 +40,9 @@ class Statistics:
         """The counters by node, as they are now."""
         found = {
             number: NodeStatistics(one.sent, one.ok, one.retries, one.errors.copy(), one.latency.copy())
-            for number, one in self._nodes.items()
+            for number, one in tuple(self._nodes.items())
         }
-        for group, times in self._groups.items():
+        for group, times in tuple(self._groups.items()):
             count = sum(times)
             for number in group if count else ():
                 counters = found.setdefault(number, NodeStatistics())

@@ -33,6 +33,8 @@ from motorbus.link.base import Link
 
 CLIENT_TIME: Final = 0.05
 """s for a client to send its request."""
+ROUNDS_TIME: Final = 3.0
+"""s for all rounds of a stop, less than `STOP_TIMEOUT`."""
 STOP, END = b"!", b"."
 
 
@@ -143,6 +145,7 @@ class EmergencyStop:
             engine.latch(bus.now(), by)
             self._restore_rate()
             tree = TaskTree(engine, stop_in_rounds(engine, bus.now), now=bus.now)
+            tree.deadline = bus.now() + ROUNDS_TIME
             while not tree.advance():
                 bus.send()
                 if not tree.advance():
@@ -175,18 +178,32 @@ class EmergencyStop:
             ended = False
             while not ended:
                 try:
-                    ends = [key.fileobj for key, _ in ready.select()]
-                    ended = ear in ends and self._serve_this_process(ear.recv(4096))
-                    if listener in ends and listener is not None:
-                        self._serve_client(listener.accept()[0])
+                    ended = self._serve_ready(ready, ear, listener)
                 except Exception:  # the thread must serve the next request
                     ended = self._closed
+            for key in list(ready.get_map().values()):
+                if key.fileobj not in (ear, listener) and isinstance(key.fileobj, socket.socket):
+                    key.fileobj.close()
 
-    def _serve_this_process(self, words: bytes) -> bool:
-        """Stop if that was requested; True at the end."""
-        if STOP in words:
-            self._stop_and_answer()
-        return END in words
+    def _serve_ready(
+        self, ready: DefaultSelector, ear: socket.socket, listener: socket.socket | None
+    ) -> bool:
+        """Wait, then serve this process first, then clients that have sent something; True at the end."""
+        ends = [key.fileobj for key, _ in ready.select()]
+        if ear in ends:
+            words = ear.recv(4096)
+            if STOP in words:
+                self._stop_and_answer()
+            if END in words:
+                return True
+        for end in ends:
+            if end is listener and listener is not None:
+                with contextlib.suppress(OSError):
+                    ready.register(listener.accept()[0], EVENT_READ)
+            elif end is not ear and isinstance(end, socket.socket):
+                ready.unregister(end)
+                self._serve_client(end)
+        return False
 
     def _stop_and_answer(self, client: str = "") -> StopOutcome:
         requests, self._requests = self._requests, []

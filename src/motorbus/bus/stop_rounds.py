@@ -20,6 +20,7 @@ SHORTEST_ROUND: Final = 0.05
 def stop_in_rounds(engine: Engine, now: Callable[[], float]) -> Operation[StopOutcome]:
     """Stop all known nodes. The engine is latched."""
     positions = engine.positions
+    positions.forget_stop_replies()
     before = {node: positions.accepted_count(node) for node in positions.nodes}
     stop = positions.frames(now())
     frames: Sequence[Exchange[Answer]] = stop.exchanges
@@ -52,7 +53,12 @@ def stop_in_rounds(engine: Engine, now: Callable[[], float]) -> Operation[StopOu
 
 def _stop_by(engine: Engine, request: Exchange[Answer], now: Callable[[], float]) -> Operation[Any]:
     """Send this request of a stop. If it reads a position, hold the node there."""
-    yield from request
+    try:
+        yield from request
+    except MotorbusError:
+        raise
+    except Exception as error:  # of the driver: the other nodes are stopped all the same
+        raise MotorbusError(f"a request of the stop failed: {error}") from error
     nodes = nodes_of(request)
     if request.effect not in GATED and nodes:
         frames = _frames_for(engine, nodes, now(), ())

@@ -19,6 +19,7 @@ from motorbus.core.operation import (
     Notice,
     Operation,
     Pause,
+    Rank,
     Report,
     Runnable,
     Step,
@@ -93,7 +94,7 @@ class TaskTree(Generic[T]):
         self.settled = settled
         self.since = since or engine.since
         self.has_ordered = False
-        """It has sent a request that moves or stops something, so its own stops count no more."""
+        """It has sent a motion, torque or stop request: from now on only stops after its next request end that."""
         self.cancellation: BaseException | None = None
         self.interruption: BaseException | None = None
         """Raised by one of several children, and no Exception: it cancels the others."""
@@ -255,7 +256,12 @@ class TaskTree(Generic[T]):
     def _begin_request(self, task: Task, request: Exchange[Any]) -> None:
         interlock = self.engine.interlock
         reads: Sequence[Runnable[Any]] = ()
-        if interlock is not None and request.effect in GATED and not task.checked:
+        if (
+            interlock is not None
+            and request.effect in GATED
+            and request.rank is not Rank.STOP
+            and not task.checked
+        ):
             reads = interlock.required_reads(request)
         if reads and interlock is not None:
             child = Task(_read_first(interlock.required_reads, reads, request), task)

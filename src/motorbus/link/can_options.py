@@ -89,7 +89,7 @@ class CanOptions(NamedTuple):
         if self.interface in SHARED:
             return ""
         if self.interface in SERIAL_PORTS:
-            return self.device or str(self.channel)
+            return self.device or str(self.channel).partition("@")[0]
         if self.interface == "socketcand":
             server = f"{self.settings.get('host')}:{self.settings.get('port')}"
             return f"can://socketcand/{server}/{self.channel}"
@@ -224,6 +224,10 @@ def check_rate(options: CanOptions, rate: int) -> None:
                 expected=f"f_clock={LAWICEL_CLOCK}",
             )
         return
+    if interface == "usb2can" and (rate % 1000 or rate > 1_000_000):  # python-can rounds it without a word
+        raise LinkError(
+            f"{name}: usb2can has no bit rate of {rate} bit/s", expected="kbit/s up to 1000000 bit/s"
+        )
     rates = known_rates(options)
     if rates and rate not in rates and "tseg1" not in options.settings:
         raise LinkError(

@@ -201,12 +201,21 @@ def _open_locked(path: Path) -> int | None:
 
 def _is_locked(path: Path) -> bool:
     """Whether a process holds the lock; a file alone may be left over."""
-    if not path.exists():
-        return False
-    descriptor = _open_locked(path)
-    if descriptor is not None:
-        os.close(descriptor)
-    return descriptor is None
+    try:
+        import fcntl
+    except ImportError:
+        descriptor = _open_locked(path) if path.exists() else 0
+        if descriptor:
+            os.close(descriptor)
+        return descriptor is None
+    try:
+        with path.open("rb") as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)  # shared: those who look do not see each other
+    except BlockingIOError:
+        return True
+    except OSError:
+        pass
+    return False
 
 
 def _written_owner(path: Path) -> Owner | None:

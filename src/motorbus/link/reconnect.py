@@ -107,19 +107,26 @@ def find_adapter(name: str, wanted: Identity, lister: Lister, sysfs: Path = Path
     raise PortNotFound(f"{name}: {wanted.text} is not there")
 
 
-def find_terminal(name: str, device: str) -> str:
-    """The address `name` of a pseudo-terminal, when the symbolic link `device` leads to one for which it was made.
+def link_times(device: str) -> tuple[int, ...]:
+    """When each symbolic link of the chain from `device` to its terminal was made (ns)."""
+    times, path = [], device
+    while os.path.islink(path):
+        times.append(os.lstat(path).st_ctime_ns)
+        path = os.path.join(os.path.dirname(path), os.readlink(path))
+    return tuple(times)
 
-    A link that is older than its terminal was left over from a simulator that was killed. Raises PortNotFound.
+
+def find_terminal(name: str, device: str, before: tuple[int, ...]) -> str:
+    """The address `name` of a pseudo-terminal to which the symbolic link `device` leads.
+
+    The link must be newer than its terminal, or made again since `before` (see `link_times`): a link that a killed
+    simulator left over leads to a terminal of another program. Raises PortNotFound.
     """
     real = os.path.realpath(device)
     if not (os.path.exists(real) and real.startswith(usb_adapters.PSEUDO_TERMINALS)):
-        raise PortNotFound(f"{device} leads nowhere")
-    made, path = 0, device
-    while os.path.islink(path):  # the newest of a chain
-        made = max(made, os.lstat(path).st_ctime_ns)
-        path = os.path.join(os.path.dirname(path), os.readlink(path))
-    if made < os.stat(real).st_ctime_ns:
+        raise PortNotFound(f"{device} leads to no pseudo-terminal")
+    times = link_times(device)
+    if times == before and max(times, default=0) < os.stat(real).st_ctime_ns:
         raise PortNotFound(f"{device} has not been made again")
     return name
 
@@ -234,7 +241,15 @@ class Reconnecting:
         if settings.get("kind") == "frames":
             settings["options"] = {**(settings.get("options") or {}), "listen_only": self.listen_only}
         lock = self._lock if self._lock.held else None
-        return open_link(self._find(), lock=lock, connect_time=CONNECT_TIME, **settings)
+        address = self._find()
+        link = open_link(address, lock=lock, connect_time=CONNECT_TIME, **settings)
+        try:
+            if self._find() == address:
+                return link
+            raise PortNotFound(f"{self.name} was exchanged while it was opened")
+        except BaseException:
+            link.close()
+            raise
 
     def rest(self, until: float) -> None:
         """See `Renewable.rest`."""
@@ -270,7 +285,8 @@ def reconnecting(
     if not device:
         return Reconnecting(link, lambda: name, settings)
     if is_terminal:
-        return Reconnecting(link, lambda: find_terminal(name, device), settings)
+        times = link_times(device)
+        return Reconnecting(link, lambda: find_terminal(name, device, times), settings)
     known = identify(real, lister, sysfs)
     port_at: Callable[[str], str] = getattr(link, "port_at", str)
     return Reconnecting(link, lambda: port_at(find_adapter(name, known, lister, sysfs)), settings)
