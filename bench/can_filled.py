@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 from bench.rounds import Failed
 from motorbus import kst
 from motorbus.bus.blocking import Bus
-from motorbus.core.operation import Operation, Together
+from motorbus.core.operation import Together
 from motorbus.diagnose.budget import Budget, Transfer, budget
 from motorbus.families.kst.simulator import KstBus
 from motorbus.families.kst.wire import encode_upload, encode_upload_reply
@@ -73,17 +73,17 @@ def measured(nodes: range, bitrate: int, reads: int) -> Filled:
     bus = Bus(MemoryLink(wire, rate=bitrate), kst.FAMILY.configured(), interlock=Gate())
     times: list[float] = []
 
-    def reading(node: int) -> Operation[None]:
+    async def reading(node: int) -> None:
         servo, position = kst.Servo(bus, node), kst.Servo.position.function
         for _ in range(reads // len(nodes)):
             begun = bus.link.now()
-            found = servo.table["present_position"].to_raw((yield from position(servo)))
+            found = servo.table["present_position"].to_raw(await position(servo))
             if found != raw(node):
                 raise WrongValue(f"node {node} stands at {raw(node)}, and was read as {found}")
             times.append(bus.link.now() - begun)
 
-    def together() -> Operation[None]:
-        yield from Together([reading(node) for node in nodes])
+    async def together() -> None:
+        await Together([reading(node) for node in nodes])
 
     bus.run(together())
     if any(ledger.sent != ledger.ok for ledger in bus.statistics.nodes.values()):

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import motorbus
 from bench.can_loop import BITRATE, main
 from motorbus import kst
-from motorbus.core.operation import Operation, Together
+from motorbus.core.operation import Together
 
 COUNTS_PER_RADIAN = 10 * 57.29577951308232
 
@@ -32,13 +32,13 @@ class Motorbus:
     def _together(self, count: int, values: list[list[float]]) -> None:
         verb = kst.Servo.position.function
 
-        def endless(servo: kst.Servo, keep: Callable[[float], None]) -> Operation[None]:
+        async def endless(servo: kst.Servo, keep: Callable[[float], None]) -> None:
             for _ in range(count):
-                keep((yield from verb(servo)))
+                keep(await verb(servo))
 
-        def together() -> Operation[None]:
+        async def together() -> None:
             pairs = zip(self.servos, values, strict=True)
-            yield from Together([endless(servo, found.append) for servo, found in pairs])
+            await Together([endless(servo, found.append) for servo, found in pairs])
 
         self.bus.run(together())
 

@@ -12,7 +12,7 @@ from motorbus.bus.blocking import Bus
 from motorbus.bus.stop_socket import StopOutcome
 from motorbus.bus.tasks import TaskTree
 from motorbus.core.goal import Goal
-from motorbus.core.operation import ANY, UNLIKE, Alone, Answer, Data, Due, Exchange, Listen, Operation
+from motorbus.core.operation import ANY, UNLIKE, Alone, Answer, Data, Due, Exchange, Listen
 from motorbus.core.operation import Effect as Effect
 from motorbus.core.operation import Rank as Priority
 from motorbus.core.operation import Timeout as Timeout
@@ -70,22 +70,22 @@ def request(
     )
 
 
-def exclusive(*requests: Exchange[Any]) -> Operation[Any]:
+async def exclusive(*requests: Exchange[Any]) -> Any:
     """These requests in order, and no other in between."""
 
-    def sequence() -> Operation[list[Any]]:
+    async def sequence() -> list[Any]:
         values = []
         for one in requests:
-            value = yield from one
+            value = await one
             values.append(value)
         return values
 
-    return (yield from Alone(sequence()))
+    return await Alone(sequence())
 
 
-def notification(node: int, seconds: float) -> Operation[Any]:
+async def notification(node: int, seconds: float) -> Any:
     """Wait for a notification of this node: its kind, None after so many seconds."""
-    notice = yield from Listen(lambda one: one.node == node, seconds)
+    notice = await Listen(lambda one: one.node == node, seconds)
     return notice and notice.kind
 
 

@@ -867,10 +867,10 @@ def test_a_procedure_that_began_before_a_loss_moves_nothing_after_it(engine: Eng
     known(engine, 1)
     servos = engine.wire.answer
 
-    def stubborn() -> Any:
+    async def stubborn() -> Any:
         for work in (read(1), move(1), read(1), move(1, 2)):
             try:
-                yield from work
+                await work
             except LinkLost:
                 engine.link.plug()
 

@@ -47,31 +47,31 @@ def lock(node: int, closed: int) -> Any:
 def guarded(node: int, work: Any = None) -> Operation[None]:
     """Open the lock, change something, close the lock whatever happens."""
 
-    def change() -> Operation[None]:
-        yield from lock(node, 0)
-        yield from work or write(node, 9, repeatable=True)
+    async def change() -> None:
+        await lock(node, 0)
+        await (work or write(node, 9, repeatable=True))
 
     return afterwards(change(), lambda: lock(node, 1))
 
 
-def turning(*rests: float) -> Operation[None]:
+async def turning(*rests: float) -> None:
     """Wait for ever; then wait for something to come to rest, and write."""
     try:
-        yield from Pause(1e9)
+        await Pause(1e9)
     finally:
         for rest in rests:
-            yield from outcome(iter(Pause(rest)))
-        yield from outcome(write(1, 9))
+            await outcome(Pause(rest))
+        await outcome(write(1, 9))
 
 
 def test_each_step_gives_its_value(engine: Engine) -> None:
-    def everything() -> Operation[list[Any]]:
-        values: list[Any] = [(yield from read(1))]
-        values += yield from Together([read(2), read(3)])
+    async def everything() -> list[Any]:
+        values: list[Any] = [await read(1)]
+        values += await Together([read(2), read(3)])
         none: list[Any] = []
-        values.append((yield from Together(none)))
-        values.append((yield from Pause(3600.0)) > 3600.0)
-        values += [(yield from Tune(500_000)), (yield from Tune(0)), (yield from read(4))]
+        values.append(await Together(none))
+        values.append(await Pause(3600.0) > 3600.0)
+        values += [await Tune(500_000), await Tune(0), await read(4)]
         return values
 
     assert engine.run(everything()) == [100, 200, 300, [], True, 1_000_000, 500_000, 400]
@@ -82,8 +82,8 @@ def test_one_failure_of_several_stops_none_of_the_others(engine: Engine) -> None
     engine.wire.answer = servos = Servos()
     servos.silent = {2, 4}
 
-    def several() -> Operation[list[Any]]:
-        return (yield from Together([read(node) for node in (1, 2, 3, 4)]))
+    async def several() -> list[Any]:
+        return await Together([read(node) for node in (1, 2, 3, 4)])
 
     with pytest.raises(NoReply, match="node 2") as caught:
         engine.run(several())
@@ -94,13 +94,13 @@ def test_one_failure_of_several_stops_none_of_the_others(engine: Engine) -> None
 def test_reports_are_handed_over_before_the_next_step_and_what_they_raise_comes_back(engine: Engine) -> None:
     seen: list[tuple[object, int]] = []
 
-    def work() -> Operation[None]:
+    async def work() -> None:
         try:
             for done in range(2):
-                yield from Report(Progress(done, 2))
-                yield from read(1)
+                await Report(Progress(done, 2))
+                await read(1)
         finally:
-            yield from lock(1, 1)
+            await lock(1, 1)
 
     engine.bus.run(work(), report=lambda event: seen.append((event, len(engine.wire.sent))))
     assert seen == [(Progress(0, 2), 0), (Progress(1, 2), 1)]
@@ -115,9 +115,9 @@ def test_reports_are_handed_over_before_the_next_step_and_what_they_raise_comes_
 
 
 def test_without_a_journal_a_guarded_change_is_refused_before_it_begins(engine: Engine) -> None:
-    def change() -> Operation[None]:
-        yield from Report(Journal("set_id", "begun", {}))
-        yield from write(1, 2, address=5)
+    async def change() -> None:
+        await Report(Journal("set_id", "begun", {}))
+        await write(1, 2, address=5)
 
     with pytest.raises(RequestError, match="keeps no journal"):
         engine.run(change())
@@ -126,8 +126,8 @@ def test_without_a_journal_a_guarded_change_is_refused_before_it_begins(engine: 
 
 @pytest.mark.parametrize("after", [0.0, 0.0005, 0.001, 0.0015])
 def test_a_cancelled_change_closes_its_lock_at_every_step(engine: Engine, after: float) -> None:
-    def both() -> Operation[Any]:
-        return (yield from Together([guarded(node, Pause(0.001)) for node in (1, 2)]))
+    async def both() -> Any:
+        return await Together([guarded(node, Pause(0.001)) for node in (1, 2)])
 
     engine.submit("a", both())
     engine.advance(after)
@@ -165,14 +165,14 @@ def test_a_clean_up_that_does_not_end_is_given_up_and_a_second_cancel_shortens_i
 
 
 def test_what_a_clean_up_failed_with_goes_with_the_cancellation_once(engine: Engine) -> None:
-    def failing(text: str) -> Operation[None]:
+    async def failing(text: str) -> None:
         try:
-            yield from Pause(1e9)
+            await Pause(1e9)
         finally:
             raise RequestError(text)
 
-    def several() -> Operation[Any]:
-        return (yield from Together([failing("it may turn"), failing("it may turn"), failing("so may this")]))
+    async def several() -> Any:
+        return await Together([failing("it may turn"), failing("it may turn"), failing("so may this")])
 
     engine.submit("a", several())
     engine.cancel("a")
@@ -181,12 +181,12 @@ def test_what_a_clean_up_failed_with_goes_with_the_cancellation_once(engine: Eng
 
 
 def test_while_a_bus_only_listens_requests_are_refused_and_notifications_received(can: Engine) -> None:
-    def listen() -> Operation[list[Any]]:
-        yield from Tune(125_000, listen_only=True)
-        refused = yield from outcome(can_read(1))
-        notice = yield from Listen(lambda one: one.node == 5, 0.1)
-        before = yield from Tune(500_000)
-        return [refused, notice, before, (yield from can_read(1))]
+    async def listen() -> list[Any]:
+        await Tune(125_000, listen_only=True)
+        refused = await outcome(can_read(1))
+        notice = await Listen(lambda one: one.node == 5, 0.1)
+        before = await Tune(500_000)
+        return [refused, notice, before, await can_read(1)]
 
     can.submit("a", listen())
     can.deliver(CanFrame(0x585, b"\x64\0\0\0"))
@@ -206,14 +206,14 @@ def test_a_rate_that_the_link_refuses_fails_the_change_only(
 
     monkeypatch.setattr(can.link, "tune", refuse)
     with pytest.raises(LinkError, match="cannot"):
-        can.run(iter(Tune(125_000, listen_only=True)))
+        can.run(Tune(125_000, listen_only=True))
     assert can.bus.rate == 500_000
     assert can.run(can_read(1)) == 100
 
 
 def test_a_stop_is_sent_at_the_rate_at_which_nodes_answered(can: Engine) -> None:
     can.run(can_read(1, tells_position=True))
-    can.run(iter(Tune(125_000, listen_only=True)))
+    can.run(Tune(125_000, listen_only=True))
     assert can.estop().acknowledged == (1,)
     assert can.bus.rate == can.wire.rate == 500_000
 

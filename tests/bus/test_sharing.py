@@ -17,7 +17,7 @@ import motorbus
 from motorbus import feetech
 from motorbus.bus.blocking import exchange_on
 from motorbus.bus.running import run_on
-from motorbus.core.operation import Operation, Pause
+from motorbus.core.operation import Exchange, Pause
 from motorbus.errors import Interrupted, LinkLost
 from motorbus.families.feetech.driver.torque import disable_torque_everyone
 from tests.bus.test_batches import Arm
@@ -38,10 +38,14 @@ def started(work: Callable[[], object]) -> threading.Thread:
     return thread
 
 
-def reading(arm: Arm, times: int, pause: float = 0.0) -> Operation[None]:
+async def carried_out(order: Exchange[Any]) -> None:
+    await order
+
+
+async def reading(arm: Arm, times: int, pause: float = 0.0) -> None:
     for _ in range(times):
-        yield from arm.batch()[1]
-        yield Pause(pause)
+        await arm.batch()[1]
+        await Pause(pause)
 
 
 @pytest.mark.parametrize("kind", ["exchange", "run"])
@@ -80,7 +84,7 @@ def test_an_order_that_waited_for_the_bus_does_not_leave_after_a_torque_off(
     calls: dict[str, Callable[[], object]] = {
         "run": lambda: arm.bus.run(order),
         "exchange": lambda: arm.bus.exchange([order, read]),
-        "procedure": lambda: arm.bus.run(iter(order)),
+        "procedure": lambda: arm.bus.run(carried_out(order)),
     }
 
     def call() -> None:
@@ -137,16 +141,16 @@ def test_a_handler_that_raises_while_a_call_waits_for_the_bus_loses_nothing(
 def test_a_second_signal_does_not_take_the_clean_up_away(arms: list[Arm], where: str) -> None:
     arm, cleaned = arms[0], []
 
-    def work() -> Operation[None]:
+    async def work() -> None:
         try:
             if where == "request":
-                yield from arm.batch()[1]
+                await arm.batch()[1]
                 signal.raise_signal(signal.SIGINT)
             while True:
-                yield Pause(0.5)
+                await Pause(0.5)
         finally:
             signal.raise_signal(signal.SIGINT)
-            yield from arm.batch()[1]
+            await arm.batch()[1]
             cleaned.append(True)
 
     if where == "pause":
@@ -195,14 +199,11 @@ def test_an_emergency_stop_ends_the_calls_of_a_loop_that_is_closed() -> None:
     with motorbus.simulate("feetech", ids="1", clock="real") as sim:
         bus = motorbus.open_async(sim.url)
         loop = asyncio.new_event_loop()
-        pending: list[asyncio.Task[None]] = []
-
-        def reading_for_ever() -> Operation[None]:
-            yield from Pause(60.0)
+        pending: list[asyncio.Task[float]] = []
 
         async def begin() -> None:
             await bus.run(feetech.Servo.position.function(feetech.AsyncServo(bus, 1)))
-            pending.append(loop.create_task(bus.run(reading_for_ever())))
+            pending.append(loop.create_task(bus.run(Pause(60.0))))
             await asyncio.sleep(0.05)
 
         loop.run_until_complete(begin())

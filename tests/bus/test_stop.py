@@ -14,7 +14,7 @@ import pytest
 
 from motorbus.bus.blocking import Bus
 from motorbus.bus.stop_socket import STOP_TIMEOUT, request_estop
-from motorbus.core.operation import Effect, Exchange, Operation, Tune
+from motorbus.core.operation import Effect, Exchange, Tune
 from motorbus.errors import LinkError, LinkLost, PortNotFound
 from motorbus.families.feetech import FAMILY
 from motorbus.link.memory import MemoryLink
@@ -91,15 +91,11 @@ def test_a_stop_is_sent_at_the_rate_of_the_last_prepared_reply() -> None:
     read = position(1)
     kept = Exchange(read.request, read.replies, read.read, repeatable=True, whole=lambda data, at: data[5])
     for rate in (1_000_000, 500_000):
-        bus.run(set_rate(rate))
+        bus.run(Tune(rate))
         for _ in range(3):
             assert bus.run(kept) == 1
     bus.estop()
     assert (bus.rate, responder.rate) == (500_000, 500_000)
-
-
-def set_rate(rate: int) -> Operation[int]:
-    return (yield from Tune(rate))
 
 
 def test_a_port_that_is_full_for_a_while_does_not_lose_the_stop() -> None:

@@ -17,7 +17,6 @@ from motorbus.core.operation import (
     Exchange,
     Journal,
     Listen,
-    Operation,
     Pause,
     Progress,
     Report,
@@ -56,11 +55,11 @@ def test_the_gate_stands_in_a_dry_run_too(arm: Simulation) -> None:
 
 
 def test_nobody_waits_in_a_rehearsal_but_its_time_passes(arm: Simulation) -> None:
-    def waiting() -> Operation[float]:
-        began = yield from Pause(0)
-        heard = yield from Listen(lambda _: True, 100.0)
+    async def waiting() -> float:
+        began = await Pause(0)
+        heard = await Listen(lambda _: True, 100.0)
         assert heard is None
-        return (yield from Pause(1000.0)) - began
+        return await Pause(1000.0) - began
 
     with motorbus.open(arm.url) as bus:
         before = bus.link.now()
@@ -69,9 +68,9 @@ def test_nobody_waits_in_a_rehearsal_but_its_time_passes(arm: Simulation) -> Non
 
 
 def test_events_are_heard_and_no_journal_is_kept(arm: Simulation) -> None:
-    def told() -> Operation[None]:
-        yield from Report(Journal("set_id", INTENT, {"node": 1}))
-        yield from Report(Progress(1, 2))
+    async def told() -> None:
+        await Report(Journal("set_id", INTENT, {"node": 1}))
+        await Report(Progress(1, 2))
 
     heard: list[object] = []
     with motorbus.open(arm.url) as bus:
@@ -122,17 +121,17 @@ def test_another_device_is_apart_and_its_frames_are_shown_with_the_rest(arm: Sim
 
 def test_the_rate_of_the_bus_is_known(arm: Simulation) -> None:
     with motorbus.open(arm.url) as bus:
-        assert DryBus(bus).run(iter(Tune(0))) == 1_000_000
+        assert DryBus(bus).run(Tune(0)) == 1_000_000
 
 
 def test_every_kind_of_step_is_gone_through(arm: Simulation) -> None:
-    def inner(name: str) -> Operation[str]:
-        yield from Pause(1.0)
-        yield from Report(name)
+    async def inner(name: str) -> str:
+        await Pause(1.0)
+        await Report(name)
         return name
 
-    def outer() -> Operation[list[str]]:
-        return [(yield from Alone(inner("a"))), *(yield from Together([inner("b"), inner("c")]))]
+    async def outer() -> list[str]:
+        return [await Alone(inner("a")), *await Together([inner("b"), inner("c")])]
 
     with motorbus.open(arm.url) as bus:
         assert DryBus(bus).run(outer()) == ["a", "b", "c"]
@@ -141,9 +140,9 @@ def test_every_kind_of_step_is_gone_through(arm: Simulation) -> None:
 def test_an_error_reaches_the_operation(arm: Simulation) -> None:
     absent = motorbus.feetech.FAMILY.probe(9, 0)
 
-    def careful(exchange: Exchange[bool]) -> Operation[str]:
+    async def careful(exchange: Exchange[bool]) -> str:
         try:
-            yield from exchange
+            await exchange
         except motorbus.NoReply:
             return "nobody"
         return "somebody"

@@ -21,7 +21,7 @@ def homed(
         ran = run("home", f"{line.url}#1", *words)
         orders = line.orders()
         with motorbus.open(line.url) as bus:
-            bus.run(iter(Pause(2.0)))  # a slow stop takes its time
+            bus.run(Pause(2.0))  # a slow stop takes its time
         return ran.code, ran.out + ran.err, orders, simulation[1].status()["frequency"]
 
 

@@ -6,7 +6,7 @@ import pytest
 
 import motorbus
 from motorbus.cli import monitor
-from motorbus.core.operation import Operation, Pause
+from motorbus.core.operation import Pause
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Bench, Run
 
@@ -82,11 +82,11 @@ def test_l12_it_goes_on_when_a_port_that_was_gone_is_there_again(
 ) -> None:
     pauses: list[float] = []
 
-    def pulled(seconds: float) -> Operation[None]:
+    async def pulled(seconds: float) -> None:
         pauses.append(seconds)
         if len(pauses) == 2:
             arm.unplug(seconds=1.0)
-        yield from Pause(seconds)
+        await Pause(seconds)
 
     monkeypatch.setattr(monitor, "_pause", pulled)
     ran = run("monitor", f"{arm.url}#1", "--rate", "4", "--count", "12", "--json")
@@ -103,9 +103,9 @@ def test_l12_it_goes_on_when_a_port_that_was_gone_is_there_again(
 def test_it_ends_where_a_port_is_not_looked_for(
     run: Run, arm: Simulation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def pulled(seconds: float) -> Operation[None]:
+    async def pulled(seconds: float) -> None:
         arm.unplug(seconds=1.0)
-        yield from Pause(seconds)
+        await Pause(seconds)
 
     monkeypatch.setattr(monitor, "_pause", pulled)
     ran = run("monitor", f"{arm.url}#1", "--reconnect", "no", "--count", "12", "--json")

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from motorbus.core.family import Family, Health, State, Train
-from motorbus.core.operation import Effect, Exchange, Operation, Runnable, Together, outcome
+from motorbus.core.operation import Effect, Exchange, Runnable, Together, outcome
 from motorbus.errors import LimitExceeded, NoReply, RequestError
 from tests.support.subjects import line_of
 from tests.support.world import IDS, Steps, World, abilities, kept, sent, world
@@ -163,16 +163,16 @@ def heard(there: World, train: Train) -> dict[int, float]:
     return values
 
 
-def visited(exchanges: Any) -> Operation[list[Any]]:
-    return (yield from Together([outcome(one) for one in exchanges]))
+async def visited(exchanges: Any) -> list[Any]:
+    return await Together([outcome(one) for one in exchanges])
 
 
 def led(there: World, train: Train, to: Mapping[int, float]) -> None:
     there.bus.run(together(train.goals(to)))
 
 
-def together(exchanges: Any) -> Operation[None]:
-    yield from Together(list(exchanges))
+async def together(exchanges: Any) -> None:
+    await Together(list(exchanges))
 
 
 def stands(there: World) -> dict[int, int]:

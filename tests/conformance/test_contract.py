@@ -19,7 +19,6 @@ from motorbus.core.operation import (
     Due,
     Effect,
     Exchange,
-    Operation,
     Rank,
     Timeout,
     Together,
@@ -139,8 +138,8 @@ def test_lanes_and_window_agree_and_as_many_fly_as_the_window_allows(subject: Fa
     assert most == min(subject.link.window, len({subject.lane(node) for node in there.ids}))
 
 
-def probes(family: Family) -> Operation[list[bool]]:
-    return (yield from Together([family.probe(node, 0) for node in possible(family, IDS)]))
+async def probes(family: Family) -> list[bool]:
+    return await Together([family.probe(node, 0) for node in possible(family, IDS)])
 
 
 # --- probes, echo, stop -------------------------------------------------------------------------------------

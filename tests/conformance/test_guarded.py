@@ -56,14 +56,13 @@ def test_a_guarded_write_opens_the_lock_and_closes_it(lockable: Family) -> None:
 
 
 @pytest.mark.parametrize("error", [Cut, KeyboardInterrupt, asyncio.CancelledError], ids=lambda e: e.__name__)
-@pytest.mark.parametrize("again", [False, True], ids=["once", "twice"])
 @pytest.mark.parametrize("before", [True, False], ids=["before", "after"])
 def test_cut_at_any_step_it_closes_the_lock(
-    lockable: Family, before: bool, again: bool, error: type[BaseException]
+    lockable: Family, before: bool, error: type[BaseException]
 ) -> None:
     for number in range(MOST):
         with world(lockable) as there:
-            steps = Steps(there.bus, cut_at=number, before=before, again=again, error=error)
+            steps = Steps(there.bus, cut_at=number, before=before, error=error)
             operation = guarded(there)
             try:
                 steps.run(operation)

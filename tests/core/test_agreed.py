@@ -7,23 +7,19 @@ from collections.abc import Iterator
 import pytest
 
 from motorbus.core.agreed import READINGS, agreed
-from motorbus.core.operation import Operation
 from motorbus.errors import VerificationFailed
 
 
 def judged(values: Iterator[int]) -> int:
     """Carries `agreed` out over these readings, none of which needs a bus."""
 
-    def reading() -> Operation[int]:
-        yield from ()
+    async def reading() -> int:
         return next(values)
 
-    def run() -> Operation[None]:
-        readings.append((yield from agreed(reading, node=3, what="position")))
-
-    readings: list[int] = []
-    assert list(run()) == []
-    return readings[0]
+    with pytest.raises(StopIteration) as end:
+        agreed(reading, node=3, what="position").send(None)
+    value: int = end.value.value
+    return value
 
 
 @pytest.mark.parametrize(

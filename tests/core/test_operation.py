@@ -1,8 +1,9 @@
-"""Steps are values; `yield from` gives each the type of its answer; `afterwards` always cleans up."""
+"""Steps are values; `await` gives each the type of its value; `afterwards` always cleans up."""
 
 from __future__ import annotations
 
-from typing import assert_type
+from inspect import CORO_CLOSED, getcoroutinestate
+from typing import Any, assert_type
 
 import pytest
 
@@ -10,44 +11,49 @@ from motorbus.core.operation import (
     Alone,
     Due,
     Exchange,
+    Guard,
     Listen,
     Notice,
     Operation,
     Pause,
     Report,
+    Runnable,
+    Shielded,
     Step,
     Together,
     Tune,
     afterwards,
+    discard,
     outcome,
 )
 from motorbus.errors import MotorbusError, NoReply
+from tests.families.player import played
 
 
 def number(value: int) -> Exchange[int]:
     return Exchange(bytes([value]), (Due(1, 1, 1),), lambda answer: answer.replies[0].data[0])
 
 
-def everything() -> Operation[str]:
-    one = yield from number(1)
+async def everything() -> str:
+    one = await number(1)
     assert_type(one, int)
-    several = yield from Together([number(2), number(3)])
+    several = await Together([number(2), number(3)])
     assert_type(several, list[int])
-    alone = yield from Alone(number(4))
+    alone = await Alone(number(4))
     assert_type(alone, int)
-    yield from Pause(0.1)
-    notice = yield from Listen(lambda n: True, 1.0)
+    await Pause(0.1)
+    notice = await Listen(lambda n: True, 1.0)
     assert_type(notice, Notice | None)
-    yield from Tune(500_000)
-    yield from Report("event")
+    await Tune(500_000)
+    await Report("event")
     return f"{one} {several} {alone} {notice}"
 
 
 def test_every_step_yields_itself_and_returns_what_is_sent_in() -> None:
     operation = everything()
-    kinds: list[type[Step]] = []
+    kinds: list[type[Step[Any]]] = []
     answers: list[object] = [1, [2, 3], 4, None, None, None, None]
-    step = next(operation)
+    step = operation.send(None)
     for answer in answers[:-1]:
         kinds.append(type(step))
         step = operation.send(answer)
@@ -60,70 +66,72 @@ def test_every_step_yields_itself_and_returns_what_is_sent_in() -> None:
 
 def test_an_outcome_turns_our_errors_into_values_and_no_others() -> None:
     operation: Operation[int | MotorbusError] = outcome(number(1))
-    next(operation)
+    operation.send(None)
     with pytest.raises(StopIteration) as end:
         operation.throw(NoReply("silent"))
     assert isinstance(end.value.value, NoReply)
     operation = outcome(number(1))
-    next(operation)
+    operation.send(None)
     with pytest.raises(KeyboardInterrupt):
         operation.throw(KeyboardInterrupt())
 
 
-def guarded(log: list[str], fail: BaseException | None = None) -> Operation[int]:
-    def body() -> Operation[int]:
-        value = yield from number(1)
-        if fail is not None:
-            raise fail
-        return value
+class Locked(Guard):
+    """Request 1 opens, request 9 closes."""
 
-    def lock() -> Exchange[int]:
-        log.append("lock")
-        return number(9)
+    def __init__(self, log: list[int]) -> None:
+        self.log = log
 
-    return afterwards(body(), lock)
+    async def enter(self) -> None:
+        await number(1)
 
-
-def test_afterwards_cleans_up_and_returns_the_value() -> None:
-    log: list[str] = []
-    operation = guarded(log)
-    next(operation)
-    lock = operation.send(7)
-    assert isinstance(lock, Exchange)
-    assert lock.request == b"\x09"
-    with pytest.raises(StopIteration) as end:
-        operation.send(None)
-    assert end.value.value == 7
-    assert log == ["lock"]
+    async def leave(self, error: BaseException | None) -> None:
+        await number(9)
 
 
+def carried_out(operation: Runnable[Any], log: list[int], *, fails_at: int, error: BaseException) -> Any:
+    """Run a procedure whose request of this number fails."""
+
+    def carry_out(step: Any) -> Any:
+        if isinstance(step, Shielded):
+            return played(step.operation, carry_out)
+        log.append(step.request[0])
+        if step.request[0] == fails_at:
+            raise error
+        return step.request[0]
+
+    return played(operation, carry_out)
+
+
+async def changed(log: list[int]) -> int:
+    async with Locked(log):
+        return await number(2)
+
+
+@pytest.mark.parametrize("kind", ["guard", "afterwards"])
 @pytest.mark.parametrize("error", [NoReply("silent"), KeyboardInterrupt(), ValueError("bug")])
-def test_afterwards_cleans_up_after_any_error(error: BaseException) -> None:
-    log: list[str] = []
-    operation = guarded(log, error)
-    next(operation)
-    operation.send(7)
-    assert log == ["lock"]
-    with pytest.raises(type(error)):
-        operation.send(None)
+@pytest.mark.parametrize("fails_at", [0, 1, 2, 9])
+def test_the_end_of_a_guard_follows_its_beginning(kind: str, error: BaseException, fails_at: int) -> None:
+    if fails_at == 9 and isinstance(error, KeyboardInterrupt):
+        pytest.skip("a bus raises it when the guard has ended")
+    log: list[int] = []
+    work = changed(log) if kind == "guard" else afterwards(number(2), lambda: number(9))
+    if fails_at in ((1, 2, 9) if kind == "guard" else (2, 9)):
+        with pytest.raises(type(error)):
+            carried_out(work, log, fails_at=fails_at, error=error)
+    else:
+        assert carried_out(work, log, fails_at=fails_at, error=error) == 2
+    opened = [1] if kind == "guard" else []
+    assert log == [*opened, *([2] if fails_at != 1 or not opened else []), 9]
 
 
-def test_an_interruption_of_the_clean_up_repeats_it() -> None:
-    log: list[str] = []
-    operation = guarded(log)
-    next(operation)
-    operation.send(7)
-    operation.throw(KeyboardInterrupt())
-    assert log == ["lock", "lock"]
-    with pytest.raises(KeyboardInterrupt):
-        operation.send(None)
+def test_a_procedure_that_is_dropped_leaves_no_guard() -> None:
+    operation = changed([])
+    operation.send(None)
+    operation.close()  # raises RuntimeError where it awaits another step
 
 
-def test_a_clean_up_that_fails_is_not_repeated_for_ever() -> None:
-    log: list[str] = []
-    operation = guarded(log)
-    next(operation)
-    operation.send(7)
-    with pytest.raises(NoReply):
-        operation.throw(NoReply("silent"))
-    assert log == ["lock"]
+def test_what_is_never_started_is_closed_with_all_that_it_was_given() -> None:
+    inner = changed([])
+    discard(Together([Alone(outcome(inner))]))
+    assert getcoroutinestate(inner) == CORO_CLOSED

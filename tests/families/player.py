@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from motorbus.core.operation import Exchange, Operation, Runnable
+from motorbus.core.operation import Runnable, Step
 
 T = TypeVar("T")
 
 
 def played(runnable: Runnable[T], carry_out: Callable[[Any], Any]) -> T:
     """The value of the operation; what `carry_out` raises at a step is thrown into it there."""
-    operation: Operation[T] = iter(runnable) if isinstance(runnable, Exchange) else runnable
+    operation = runnable.__await__() if isinstance(runnable, Step) else runnable
     value: Any = None
     error: BaseException | None = None
     while True:

@@ -10,7 +10,7 @@ import pytest
 
 from motorbus import AsyncRobot, NoReply, RequestError, Robot
 from motorbus.core.family import Quality
-from motorbus.core.operation import Operation, Pause
+from motorbus.core.operation import Pause
 from motorbus.motion.axis import AsyncAxis, Axis
 from motorbus.motion.body import Body
 from motorbus.motion.capabilities import ability
@@ -110,13 +110,13 @@ def test_effort_has_the_direction_of_the_axis() -> None:
         assert axis.current() == -0.5
 
 
-def _told(value: float) -> Operation[float]:
-    yield from Pause(0)
+async def _told(value: float) -> float:
+    await Pause(0)
     return value
 
 
-def _pause(seconds: float) -> Operation[float]:
-    return (yield from Pause(seconds))
+async def _pause(seconds: float) -> float:
+    return await Pause(seconds)
 
 
 def test_a_linear_axis_is_in_metres() -> None:

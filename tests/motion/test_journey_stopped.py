@@ -115,9 +115,9 @@ def test_a_stop_between_all_being_ready_and_the_moment_keeps_everybody_where_he_
     ready: list[object] = []
     start = Seat.start
 
-    def noted(self: Seat, lead: float, *meanwhile: Any) -> Any:
+    async def noted(self: Seat, lead: float, *meanwhile: Any) -> Any:
         ready.append(self)
-        return (yield from start(self, lead, *meanwhile))
+        return await start(self, lead, *meanwhile)
 
     monkeypatch.setattr(Seat, "start", noted)
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from motorbus import AsyncRobot, LinkLost, MotorbusError, NotHomed, Robot
-from motorbus.core.operation import Operation, Pause, Together, outcome
+from motorbus.core.operation import Pause, Together, outcome
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.leaving import Leaving, given_up, goes_on
 from motorbus.motion.machine import Machine
@@ -101,8 +101,8 @@ def _is_last(titles: list[str], number: int) -> bool:
     return not any("servo 2" in one for one in titles[number + 1 :])
 
 
-def _wait(seconds: float) -> Operation[None]:
-    yield from Pause(seconds)
+async def _wait(seconds: float) -> None:
+    await Pause(seconds)
 
 
 def test_everyone_is_visited_though_some_are_dead() -> None:
@@ -298,8 +298,8 @@ def test_async_parks_and_tells_what_failed() -> None:
 def test_a_stop_of_others_in_a_movement_needs_no_more_when_it_is_left() -> None:
     with machine(arm="1") as (made, sims), Robot.of(made) as robot:
 
-        def both() -> Operation[list[object]]:
-            told = yield from Together(
+        async def both() -> list[object]:
+            told = await Together(
                 [outcome(moving.move_axis(robot["a1"], 1.0)), outcome(_stopped_after(robot, 0.3))]
             )
             return list(told)
@@ -311,11 +311,11 @@ def test_a_stop_of_others_in_a_movement_needs_no_more_when_it_is_left() -> None:
         assert said(sims) == []
 
 
-def _stopped_after(robot: Robot, seconds: float) -> Operation[object]:
+async def _stopped_after(robot: Robot, seconds: float) -> object:
     from motorbus.motion.capabilities import stop
 
-    yield from Pause(seconds)
-    return (yield from stop(robot["a1"]))
+    await Pause(seconds)
+    return await stop(robot["a1"])
 
 
 def test_a_bus_that_is_gone_keeps_no_other_from_being_left() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import CanFrame, Exchange
+from motorbus.core.operation import CanFrame
 from motorbus.errors import Interrupted, MotorbusError
 from motorbus.link.base import Side
 from motorbus.motion.capabilities import disable_torque
@@ -123,11 +123,11 @@ def test_who_was_given_torque_before_letting_go_was_over_counts_as_given_torque(
         axis: Any = robot["a1"]
         bus: Any = robot.buses["arm"]
         lets_go = disable_torque(axis)
-        step = next(lets_go)
+        step = lets_go.send(None)
         axis.departs()  # a loop begins meanwhile
         with suppress(StopIteration):
             while True:
-                step = lets_go.send(bus.run(step if isinstance(step, Exchange) else iter(step)))
+                step = lets_go.send(bus.run(step))
         assert axis.engaged
         axis.disable_torque()
         assert not axis.engaged

@@ -35,7 +35,7 @@ def test_without_a_beat_it_goes_no_further_than_a_quantum(name: str) -> None:
             hand.beat()
             before = robot.positions()[name]
             bus = robot.buses[robot[name].spec.bus]
-            bus.run(iter(Pause(5.0)))  # type: ignore[attr-defined]
+            bus.run(Pause(5.0))  # type: ignore[attr-defined]
             after = robot.positions()[name]
         assert before is not None
         assert after is not None

@@ -9,7 +9,7 @@ from math import pi, tau
 import pytest
 
 from motorbus import AsyncRobot, Interrupted, LimitExceeded, MotorbusError, NotHomed, RequestError, Robot
-from motorbus.core.operation import Operation, Pause, Together, outcome
+from motorbus.core.operation import Pause, Together, outcome
 from motorbus.motion import capabilities as verbs
 from motorbus.motion import reckoning
 from motorbus.motion.abreast import Abreast
@@ -161,15 +161,15 @@ def test_a_stop_in_the_middle_makes_it_unknown(rank: str) -> None:
         lift = robot["lift"]
         lift.declare(0.0)
 
-        def stopped() -> Operation[None]:
-            yield from Pause(1.0)
+        async def stopped() -> None:
+            await Pause(1.0)
             if rank == "estop":
                 lift.bus.estop()
             else:
-                yield from verbs.stop(lift)
+                await verbs.stop(lift)
 
-        def both() -> Operation[list[object]]:
-            found = yield from Together([outcome(reckoning.move_by(lift, 0.1)), outcome(stopped())])
+        async def both() -> list[object]:
+            found = await Together([outcome(reckoning.move_by(lift, 0.1)), outcome(stopped())])
             return list(found)
 
         told: list[object] = robot.conductor.run(Abreast({"stage": both()}, lambda results: results["stage"]))
@@ -253,8 +253,8 @@ def test_a_program_makes_it_unknown() -> None:
         assert "program 2" in lift.reckoning.why  # type: ignore[union-attr]
 
 
-def _ran(number: int) -> Operation[str]:
-    yield from Pause(0.1)
+async def _ran(number: int) -> str:
+    await Pause(0.1)
     return f"project {number} ran"
 
 

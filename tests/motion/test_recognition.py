@@ -11,7 +11,7 @@ import pytest
 import motorbus
 from motorbus import AsyncRobot, NoReply, RequestError, Robot
 from motorbus.core.family import Identity
-from motorbus.core.operation import Operation, Pause
+from motorbus.core.operation import Pause
 from motorbus.core.verbs import verb
 from motorbus.motion import recognition
 from tests.support.machines import listened, machine, said
@@ -204,8 +204,8 @@ class Other:
     """A device that is none of those that somebody knows."""
 
     @verb
-    def identify(self) -> Operation[Identity]:
-        yield from Pause(0)
+    async def identify(self) -> Identity:
+        await Pause(0)
         return Identity(1, "SCS9999", "9.9", "")
 
 

@@ -15,7 +15,7 @@ from math import inf, isfinite, nan, pi, radians
 from random import Random
 from typing import Any, NamedTuple
 
-from motorbus.core.operation import Operation, Together, outcome
+from motorbus.core.operation import Together, outcome
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import sync_write, sync_write_positions
 from motorbus.families.kst import broadcast_position
@@ -260,12 +260,12 @@ class Caller:
 
         return Call("two", lambda: bus.run(self._both(wants)), wants, each=True)
 
-    def _both(self, wants: dict[Spot, object]) -> Operation[object]:
-        return (yield from Together([outcome(self._write(spot, goal)) for spot, goal in wants.items()]))
+    async def _both(self, wants: dict[Spot, object]) -> object:
+        return await Together([outcome(self._write(spot, goal)) for spot, goal in wants.items()])
 
-    def _write(self, spot: Spot, goal: object) -> Operation[object]:
+    async def _write(self, spot: Spot, goal: object) -> object:
         device = self.device(spot)
-        return (yield from type(device).write.function(device, goal_position=goal))
+        return await type(device).write.function(device, goal_position=goal)
 
     def again(self) -> Call:
         """A call that was made before: its goal may be a lie by now."""

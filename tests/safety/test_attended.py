@@ -49,7 +49,7 @@ def turning(sims: dict[str, Simulation], node: int = 1) -> bool:
 def passes(robot: Robot, seconds: float) -> None:
     """Nobody calls the robot for so long."""
     for bus in robot.buses.values():
-        bus.run(iter(Pause(seconds)))  # type: ignore[attr-defined]
+        bus.run(Pause(seconds))  # type: ignore[attr-defined]
 
 
 # -- endless motion ------------------------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from motorbus import AsyncRobot, Robot
-from motorbus.core.operation import CanFrame, Data, Operation, outcome
+from motorbus.core.operation import CanFrame, Data, outcome
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import disable_torque_all
 from tests.support.machines import Heard, listened, machine
@@ -54,8 +54,8 @@ def befall(robot: Any, sims: Any, fates: Fates) -> None:
 
 
 def breaking(inner: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    def breaks(device: Any) -> Operation[None]:
-        yield from outcome(inner(device))
+    async def breaks(device: Any) -> None:
+        await outcome(inner(device))
         raise MotorbusError(FAILS)
 
     return breaks

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Operation, Pause
+from motorbus.core.operation import Pause
 from motorbus.errors import Faulted, LinkLost, NotHomed
 from motorbus.motion.safety.gate import Gate
 from motorbus.session.robot import Robot
@@ -15,8 +15,8 @@ from tests.support.machines import Heard, machine
 AWAY = 0.5
 
 
-def pause(seconds: float) -> Operation[None]:
-    yield from Pause(seconds)
+async def pause(seconds: float) -> None:
+    await Pause(seconds)
 
 
 def wait(robot: Robot, bus: str, seconds: float) -> None:

@@ -164,9 +164,9 @@ def test_05_a_holder_who_falls_silent_loses_the_machine_until_somebody_resets_it
             with robot.attended(lasts=0.5) as hand:
                 device.set_velocity(0.5)
                 hand.beat()
-                robot.buses["arm"].run(iter(Pause(0.4)))  # type: ignore[attr-defined]
+                robot.buses["arm"].run(Pause(0.4))  # type: ignore[attr-defined]
                 assert sims["arm"][1].status()["moving"]
-                robot.buses["arm"].run(iter(Pause(2.0)))  # type: ignore[attr-defined]
+                robot.buses["arm"].run(Pause(2.0))  # type: ignore[attr-defined]
                 assert not sims["arm"][1].status()["moving"]
 
         with pytest.raises(Refused) as caught:
@@ -219,9 +219,8 @@ def test_08_every_axis_is_visited_with_alarms_dead_nodes_and_errors_on_the_way(v
         sims["arm"][2].alarm = 0x20
         sims["can"][0x25].unplug()
 
-        def breaks(device: object) -> Any:
+        async def breaks(device: object) -> Any:
             raise MotorbusError("a driver that fails")
-            yield from ()
 
         robot["a3"].able = {**robot["a3"].able, verb: breaks}
         listened(sims)

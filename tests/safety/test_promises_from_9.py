@@ -157,7 +157,7 @@ def test_15_a_bus_can_be_stopped_when_everything_around_it_fails() -> None:
         for node in (1, 2, 3, 4):
             motorbus.feetech.Servo(bus, node).enable_torque()
         with pytest.raises(OSError, match="No space left"):
-            bus.run(iter(Report("something")))
+            bus.run(Report("something"))
         sim[3].unplug()
         outcome = bus.estop()
         assert (set(outcome.acknowledged), outcome.silent) == ({1, 2, 4}, (3,))

@@ -49,7 +49,7 @@ def terminal_gone(robot: Robot) -> None:
 
 def lease_lost(robot: Robot) -> None:
     for bus in robot.buses.values():
-        bus.run(iter(Pause(30.0)))  # type: ignore[attr-defined]
+        bus.run(Pause(30.0))  # type: ignore[attr-defined]
 
 
 ENDS: list[tuple[Callable[[Robot], None], type[BaseException]]] = [

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from motorbus import Robot
-from motorbus.core.operation import Data, Operation, Pause
+from motorbus.core.operation import Data, Pause
 from motorbus.errors import MotorbusError, Refused
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion import capabilities
@@ -56,7 +56,7 @@ def turning(sims: dict[str, Simulation], node: int = 1) -> bool:
 def passes(robot: Robot, seconds: float) -> None:
     """Nobody calls the robot for so long."""
     for bus in robot.buses.values():
-        bus.run(iter(Pause(seconds)))  # type: ignore[attr-defined]
+        bus.run(Pause(seconds))  # type: ignore[attr-defined]
 
 
 # -- a loss --------------------------------------------------------------------------------------------------------
@@ -193,11 +193,11 @@ def test_want_of_memory_in_the_stop_of_an_axis_ends_neither_the_stop_nor_the_wat
 ) -> None:
     stop, struck = capabilities.stop, Event()
 
-    def once(axis: Any) -> Operation[Any]:
+    async def once(axis: Any) -> Any:
         if not struck.is_set():
             struck.set()
             raise MemoryError
-        return (yield from stop(axis))
+        return await stop(axis)
 
     monkeypatch.setattr(capabilities, "stop", once)
     with turned(options=options) as (robot, sims, _):

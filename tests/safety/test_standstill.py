@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from motorbus import families
 from motorbus.core.family import Quality
-from motorbus.core.operation import Data, Operation
+from motorbus.core.operation import Data
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech.table import SCS_COUNT
 from motorbus.link.base import Delivery, Side
@@ -118,8 +118,8 @@ def test_an_axis_that_is_silent_afterwards_was_not_seen_to_rest() -> None:
         axis = robot["a1"]
         inner = axis.able["stop"]
 
-        def stops_and_is_unplugged(device: object) -> Operation[Enum]:
-            promise: Enum = yield from inner(device)
+        async def stops_and_is_unplugged(device: object) -> Enum:
+            promise: Enum = await inner(device)
             sims["arm"][1].unplug()
             return promise
 

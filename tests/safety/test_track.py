@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motorbus.core.family import Quality
-from motorbus.core.operation import Operation, Pause
+from motorbus.core.operation import Pause
 from motorbus.errors import WireError
 from motorbus.motion.safety.track import FASTEST, FRESH, MARGIN, REACH, TREMBLING, Sample, Track, believed
 
@@ -202,13 +202,12 @@ def reading(*angles: float) -> float:
     track, left, at = Track(), list(angles), 1.0
     track.take(0.0, at)
 
-    def ask() -> Operation[float]:
-        yield from ()
+    async def ask() -> float:
         return left.pop(0)
 
-    steps = iter(believed(track, ask))
+    steps = believed(track, ask)
     try:
-        assert isinstance(next(steps), Pause)
+        assert isinstance(steps.send(None), Pause)
         while True:
             at += 0.01
             steps.send(at)

@@ -20,7 +20,18 @@ from motorbus.bus.stop_socket import StopOutcome
 from motorbus.bus.trace import Subscription, TraceRecord
 from motorbus.core.entry import Entry, Table
 from motorbus.core.family import Family
-from motorbus.core.operation import Alone, Data, Effect, Exchange, Notice, Operation, Runnable, Step, Together
+from motorbus.core.operation import (
+    Alone,
+    Data,
+    Effect,
+    Exchange,
+    Notice,
+    Runnable,
+    Shielded,
+    Step,
+    Together,
+    discard,
+)
 from motorbus.errors import RequestError
 from motorbus.link.base import Line, Link
 from motorbus.link.memory import MemoryLink
@@ -318,14 +329,12 @@ class Steps:
         *,
         cut_at: int | None = None,
         before: bool = True,
-        again: bool = False,
         error: Callable[[], BaseException] = Cut,
         seen: Callable[[], None] = lambda: None,
     ) -> None:
         self.bus = bus
         self.cut_at = cut_at
         self.before = before
-        self.again = again
         self.error = error
         self.seen = seen
         self.count = 0
@@ -334,7 +343,7 @@ class Steps:
 
     def run(self, operation: Runnable[Any]) -> Any:
         """The value of the operation; raises what it raises."""
-        generator: Operation[Any] = iter(operation) if isinstance(operation, Exchange) else operation
+        generator = operation.__await__() if isinstance(operation, Step) else operation
         value: Any = None
         failure: BaseException | None = None
         while True:
@@ -347,21 +356,36 @@ class Steps:
                 value = self._carried_out(step)
             except BaseException as error:  # it is the operation's to deal with
                 failure = error
+                discard(step)
 
-    def _carried_out(self, step: Step) -> Any:
+    def _carried_out(self, step: Step[Any]) -> Any:
         if isinstance(step, Alone):
             return self.run(step.operation)
+        if isinstance(step, Shielded):
+            return self._run_shielded(step)
         if isinstance(step, Together):
             return [self.run(operation) for operation in step.operations]
         number, self.count = self.count, self.count + 1
-        cuts = number == self.cut_at or (self.again and self.cuts == 1)
+        cuts = number == self.cut_at
         if cuts and self.before:
             raise self._cut()
         if isinstance(step, Exchange):
             self.exchanges.append(step)
-        value = self.bus.run(iter(step))
+        value = self.bus.run(step)
         self.seen()
         if cuts:
+            raise self._cut()
+        return value
+
+    def _run_shielded(self, step: Shielded[Any]) -> Any:
+        """Carry out the end of a guard; a cancellation in it is raised when it has ended."""
+        cut_at, begun = self.cut_at, self.count
+        if isinstance(self.error(), Exception):
+            return self.run(step.operation)
+        self.cut_at = None
+        value = self.run(step.operation)
+        self.cut_at = cut_at
+        if cut_at is not None and begun <= cut_at < self.count:
             raise self._cut()
         return value
 

@@ -23,7 +23,6 @@ from motorbus.core.operation import (
     Goal,
     Listen,
     Notice,
-    Operation,
     Rank,
     Refusal,
     Timeout,
@@ -186,18 +185,18 @@ def _refused(node: Node, code: int, index: int, subindex: int) -> DeviceError:
 # --- who is there -------------------------------------------------------------------------------------------
 
 
-def ping(node: Node) -> Operation[bool]:
+async def ping(node: Node) -> bool:
     """Is it there? Silence is the answer False."""
     try:
-        return (yield from proof(node))
+        return await proof(node)
     except NoReply:
         return False
 
 
-def identify(node: Node) -> Operation[Identity]:
+async def identify(node: Node) -> Identity:
     """Model and firmware. Unknown firmware would get table "": readable, never written."""
-    model = yield from read_row(node, TABLE["model"])
-    firmware = yield from read_row(node, TABLE["firmware"])
+    model = await read_row(node, TABLE["model"])
+    firmware = await read_row(node, TABLE["firmware"])
     name = TABLE["model"].choices.get(model, f"unknown model 0x{model:04X}")
     known = TABLE.name if model in TABLE["model"].choices else ""
     return Identity(node.node, name, f"{firmware >> 8}.{firmware & 0xFF}", known, {"model_number": model})
@@ -206,16 +205,16 @@ def identify(node: Node) -> Operation[Identity]:
 # --- objects by name ----------------------------------------------------------------------------------------
 
 
-def read(node: Node, *names: str) -> Operation[dict[str, Value]]:
+async def read(node: Node, *names: str) -> dict[str, Value]:
     """Objects in API units by name, all when none is named. Raises RequestError for an unknown name."""
     rows = [TABLE[name] for name in names or TABLE if TABLE[name].readable]
     values: dict[str, Value] = {}
     for row in rows:
-        values[row.name] = row.to_value((yield from read_row(node, row)))
+        values[row.name] = row.to_value(await read_row(node, row))
     return values
 
 
-def write(node: Node, /, **values: Value) -> Operation[None]:
+async def write(node: Node, /, **values: Value) -> None:
     """Write objects by name, in API units; all are checked before the first is sent.
 
     What lies in EEPROM goes through the guarded sequence. Raises RequestError for what cannot or must not be
@@ -224,18 +223,18 @@ def write(node: Node, /, **values: Value) -> Operation[None]:
     orders = [(TABLE[name], _checked(TABLE[name], value)) for name, value in values.items()]
     kept = [(row, raw) for row, raw in orders if row.storage is Storage.EEPROM]
     if kept:
-        yield from Alone(_guarded(node, kept))
+        await Alone(_guarded(node, kept))
     for row, raw in orders:
         if row.effect is Effect.MOTION:
-            yield from write_row(node, row, raw, (yield from _goal(node, raw)))
+            await write_row(node, row, raw, await _goal(node, raw))
         elif row.storage is not Storage.EEPROM:
-            yield from write_row(node, row, raw)
+            await write_row(node, row, raw)
 
 
-def set_node_id(node: Node, new: int) -> Operation[None]:
+async def set_node_id(node: Node, new: int) -> None:
     """Give it another id, 1 to 63, which it takes at its next power-up."""
     TABLE["node_id"].encode(new)
-    yield from Alone(_guarded(node, [(TABLE["node_id"], new)]))
+    await Alone(_guarded(node, [(TABLE["node_id"], new)]))
 
 
 def _checked(row: Entry, value: Value) -> int:
@@ -254,44 +253,44 @@ def _checked(row: Entry, value: Value) -> int:
     return raw
 
 
-def _guarded(node: Node, orders: list[tuple[Entry, int]]) -> Operation[None]:
+async def _guarded(node: Node, orders: list[tuple[Entry, int]]) -> None:
     """Unlock, write, read back, and lock again whatever happens, Ctrl-C and a second Ctrl-C included.
 
     The unlock belongs to what is cleaned up after, for it may have been heard although its answer was not.
     """
     node.limits = None
-    yield from afterwards(_unlocked(node, orders), lambda: _locked(node))
+    await afterwards(_unlocked(node, orders), lambda: _locked(node))
 
 
-def _unlocked(node: Node, orders: list[tuple[Entry, int]]) -> Operation[None]:
-    yield from write_row(node, TABLE["lock"], 0)
+async def _unlocked(node: Node, orders: list[tuple[Entry, int]]) -> None:
+    await write_row(node, TABLE["lock"], 0)
     for row, raw in orders:
-        yield from write_row(node, row, raw)
-        found = yield from read_row(node, row)
+        await write_row(node, row, raw)
+        found = await read_row(node, row)
         if found != raw:
             raise VerificationFailed(f"{row.name} reads back {found}, not {raw}", node=node.node)
 
 
-def _locked(node: Node) -> Operation[None]:
+async def _locked(node: Node) -> None:
     """Said again when it was not acknowledged, beside what the bus repeats by itself."""
     lock = write_row(node, TABLE["lock"], 1)
-    if (yield from outcome(lock)) is not None:
-        yield from lock
+    if await outcome(lock) is not None:
+        await lock
 
 
 # --- moving -------------------------------------------------------------------------------------------------
 
 
-def enable_torque(node: Node) -> Operation[None]:
+async def enable_torque(node: Node) -> None:
     """Torque on without a jump: the goal becomes the present position first."""
-    here = yield from read_row(node, TABLE["present_position"])
-    yield from write_row(node, TABLE["goal_position"], here, (yield from _goal(node, here)))
-    yield from write_row(node, TABLE["torque_enable"], 1)
+    here = await read_row(node, TABLE["present_position"])
+    await write_row(node, TABLE["goal_position"], here, await _goal(node, here))
+    await write_row(node, TABLE["torque_enable"], 1)
 
 
-def move(
+async def move(
     node: Node, to: float, *, velocity: float | None = None, wait: bool = True, tolerance: float = 0.01
-) -> Operation[None]:
+) -> None:
     """Move to `to` rad, at most at `velocity` rad/s; returns when it is there, at once with `wait=False`.
 
     Raises LimitExceeded when `to` is not finite (and the gate does outside the limits), Stalled when it stopped
@@ -300,19 +299,19 @@ def move(
     if not math.isfinite(to):
         raise LimitExceeded(f"node {node.node}: {to} is no position", advice="give a number in rad")
     row = TABLE["goal_position"]
-    goal = yield from _goal(node, row.to_raw(to))
+    goal = await _goal(node, row.to_raw(to))
     if velocity is not None:
-        yield from write(node, move_velocity=velocity)
-    yield from write_row(node, row, row.to_raw(to), goal)
+        await write(node, move_velocity=velocity)
+    await write_row(node, row, row.to_raw(to), goal)
     if wait:
-        yield from _arrival(node, to, tolerance)
+        await _arrival(node, to, tolerance)
 
 
-def _arrival(node: Node, to: float, tolerance: float) -> Operation[None]:
+async def _arrival(node: Node, to: float, tolerance: float) -> None:
     """Wait for the report, and ask now and then: it may have been sent before we listened."""
-    while (yield from read_row(node, TABLE["moving"])):
-        yield from Listen(partial(_is_arrival, node.node), PATIENCE)
-    here = yield from position(node)
+    while await read_row(node, TABLE["moving"]):
+        await Listen(partial(_is_arrival, node.node), PATIENCE)
+    here = await position(node)
     if abs(here - to) > tolerance:
         raise Stalled(f"node {node.node} stands at {here:.4g} rad, not at {to:.4g} rad", node=node.node)
 
@@ -321,25 +320,25 @@ def _is_arrival(node: int, notice: Notice) -> bool:
     return notice.node == node and notice.kind == "arrived"
 
 
-def _goal(node: Node, raw: int) -> Operation[Goal]:
+async def _goal(node: Node, raw: int) -> Goal:
     """What this raw goal orders, with the limits the device itself declares, for the gate to judge."""
-    known = yield from limits(node)
+    known = await limits(node)
     return Goal(node.node, "position", float(TABLE["goal_position"].to_value(raw)), *known)
 
 
-def limits(node: Node) -> Operation[tuple[float, float]]:
+async def limits(node: Node) -> tuple[float, float]:
     """Lowest and highest position, rad, as the device itself has them; read once."""
     if node.limits is None:
-        found = yield from read(node, "min_position", "max_position")
+        found = await read(node, "min_position", "max_position")
         node.limits = found["min_position"], found["max_position"]
     return node.limits
 
 
-def telemetry(node: Node) -> Operation[State]:
+async def telemetry(node: Node) -> State:
     """One sample: position (rad), temperature (°C), moving, alarm."""
-    here = yield from position(node)
+    here = await position(node)
     at = node.at
-    others = yield from read(node, "moving", "present_temperature")
+    others = await read(node, "moving", "present_temperature")
     return State(
         at=at,
         position=here,

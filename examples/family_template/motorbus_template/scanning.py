@@ -9,7 +9,6 @@ from __future__ import annotations
 from motorbus.core.family import Found
 from motorbus.core.operation import (
     Alone,
-    Operation,
     Progress,
     Report,
     Timeout,
@@ -23,39 +22,39 @@ from motorbus.errors import MotorbusError
 from . import driver, wire
 
 
-def scan(ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Operation[list[Found]]:
+async def scan(ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> list[Found]:
     """Ask every id, two at a time because each has a lane of its own; the present rate is set again in the end."""
     asked = ids or tuple(wire.NODES)
-    present = yield from Tune(0)
+    present = await Tune(0)
     if not rates:
-        return (yield from _everyone(asked, present))
-    return (yield from Alone(afterwards(_at_all_rates(asked, rates), lambda: iter(Tune(present)))))
+        return await _everyone(asked, present)
+    return await Alone(afterwards(_at_all_rates(asked, rates), lambda: Tune(present)))
 
 
-def _at_all_rates(nodes: tuple[int, ...], rates: tuple[int, ...]) -> Operation[list[Found]]:
+async def _at_all_rates(nodes: tuple[int, ...], rates: tuple[int, ...]) -> list[Found]:
     found: list[Found] = []
     for rate in rates:
-        yield from Tune(rate)
-        found += yield from _everyone(nodes, rate)
+        await Tune(rate)
+        found += await _everyone(nodes, rate)
     return found
 
 
-def _everyone(nodes: tuple[int, ...], rate: int) -> Operation[list[Found]]:
+async def _everyone(nodes: tuple[int, ...], rate: int) -> list[Found]:
     """Whoever is silent is asked once more, for the first frame after power-up may be missed."""
     found: dict[int, Found] = {}
     for turn in range(2):
         silent = [node for node in nodes if node not in found]
-        looks = yield from Together([_look(driver.Node(node), rate) for node in silent])
+        looks = await Together([_look(driver.Node(node), rate) for node in silent])
         found |= {one.node: one for one in looks if one is not None}
-        yield from Report(Progress((turn + 1) * len(nodes), 2 * len(nodes), f"{rate} bit/s"))
+        await Report(Progress((turn + 1) * len(nodes), 2 * len(nodes), f"{rate} bit/s"))
     return [found[node] for node in nodes if node in found]
 
 
-def _look(node: driver.Node, rate: int) -> Operation[Found | None]:
-    heard = yield from outcome(driver.proof(node, timeout=Timeout.SCAN))
+async def _look(node: driver.Node, rate: int) -> Found | None:
+    heard = await outcome(driver.proof(node, timeout=Timeout.SCAN))
     if heard is not True:
         return None
-    identity = yield from outcome(driver.identify(node))
+    identity = await outcome(driver.identify(node))
     found = Found(node.node, rate, None if isinstance(identity, MotorbusError) else identity)
-    yield from Report(found)
+    await Report(found)
     return found

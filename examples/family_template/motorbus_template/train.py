@@ -11,7 +11,7 @@ from math import ceil, isfinite
 from typing import Final
 
 from motorbus.core.family import Positions
-from motorbus.core.operation import Exchange, Goal, Operation, Together
+from motorbus.core.operation import Exchange, Goal, Together
 from motorbus.errors import LimitExceeded, RequestError
 
 from .driver import Node, enable_torque, limits, position, write_row
@@ -21,9 +21,9 @@ _GOAL: Final = TABLE["goal_position"]
 _VELOCITY: Final = TABLE["move_velocity"]
 
 
-def train(servos: Sequence[Node], *, rate: int) -> Operation[Train]:
+async def train(servos: Sequence[Node], *, rate: int) -> Train:
     """These servos, ready to be led; their limits are read and nothing is written. `rate` changes nothing here."""
-    yield from Together([limits(node) for node in servos])
+    await Together([limits(node) for node in servos])
     return Train(servos)
 
 
@@ -39,12 +39,12 @@ class Train:
         """One frame for each. Raises LimitExceeded for what is no number or fits no register."""
         return [_order(self._servo(id), value) for id, value in to.items()]
 
-    def begin(self, speeds: Mapping[int, float]) -> Operation[None]:
+    async def begin(self, speeds: Mapping[int, float]) -> None:
         """Torque on where it stands, and as quick (rad/s) as it may be. Everyone is visited before an error is raised.
 
         What one cannot be told exactly is rounded up: who follows goals must not fall behind them.
         """
-        yield from Together([_begin(node, speeds.get(id)) for id, node in self._servos.items()])
+        await Together([_begin(node, speeds.get(id)) for id, node in self._servos.items()])
 
     def _servo(self, id: int) -> Node:
         if id in self._servos:
@@ -84,7 +84,7 @@ def _written(node: Node) -> RequestError:
     )
 
 
-def _begin(node: Node, speed: float | None) -> Operation[None]:
-    yield from enable_torque(node)
+async def _begin(node: Node, speed: float | None) -> None:
+    await enable_torque(node)
     raw = _VELOCITY.high if speed is None else ceil(speed / _VELOCITY.scale)
-    yield from write_row(node, _VELOCITY, min(max(raw, _VELOCITY.low), _VELOCITY.high))
+    await write_row(node, _VELOCITY, min(max(raw, _VELOCITY.low), _VELOCITY.high))

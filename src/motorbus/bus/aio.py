@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import signal
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from math import inf
 from threading import get_ident
 from typing import Any, Final, Generic, Self, TypeVar
@@ -15,7 +15,7 @@ from motorbus.bus.interrupts import DEFAULTS, SIGNALS
 from motorbus.bus.jobs import RequestJob
 from motorbus.bus.prepared import Prepared
 from motorbus.bus.tasks import Notify, TaskTree
-from motorbus.core.operation import UNLIKE, Exchange, Runnable
+from motorbus.core.operation import UNLIKE, Exchange, Runnable, discard
 from motorbus.errors import LinkError, LinkLost
 
 T = TypeVar("T")
@@ -36,11 +36,14 @@ class AsyncBus(BaseBus):
     _direct: tuple[Prepared, _Call] | None = None
     """The prepared request in flight that no other request has met."""
 
-    async def run(self, procedure: Runnable[T], report: Notify | None = None) -> T:
+    def run(self, procedure: Runnable[T], report: Notify | None = None) -> Coroutine[Any, Any, T]:
         """Run a procedure as `Bus.run` does. A cancelled task cleans up, then raises CancelledError."""
         if isinstance(procedure, Exchange) and not procedure.effect and not self.link.virtual:
-            return await self._transact(procedure)  # type: ignore[no-any-return]
-        part = _Part(self, procedure, report, asyncio.Event())
+            return self._transact(procedure)
+        return self._run(_Owned(procedure), report)
+
+    async def _run(self, owned: _Owned, report: Notify | None) -> Any:
+        part: _Part[Any] = _Part(self, owned.procedure, report, asyncio.Event())
         await _run_parts([part])
         return part.tree.result()
 
@@ -181,6 +184,16 @@ def call_in(loop: asyncio.AbstractEventLoop, function: Callable[[], object]) -> 
     """Call this function in the thread of the loop, from the stop thread; a closed loop needs no call."""
     with contextlib.suppress(RuntimeError):
         loop.call_soon_threadsafe(function)
+
+
+class _Owned:
+    """A procedure that is closed if the task that was to run it is cancelled before it begins."""
+
+    def __init__(self, procedure: Runnable[Any]) -> None:
+        self.procedure = procedure
+
+    def __del__(self) -> None:
+        discard(self.procedure)
 
 
 class _Call(RequestJob):

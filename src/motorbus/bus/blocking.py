@@ -15,7 +15,7 @@ from motorbus.bus.prepared import Prepared
 from motorbus.bus.running import TURN_TIMEOUT, run_here, run_on
 from motorbus.bus.tasks import Notify
 from motorbus.core.entry import shown
-from motorbus.core.operation import UNLIKE, Exchange, Operation, Rank, Runnable, Together
+from motorbus.core.operation import UNLIKE, Exchange, Rank, Runnable, Together
 from motorbus.errors import LinkError, MotorbusError, RequestError
 
 T = TypeVar("T")
@@ -209,22 +209,22 @@ class Pending:
         return [value] if len(self.requests) == 1 else [None, value]
 
 
-def carry_out_batch(
+async def carry_out_batch(
     requests: Sequence[Exchange[Any]], tolerated: tuple[type[Exception], ...]
-) -> Operation[list[Any]]:
+) -> list[Any]:
     """Carry out these requests: those on different lanes at the same time, others in order."""
     if len({request.lane for request in requests}) > 1:
-        return (yield from Together([_tolerate(request, tolerated) for request in requests]))
+        return await Together([_tolerate(request, tolerated) for request in requests])
     values = []
     for request in requests:
-        value = yield from _tolerate(request, tolerated)
+        value = await _tolerate(request, tolerated)
         values.append(value)
     return values
 
 
-def _tolerate(request: Exchange[Any], tolerated: tuple[type[Exception], ...]) -> Operation[Any]:
+async def _tolerate(request: Exchange[Any], tolerated: tuple[type[Exception], ...]) -> Any:
     try:
-        return (yield from request)
+        return await request
     except tolerated as error:
         return error
 

@@ -9,7 +9,7 @@ from motorbus.bus.engine import Engine
 from motorbus.bus.positions import GATED
 from motorbus.bus.prepared import nodes_of
 from motorbus.bus.stop_socket import StopOutcome
-from motorbus.core.operation import Answer, Exchange, Operation, Pause, Together, outcome
+from motorbus.core.operation import Answer, Exchange, Pause, Together, outcome
 from motorbus.errors import DeviceError, LinkLost, MotorbusError
 
 ROUNDS: Final = 5
@@ -17,7 +17,7 @@ SHORTEST_ROUND: Final = 0.05
 """s of a round in which an acknowledgement is missing: a port that was full may have room after it."""
 
 
-def stop_in_rounds(engine: Engine, now: Callable[[], float]) -> Operation[StopOutcome]:
+async def stop_in_rounds(engine: Engine, now: Callable[[], float]) -> StopOutcome:
     """Stop all known nodes. The engine is latched."""
     positions = engine.positions
     positions.forget_stop_replies()
@@ -31,7 +31,7 @@ def stop_in_rounds(engine: Engine, now: Callable[[], float]) -> Operation[StopOu
             break
         rounds += 1
         begun = now()
-        found = yield from Together([outcome(_stop_by(engine, one, now)) for one in frames])
+        found = await Together([outcome(_stop_by(engine, one, now)) for one in frames])
         errors = [error for error in found if isinstance(error, MotorbusError)]
         acknowledged = sorted(
             node for node in positions.nodes if positions.accepted_count(node) > before.get(node, 0)
@@ -40,7 +40,7 @@ def stop_in_rounds(engine: Engine, now: Callable[[], float]) -> Operation[StopOu
         if acknowledged and not missing:
             break
         if not all(isinstance(error, LinkLost | DeviceError) for error in errors):
-            yield from outcome(iter(Pause(begun + SHORTEST_ROUND - now())))
+            await outcome(Pause(begun + SHORTEST_ROUND - now()))
         frames = [
             one
             for one in _frames_for(engine, missing, now(), frames)
@@ -51,10 +51,10 @@ def stop_in_rounds(engine: Engine, now: Callable[[], float]) -> Operation[StopOu
     return StopOutcome(tuple(acknowledged), silent, rounds, promise)
 
 
-def _stop_by(engine: Engine, request: Exchange[Answer], now: Callable[[], float]) -> Operation[Any]:
+async def _stop_by(engine: Engine, request: Exchange[Answer], now: Callable[[], float]) -> Any:
     """Send this request of a stop. If it reads a position, hold the node there."""
     try:
-        yield from request
+        await request
     except MotorbusError:
         raise
     except Exception as error:  # of the driver: the other nodes are stopped all the same
@@ -62,7 +62,7 @@ def _stop_by(engine: Engine, request: Exchange[Answer], now: Callable[[], float]
     nodes = nodes_of(request)
     if request.effect not in GATED and nodes:
         frames = _frames_for(engine, nodes, now(), ())
-        yield from Together([iter(one) for one in frames if one.effect in GATED and nodes_of(one)])
+        await Together([one for one in frames if one.effect in GATED and nodes_of(one)])
 
 
 def _frames_for(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from math import inf
 from typing import Any, Final, Generic, TypeVar
 
@@ -12,18 +13,19 @@ from motorbus.bus.jobs import ExclusiveJob, Job, RateJob, RequestJob, Since
 from motorbus.bus.positions import GATED
 from motorbus.core.operation import (
     Alone,
-    Closed,
     Exchange,
     Journal,
     Listen,
     Notice,
-    Operation,
     Pause,
     Rank,
     Report,
     Runnable,
+    Shielded,
     Step,
     Together,
+    Tune,
+    discard,
     outcome,
 )
 from motorbus.errors import MotorbusError, RequestError
@@ -39,8 +41,6 @@ LONG_SLEEP: Final = 0.5
 """s; a sleep of a clean-up from here on waits for a device to come to rest, and extends the timeout."""
 LONGEST_EXTENSION: Final = 30.0
 """s by which such sleeps extend it."""
-CLEANUP_STEPS: Final = 100
-"""Steps of a clean-up that fail, one after the other, when a procedure is dropped."""
 READS: Final = 2
 """Rounds of the reads that the interlock requires; the second where the first was doubtful."""
 
@@ -55,17 +55,18 @@ class Timer(Job):
 
 
 class Task:
-    """One generator, and the one thing that it waits for: a job, or its children."""
+    """One procedure, and the one thing that it waits for: a job, or its children. `entered`: its code has begun."""
 
     def __init__(self, procedure: Runnable[Any], parent: Task | None = None) -> None:
-        self.generator: Operation[Any] = iter(procedure) if isinstance(procedure, Exchange) else procedure
+        self.procedure = procedure
+        self.coroutine = procedure.__await__() if isinstance(procedure, Step) else procedure
         self.owner: object = None if parent is None else parent.owner
         self.job: Job | None = None
         self.children: list[Task] = []
         self.joins_one = False
         self.claims = False
         self.checked = False
-        self.started = self.finished = False
+        self.started = self.entered = self.finished = False
         # A clean-up that starts tasks of its own is not cancelled again.
         self.cancelled: bool = parent is not None and parent.cancelled
         self.value: Any = None
@@ -182,8 +183,9 @@ class TaskTree(Generic[T]):
         return True
 
     def _resume(self, task: Task, value: Any = None, error: BaseException | None = None) -> None:
+        task.entered = True
         try:
-            step = task.generator.send(value) if error is None else task.generator.throw(error)
+            step = task.coroutine.send(value) if error is None else task.coroutine.throw(error)
         except StopIteration as end:
             self._finish(task, end.value)
         except BaseException as failure:
@@ -222,7 +224,7 @@ class TaskTree(Generic[T]):
 
     # -- steps -------------------------------------------------------------------------------------------------
 
-    def _begin(self, task: Task, step: Step) -> None:
+    def _begin(self, task: Task, step: Step[Any]) -> None:
         if isinstance(step, Exchange):
             self._begin_request(task, step)
         elif isinstance(step, Together):
@@ -239,6 +241,10 @@ class TaskTree(Generic[T]):
             child.started = True
             child.job = ExclusiveJob(child.owner, self.settled)
             self.engine.submit(child.job, self.now())
+        elif isinstance(step, Shielded):
+            child = Task(step.operation, task)
+            child.cancelled = True
+            task.children, task.joins_one = [child], True
         elif isinstance(step, Report):
             self._report(task, step.event)
         elif isinstance(step, Listen):
@@ -249,9 +255,11 @@ class TaskTree(Generic[T]):
             if LONG_SLEEP <= step.seconds <= self.extension:
                 self.extension -= step.seconds
                 self.deadline += step.seconds
-        else:
+        elif isinstance(step, Tune):
             task.job = RateJob(step, task.owner, self.settled)
             self.engine.submit(task.job, self.now())
+        else:
+            self._resume(task, error=_not_a_step(step))
 
     def _begin_request(self, task: Task, request: Exchange[Any]) -> None:
         interlock = self.engine.interlock
@@ -331,14 +339,16 @@ class TaskTree(Generic[T]):
             if task.claims:
                 self.engine.release(task.owner)
             task.finished = True
-            _close(task.generator)
+            discard(task.procedure)
+            with suppress(RuntimeError):  # it awaits a step where it is closed
+                task.coroutine.close()
 
     def _cancel(self, task: Task) -> None:
         if task.finished or task.cancelled:
             return
-        if not task.started:
-            task.started = True
-            task.generator.close()
+        if not task.entered:
+            self._cancel_job(task)
+            discard(task.procedure)
             self._finish(task, error=self.cancellation)
         elif task.children and not all(child.finished for child in task.children):
             for child in task.children:
@@ -363,22 +373,13 @@ class TaskTree(Generic[T]):
         return [task, *(leaf for child in task.children for leaf in self._waiting(child))]
 
 
-def _read_first(required: Callable[[Exchange[Any]], Any], reads: Any, request: Exchange[T]) -> Operation[T]:
+async def _read_first(required: Callable[[Exchange[Any]], Any], reads: Any, request: Exchange[T]) -> T:
     """Carry out the reads that the interlock requires, again where they were doubtful, then the request."""
     for _ in range(READS):
         for read in reads:
-            yield from outcome(read)
+            await outcome(read)
         reads = required(request)
-    return (yield from request)
-
-
-def _close(generator: Operation[Any]) -> None:
-    """Close a generator, also one that yields steps of its clean-up: each of them fails."""
-    for _ in range(CLEANUP_STEPS):
-        try:
-            generator.throw(Closed())
-        except BaseException:
-            return
+    return await request
 
 
 def _add_note(error: BaseException, other: BaseException | None) -> None:
@@ -390,6 +391,14 @@ def _add_note(error: BaseException, other: BaseException | None) -> None:
     for line in lines:
         if line not in known:
             error.add_note(line)
+
+
+def _not_a_step(step: object) -> RequestError:
+    return RequestError(
+        f"a procedure awaited {type(step).__name__}, which is no step",
+        cause="asyncio.sleep(), futures and tasks need an event loop; a procedure runs without one",
+        advice="await steps of motorbus only, such as Pause(seconds)",
+    )
 
 
 def _no_journal(event: Journal) -> RequestError:

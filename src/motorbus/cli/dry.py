@@ -26,8 +26,11 @@ from motorbus.core.operation import (
     Rank,
     Reply,
     Report,
+    Shielded,
+    Step,
     Together,
     Tune,
+    discard,
 )
 from motorbus.errors import MotorbusError
 from motorbus.motion.safety import Gate
@@ -125,7 +128,7 @@ class DryBus:
         `report` gets its events but for journal records: nothing is about to be changed.
         """
         self._report = report or self._report
-        answer: Any = self._one(operation) if isinstance(operation, Exchange) else self._all(operation)
+        answer: Any = self._step(operation) if isinstance(operation, Step) else self._all(operation)
         return answer  # type: ignore[no-any-return]
 
     def _all(self, operation: Any) -> object:
@@ -141,17 +144,19 @@ class DryBus:
                 answer = self._step(step)
             except MotorbusError as failure:
                 error = failure
+            finally:
+                discard(step)
 
     def _step(self, step: object) -> object:
         if isinstance(step, Exchange):
             return self._one(step)
-        if isinstance(step, Alone):
+        if isinstance(step, Alone | Shielded):
             return self.run(step.operation)
         if isinstance(step, Together):
             return [self.run(operation) for operation in step.operations]
         if isinstance(step, Tune) and (step.rate == 0 or self.family.link.kind == "bytes"):
             return self._bus.run(
-                iter(step)
+                step
             )  # on CAN whoever speaks at another rate disturbs the bus: only ask there
         if isinstance(step, Pause):
             self._waited += step.seconds

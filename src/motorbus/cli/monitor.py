@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from motorbus.bus.blocking import Bus
     from motorbus.core.family import State
-    from motorbus.core.operation import Operation
     from motorbus.motion.machine import AxisSpec
 
 app = App(
@@ -199,8 +198,8 @@ class _Away:
         self._gone = set(gone)
 
 
-def _pause(seconds: float) -> Operation[None]:
-    yield from Pause(seconds)
+async def _pause(seconds: float) -> None:
+    await Pause(seconds)
 
 
 def _verdict(watched: set[tuple[str, int]], heard: set[tuple[str, int]]) -> Exit:

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
     from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Output
-    from motorbus.core.operation import Operation
 
 BY_HAND: Final = "stop it once more, or cut the power by hand"
 
@@ -55,9 +54,9 @@ def _judge(bus: Bus, there: Sequence[dict[str, Any]], errors: list[MotorbusError
             errors.append(_not_at_rest(one))
 
 
-def _all_of(devices: Mapping[int, Any]) -> Operation[list[Any]]:
+async def _all_of(devices: Mapping[int, Any]) -> list[Any]:
     asks = [partial(type(one).position.function, one) for one in devices.values()]
-    return (yield from Together([outcome(watched(ask)) for ask in asks]))
+    return await Together([outcome(watched(ask)) for ask in asks])
 
 
 def _unseen(one: dict[str, Any], why: str) -> None:

@@ -9,7 +9,7 @@ from motorbus.errors import MotionError, MotorbusError
 if TYPE_CHECKING:
     from motorbus.bus.blocking import Bus
     from motorbus.cli.dry import DryBus
-    from motorbus.core.operation import Operation, Runnable
+    from motorbus.core.operation import Runnable
 
 T = TypeVar("T")
 
@@ -22,10 +22,10 @@ class _Lost(BaseException):
         self.error = error
 
 
-def or_all_stop(move: Runnable[T]) -> Operation[T]:
+async def or_all_stop(move: Runnable[T]) -> T:
     """A move among several; an error of anything but its motion, as no reply, interrupts the others."""
     try:
-        return (yield from move)
+        return await move
     except MotionError:
         raise
     except MotorbusError as error:

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from motorbus.bus.trace import TraceRecord
     from motorbus.cli.output import Output
     from motorbus.core.family import Explanation
-    from motorbus.core.operation import Operation
 
 LOOK: Final = 0.05
 """s between two looks at what has come."""
@@ -64,8 +63,8 @@ def listen(
     return Exit.OK
 
 
-def _pause() -> Operation[None]:
-    yield from Pause(LOOK)
+async def _pause() -> None:
+    await Pause(LOOK)
 
 
 def _tell(opening: Bus, bus: str, record: TraceRecord, at: float, output: Output) -> None:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Bar, Output
     from motorbus.core.family import Found, Positions, Train
-    from motorbus.core.operation import Exchange, Operation
+    from motorbus.core.operation import Exchange
 
 AMPLITUDE: Final = 0.8
 """rad; how far the wave goes to either side."""
@@ -155,8 +155,8 @@ def _all(opening: Bus, exchanges: Sequence[Exchange[Any]]) -> list[Any]:
     return [opening.run(exchanges[0])] if len(exchanges) == 1 else opening.run(_together(exchanges))
 
 
-def _together(exchanges: Sequence[Exchange[Any]]) -> Operation[list[Any]]:
-    return (yield from Together(exchanges))
+async def _together(exchanges: Sequence[Exchange[Any]]) -> list[Any]:
+    return await Together(exchanges)
 
 
 def _told(opening: Bus, reads: Sequence[Exchange[Positions]]) -> dict[int, float]:

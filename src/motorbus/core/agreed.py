@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, TypeVar
 
-from motorbus.core.operation import Operation, Runnable
+from motorbus.core.operation import Runnable
 from motorbus.errors import VerificationFailed
 
 T = TypeVar("T")
@@ -19,14 +19,14 @@ READINGS: Final = 8
 """Maximum number of readings."""
 
 
-def agreed(reading: Callable[[], Runnable[T]], *, node: int, what: str, most: int = READINGS) -> Operation[T]:
+async def agreed(reading: Callable[[], Runnable[T]], *, node: int, what: str, most: int = READINGS) -> T:
     """Return the value on which two consecutive readings agree; `reading` makes each, `what` names it in errors.
 
     Raises the errors of a reading, and VerificationFailed if no two of `most` consecutive readings are equal.
     """
     values: list[T] = []
     for _ in range(most):
-        values.append((yield from reading()))
+        values.append(await reading())
         if len(values) > 1 and values[-2] == values[-1]:
             return values[-1]
     raise VerificationFailed(

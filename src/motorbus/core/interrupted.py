@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, Final, NamedTuple, Protocol, TypeVar
 
 from motorbus.core import units
-from motorbus.core.operation import Alone, Closed, Operation, Pause, Runnable, Together, afterwards, outcome
+from motorbus.core.operation import Alone, Pause, Runnable, Together, afterwards, outcome
 from motorbus.errors import MotorbusError, RequestError
 
 T = TypeVar("T")
@@ -41,14 +41,14 @@ class Moving(NamedTuple):
     position: Callable[[], Runnable[float]]
 
 
-def stopped_if_interrupted(move: Runnable[T], *devices: Moving) -> Operation[T]:
+async def stopped_if_interrupted(move: Runnable[T], *devices: Moving) -> T:
     """Run a move; if it is interrupted, stop its devices and add a note to the error: where each holds.
 
     A device with a newer move is not stopped.
     """
     wait = _Wait(devices)
     try:
-        return (yield from afterwards(wait.run(move), wait.stop))
+        return await afterwards(wait.run(move), wait.stop)
     except BaseException as error:
         for note in wait.notes:
             error.add_note(note)
@@ -64,35 +64,35 @@ class _Wait:
         self._move = object()
         self._open = False
 
-    def run(self, move: Runnable[T]) -> Operation[T]:
+    async def run(self, move: Runnable[T]) -> T:
         for moving in self._devices:
             moving.device.last_move = self._move
         self._open = True
         try:
-            value = yield from move
-        except (Exception, Closed, GeneratorExit) as error:
+            value = await move
+        except (Exception, GeneratorExit) as error:
             self._open = isinstance(error, MemoryError)  # an interruption: it says nothing of the move
             raise
         self._open = False
         return value
 
-    def stop(self) -> Operation[None]:
+    async def stop(self) -> None:
         if not self._open:
             return
         interrupted = MotorbusError("its stop was interrupted")
         self.notes = [_note(moving, interrupted) for moving in self._devices]
-        results = yield from Together([outcome(iter(Alone(self._stop(moving)))) for moving in self._devices])
+        results = await Together([outcome(Alone(self._stop(moving))) for moving in self._devices])
         self._open = False
         stopped = [pair for pair in zip(self._devices, results, strict=True) if pair[1]]
         self.notes = [_note(moving, result) for moving, result in stopped]
-        places = yield from Together([_place(moving, result) for moving, result in stopped])
+        places = await Together([_place(moving, result) for moving, result in stopped])
         self.notes = [note + place for note, place in zip(self.notes, places, strict=True)]
 
-    def _stop(self, moving: Moving) -> Operation[str]:
+    async def _stop(self, moving: Moving) -> str:
         """Run it inside `Alone`: a newer move is then ordered either before the check or after the stop."""
         if moving.device.last_move is not self._move:
             return ""
-        promise = yield from moving.stop()
+        promise = await moving.stop()
         if promise is None:
             return "its torque is off"
         return "holds" if promise.name.startswith("HOLD") else f"{promise.value};"
@@ -106,17 +106,17 @@ def _note(moving: Moving, result: str | MotorbusError) -> str:
     return f"#{node} may still be moving: {result.summary}; {fix}"
 
 
-def _place(moving: Moving, result: str | MotorbusError) -> Operation[str]:
+async def _place(moving: Moving, result: str | MotorbusError) -> str:
     """Return the text of the position at which a stopped device came to rest, or of its last reading."""
     if isinstance(result, MotorbusError):
         return ""
-    begin = since = yield from Pause(0)
+    begin = since = await Pause(0)
     rest: float | None = None
     while True:
-        position = yield from outcome(moving.position())
+        position = await outcome(moving.position())
         if isinstance(position, MotorbusError):
             return f", and its position is not known: {position.summary}"
-        now = yield from Pause(PERIOD)
+        now = await Pause(PERIOD)
         if rest is None or abs(position - rest) > TOLERANCE:
             rest, since = position, now
         place = f" at {units.show(position, 'position')}"

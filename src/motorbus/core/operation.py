@@ -1,18 +1,18 @@
-"""Operations: driver functions that run on a blocking or an async bus alike.
+"""Procedures, the steps that they await, and the requests that they send.
 
-A driver function is a generator (an `Operation`) that yields *steps* and returns its result. There are seven steps. A
-step is a plain value; the bus that runs the operation (`bus/tasks.py`) executes it. A function with a single exchange
-returns the `Exchange` itself, which may be kept and run again.
-
-`value = yield from step` has the type of the step; a bare `yield` occurs in this module only.
+A driver function is a coroutine (a procedure) that awaits *steps*; no event loop is involved. A step is a plain value:
+the bus that runs the procedure (`bus/tasks.py`) carries it out. A function with a single request returns the
+`Exchange` itself, which may be kept and run again. A procedure awaits nothing but steps and procedures.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Generator, Hashable, Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from enum import Enum, IntEnum
-from typing import Any, ClassVar, Final, Generic, NamedTuple, TypeAlias, TypeVar
+from inspect import CORO_CREATED, getcoroutinestate
+from types import CoroutineType
+from typing import Any, ClassVar, Final, Generic, NamedTuple, Self, TypeAlias, TypeVar
 
 from motorbus.core.frame import ERROR_FLAG as ERROR_FLAG
 from motorbus.core.frame import REMOTE_FLAG as REMOTE_FLAG
@@ -137,18 +137,18 @@ Refusal: TypeAlias = Callable[[Stops], MotorbusError | None]
 """The error if an exchange must not leave, None if it may."""
 
 
-class _Step(Generic[T_co]):
-    """Base of the steps: `yield from` has the type of the result."""
+class Step(Generic[T_co]):
+    """What a procedure awaits; the value of the `await` has the type of the step."""
 
     __slots__ = ()
 
-    def __iter__(self) -> Generator[Step, Any, T_co]:
-        result: T_co = yield self  # type: ignore[misc]  # every subclass is one of `Step`
-        return result
+    def __await__(self) -> Generator[Step[Any], Any, T_co]:
+        value: T_co = yield self
+        return value
 
 
 @dataclass(slots=True, eq=False, repr=False)
-class Exchange(_Step[T_co]):
+class Exchange(Step[T_co]):
     """One request and its expected replies. A value: no field but `course` changes.
 
     `request`     the bytes or the CAN frame to send
@@ -207,7 +207,7 @@ class Exchange(_Step[T_co]):
 
 
 @dataclass(slots=True, eq=False)
-class Together(_Step[list[T_co]]):
+class Together(Step[list[T_co]]):
     """Operations that overlap where the bus allows it; gives their results in order.
 
     An error in one does not end the others; an interruption (KeyboardInterrupt, MemoryError) ends all. After all have
@@ -218,21 +218,21 @@ class Together(_Step[list[T_co]]):
 
 
 @dataclass(slots=True, eq=False)
-class Alone(_Step[T_co]):
+class Alone(Step[T_co]):
     """An operation during which the bus sends nothing else, except a stop."""
 
     operation: Runnable[T_co]
 
 
 @dataclass(slots=True, eq=False)
-class Pause(_Step[float]):
+class Pause(Step[float]):
     """Wait at least `seconds` on the link clock; gives the time (s) then. 0 only reads the clock."""
 
     seconds: Final[float]
 
 
 @dataclass(slots=True, eq=False)
-class Listen(_Step[Notice | None]):
+class Listen(Step["Notice | None"]):
     """Wait at most `until` seconds from this step on for a notice that `match` accepts; gives it, or None."""
 
     match: Final[Callable[[Notice], bool]]
@@ -240,7 +240,7 @@ class Listen(_Step[Notice | None]):
 
 
 @dataclass(slots=True, eq=False)
-class Tune(_Step[int]):
+class Tune(Step[int]):
     """Set the rate of the link (bit/s) when nothing is in flight; gives the previous rate. 0 only reads it.
 
     With `listen_only` the link sends nothing until the next `Tune`, not even the acknowledge bit of CAN: a bus of
@@ -286,57 +286,88 @@ READABLE: Final = "readable"  # in the facts: True for a change that only reads 
 
 
 @dataclass(slots=True, eq=False)
-class Report(_Step[None]):
+class Report(Step[None]):
     """Pass an event (progress, an early result, a journal record) to its observers before the next step."""
 
     event: Final[object]
 
 
-Step: TypeAlias = "Exchange[Any] | Together[Any] | Alone[Any] | Pause | Listen | Tune | Report"
-Operation: TypeAlias = Generator[Step, Any, T]
-Runnable: TypeAlias = "Generator[Step, Any, T] | Exchange[T]"
+@dataclass(slots=True, eq=False)
+class Shielded(Step[T_co]):
+    """A procedure that is not cancelled: a cancellation is raised when it has ended. For the end of a `Guard` only."""
+
+    operation: Runnable[T_co]
 
 
-class Closed(BaseException):
-    """Raised in an operation whose coroutine was closed: it restores settings and orders no motion."""
+Operation: TypeAlias = Coroutine[Step[Any], Any, T]
+Runnable: TypeAlias = "Coroutine[Step[Any], Any, T] | Step[T]"
+"""What a bus runs: a procedure or a step."""
 
 
-def outcome(runnable: Runnable[T]) -> Operation[T | MotorbusError]:
+class Guard:
+    """A guarded sequence for `async with`: `leave` follows `enter`, also when `enter` fails, for its first request may
+    have arrived.
+
+    Nothing is thrown into `leave`. A procedure that is dropped sends nothing: GeneratorExit never calls `leave`.
+    """
+
+    async def enter(self) -> None:
+        """Begin the sequence."""
+
+    async def leave(self, error: BaseException | None) -> None:
+        """End the sequence; `error` is what is being raised."""
+        raise NotImplementedError
+
+    async def __aenter__(self) -> Self:
+        try:
+            await self.enter()
+        except GeneratorExit:
+            raise
+        except BaseException as error:
+            await Shielded(self.leave(error))
+            raise
+        return self
+
+    async def __aexit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if not isinstance(error, GeneratorExit):
+            await Shielded(self.leave(error))
+
+
+class CleanUp(Guard):
+    """A guarded sequence that ends with the procedure that this function makes."""
+
+    def __init__(self, function: Callable[[], Runnable[object]]) -> None:
+        self._function = function
+
+    async def leave(self, error: BaseException | None) -> None:
+        await self._function()
+
+
+async def afterwards(runnable: Runnable[T], clean_up: Callable[[], Runnable[object]]) -> T:
+    """Run `runnable`, then `clean_up()`, whatever is raised; see `Guard`."""
+    async with CleanUp(clean_up):
+        return await runnable
+
+
+async def outcome(runnable: Runnable[T]) -> T | MotorbusError:
     """Run `runnable`; a MotorbusError becomes the value, so that a loop can visit all nodes."""
     try:
-        return (yield from runnable)
+        return await runnable
     except MotorbusError as error:
         return error
 
 
-def afterwards(runnable: Runnable[T], clean_up: Callable[[], Runnable[object]]) -> Operation[T]:
-    """Run `runnable`, then always `clean_up()`, as a lock after an unlock.
-
-    An error, or up to two interruptions at any line, are raised after that. `clean_up` must be repeatable.
-    """
-    tries: list[str] = []
-    try:
-        try:
-            try:
-                return (yield from runnable)
-            finally:
-                yield from _insist(clean_up, tries)
-        finally:
-            if not tries:  # interrupted between the lines above
-                yield from _insist(clean_up, tries)
-    finally:
-        if not tries:  # interrupted twice
-            yield from _insist(clean_up, tries)
-
-
-def _insist(clean_up: Callable[[], Runnable[object]], tries: list[str]) -> Operation[None]:
-    try:
-        yield from clean_up()
-    except MotorbusError:
-        tries.append("failed")
-        raise
-    except BaseException:
-        yield from clean_up()
-        tries.append("interrupted")
-        raise
-    tries.append("done")
+def discard(runnable: object) -> None:
+    """Close a procedure that never starts, and those that it was given; Python warns of a coroutine that is dropped."""
+    given: Iterable[object] = ()
+    if isinstance(runnable, CoroutineType) and getcoroutinestate(runnable) == CORO_CREATED:
+        given = tuple(runnable.cr_frame.f_locals.values()) if runnable.cr_frame else ()
+        runnable.close()
+    elif isinstance(runnable, list | tuple):
+        given = runnable
+    elif isinstance(runnable, Together):
+        given = runnable.operations
+    elif isinstance(runnable, Alone | Shielded):
+        given = (runnable.operation,)
+    for one in given:
+        discard(one)

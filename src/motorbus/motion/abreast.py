@@ -7,8 +7,9 @@ begun together, and what becomes of their results. They know of each other only 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine, Mapping
-from typing import Any, Concatenate, Generic, NamedTuple, ParamSpec, Protocol, Self, TypeVar, overload
+from collections.abc import Callable, Coroutine, Generator, Mapping
+from dataclasses import dataclass
+from typing import Any, Concatenate, Generic, ParamSpec, Protocol, Self, TypeAlias, TypeVar, overload
 
 from motorbus.core.operation import Runnable
 from motorbus.core.verbs import Said
@@ -18,7 +19,8 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 
-class Abreast(NamedTuple, Generic[T]):
+@dataclass(frozen=True, slots=True)
+class Abreast(Generic[T]):
     """An operation for each bus, by its name, and what the whole comes to.
 
     `combine` gets what each returned, or the MotorbusError that it raised; it raises what is to be raised.
@@ -26,6 +28,14 @@ class Abreast(NamedTuple, Generic[T]):
 
     operations: Mapping[str, Runnable[Any]]
     combine: Callable[[Mapping[str, Any]], T]
+
+    def __await__(self) -> Generator[Abreast[Any], Any, T]:
+        value: T = yield self
+        return value
+
+
+Works: TypeAlias = Coroutine[Abreast[Any], Any, T]
+"""A procedure on several buses: it awaits pieces of work, one after the other."""
 
 
 class BlockingConductor(Protocol):

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from motorbus.bus.base import BaseBus
 from motorbus.core.family import Family, Train
-from motorbus.core.operation import ANY, Exchange, Operation
+from motorbus.core.operation import ANY, Exchange
 from motorbus.errors import RequestError
 from motorbus.motion import limits
 from motorbus.motion.abreast import Abreast, settled
@@ -95,10 +95,10 @@ def budget(
     chosen = body.chosen(axes)
     led, without = divided(chosen)
 
-    def of(bus: str, there: list[AxisVerbs]) -> Operation[BusBudget]:
+    async def of(bus: str, there: list[AxisVerbs]) -> BusBudget:
         face = body.buses[bus]
-        train = yield from train_of(face, there)
-        angles = yield from some_angles(there)
+        train = await train_of(face, there)
+        angles = await some_angles(there)
         return bus_budget(face, train, [axis.name for axis in there], angles, turnaround)
 
     def combine(results: Mapping[str, Any]) -> RobotBudget:
@@ -113,11 +113,11 @@ def divided(axes: Mapping[str, AxisVerbs]) -> tuple[dict[str, AxisVerbs], tuple[
     return led, tuple(name for name in axes if name not in led)
 
 
-def some_angles(axes: Iterable[AxisVerbs]) -> Operation[dict[int, float]]:
+async def some_angles(axes: Iterable[AxisVerbs]) -> dict[int, float]:
     """By id, an angle (rad) that each device can be told: all goals are as long, so any will do to count."""
     found = {}
     for axis in axes:
-        device = yield from limits.of_device(axis)
+        device = await limits.of_device(axis)
         low, high = device or (-inf, inf)
         found[axis.spec.node] = min(max(0.0, low), high)
     return found

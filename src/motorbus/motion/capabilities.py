@@ -11,7 +11,7 @@ from functools import wraps
 from typing import TYPE_CHECKING, Any, Concatenate, Final, ParamSpec, TypeAlias, TypeVar
 
 from motorbus.core.family import Quality, State
-from motorbus.core.operation import Operation, Runnable
+from motorbus.core.operation import Runnable
 from motorbus.core.verbs import verb
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion.command import Command
@@ -43,9 +43,9 @@ def _telling(
     """The same, whose errors name the axis that they befell."""
 
     @wraps(function)
-    def told(axis: Any, /, *args: P.args, **kwargs: P.kwargs) -> Operation[T]:
+    async def told(axis: Any, /, *args: P.args, **kwargs: P.kwargs) -> T:
         try:
-            return (yield from function(axis, *args, **kwargs))
+            return await function(axis, *args, **kwargs)
         except MotorbusError as error:
             why = blamed(error, [axis.bus])
             found = why if names(why, axis.name) else named(axis.name, why)
@@ -259,16 +259,16 @@ def _is_moving(name: str) -> RequestError:
 # -- what it tells -------------------------------------------------------------------------------------------------
 
 
-def state(axis: AxisVerbs) -> Operation[State]:
+async def state(axis: AxisVerbs) -> State:
     """One sample of all it tells, in its direction: rad, rad/s (m, m/s on a linear axis), fraction, A, V, °C.
 
     One whose position no motor can have come to so quickly is asked for again; `quality` says what came of that. An
     axis that has torque from here is looked at for a restart of its device, not too often: see `Robot.faults`.
     """
-    found, quality = yield from _judged(axis)
+    found, quality = await _judged(axis)
     if quality is Quality.SUSPECT:
-        found, quality = yield from _judged(axis)
-    yield from canary.looked_after(axis, found.at)
+        found, quality = await _judged(axis)
+    await canary.looked_after(axis, found.at)
     spec = axis.spec
     return found._replace(
         quality=quality,
@@ -279,55 +279,55 @@ def state(axis: AxisVerbs) -> Operation[State]:
     )
 
 
-def _judged(axis: AxisVerbs) -> Operation[tuple[State, Quality]]:
-    found: State = yield from axis.able["state"](axis.device)
+async def _judged(axis: AxisVerbs) -> tuple[State, Quality]:
+    found: State = await axis.able["state"](axis.device)
     if found.position is None:
         return found, found.quality
     return found, axis.track.take(found.position, found.at).quality
 
 
-def position(axis: AxisVerbs) -> Operation[float]:
+async def position(axis: AxisVerbs) -> float:
     """Where it is, as its device measures it (rad, m).
 
     A place to which no motor can have come so quickly is told only where a second reading agrees: see `believed`.
     """
-    angle = yield from believed(axis.track, lambda: axis.able["position"](axis.device))
+    angle = await believed(axis.track, lambda: axis.able["position"](axis.device))
     return axis.spec.from_device(angle)
 
 
-def velocity(axis: AxisVerbs) -> Operation[float]:
+async def velocity(axis: AxisVerbs) -> float:
     """How fast it moves, as its device tells (rad/s, m/s)."""
-    return axis.spec.rate_from_device((yield from axis.able["velocity"](axis.device)))
+    return axis.spec.rate_from_device(await axis.able["velocity"](axis.device))
 
 
-def load(axis: AxisVerbs) -> Operation[float]:
+async def load(axis: AxisVerbs) -> float:
     """What it pushes with: a fraction of the most that its device can, in the direction of the axis."""
-    found: float = yield from axis.able["load"](axis.device)
+    found: float = await axis.able["load"](axis.device)
     return found * axis.spec.sign
 
 
-def current(axis: AxisVerbs) -> Operation[float]:
+async def current(axis: AxisVerbs) -> float:
     """The current of its motor (A), in the direction of the axis where the device gives it a sign."""
-    found: float = yield from axis.able["current"](axis.device)
+    found: float = await axis.able["current"](axis.device)
     return found * axis.spec.sign
 
 
-def voltage(axis: AxisVerbs) -> Operation[float]:
+async def voltage(axis: AxisVerbs) -> float:
     """The supply of its device (V)."""
-    found: float = yield from axis.able["voltage"](axis.device)
+    found: float = await axis.able["voltage"](axis.device)
     return found
 
 
-def temperature(axis: AxisVerbs) -> Operation[float]:
+async def temperature(axis: AxisVerbs) -> float:
     """The temperature of its device (°C)."""
-    found: float = yield from axis.able["temperature"](axis.device)
+    found: float = await axis.able["temperature"](axis.device)
     return found
 
 
 # -- torque and rest -----------------------------------------------------------------------------------------------
 
 
-def enable_torque(axis: AxisVerbs) -> Operation[None]:
+async def enable_torque(axis: AxisVerbs) -> None:
     """Torque on without a jump; the cap of the machine file, where there is one, is set before.
 
     Raises as the device's own verb: LimitExceeded, with the servo limp, where it stands beyond its limits; Interrupted
@@ -337,12 +337,12 @@ def enable_torque(axis: AxisVerbs) -> Operation[None]:
     canary.check(axis)
     axis.orders += 1
     command = Command([axis])
-    yield from canary.unbroken(axis)
+    await canary.unbroken(axis)
     command.check()
     canary.expected(axis)
     axis.engaged = True
     try:
-        yield from command.watched(_given_torque(axis))
+        await command.watched(_given_torque(axis))
     except MotorbusError as error:
         if (lost := command.lost()) is not None:
             raise lost from error
@@ -350,49 +350,49 @@ def enable_torque(axis: AxisVerbs) -> Operation[None]:
     canary.armed(axis)
 
 
-def _given_torque(axis: AxisVerbs) -> Operation[None]:
-    yield from cap(axis)
-    yield from axis.able["enable_torque"](axis.device)
+async def _given_torque(axis: AxisVerbs) -> None:
+    await cap(axis)
+    await axis.able["enable_torque"](axis.device)
 
 
-def cap(axis: AxisVerbs) -> Operation[None]:
+async def cap(axis: AxisVerbs) -> None:
     """Bound what its device pushes with, as the machine file says; nothing is sent where it says nothing."""
     spec = axis.spec
     if spec.torque is not None:
-        yield from axis.able["cap_torque"](axis.device, spec.torque)
+        await axis.able["cap_torque"](axis.device, spec.torque)
     if spec.current is not None:
-        yield from axis.able["cap_current"](axis.device, spec.current)
+        await axis.able["cap_current"](axis.device, spec.current)
 
 
-def disable_torque(axis: AxisVerbs) -> Operation[None]:
+async def disable_torque(axis: AxisVerbs) -> None:
     """Limp, whatever alarms there are. Raises as the device's own verb when nobody knows whether it is."""
     axis.orders = order = axis.orders + 1
     resting = Resting(axis)
-    yield from axis.able["disable_torque"](axis.device)
+    await axis.able["disable_torque"](axis.device)
     resting.certain()
     if axis.orders == order:  # else somebody has told it something since, and may have given it torque
         axis.engaged = axis.under_way = False
 
 
-def stop(axis: AxisVerbs) -> Operation[Enum]:
+async def stop(axis: AxisVerbs) -> Enum:
     """Decelerate and stay; gives what the device promises. Raises as the device's own verb when it did not accept."""
     axis.orders = order = axis.orders + 1
     resting = Resting(axis)
-    promise: Enum = yield from axis.able["stop"](axis.device)
+    promise: Enum = await axis.able["stop"](axis.device)
     resting.certain()
     if axis.orders == order:  # else it is the next movement already, which this was not said to
         axis.accepted_stop()
     return promise
 
 
-def hold(axis: AxisVerbs) -> Operation[None]:
+async def hold(axis: AxisVerbs) -> None:
     """Stay here, with torque: torque on without a jump where there is a switch for it, else a stop.
 
     Raises Faulted where its device does not keep that torque; else as `enable_torque` and `stop`.
     """
     if "enable_torque" in axis.able:
-        yield from enable_torque(axis)
+        await enable_torque(axis)
         axis.under_way = False
-        yield from canary.kept(axis)
+        await canary.kept(axis)
     else:
-        yield from stop(axis)
+        await stop(axis)

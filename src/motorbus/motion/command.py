@@ -7,7 +7,7 @@ which it leaves, whether the command is still with those who made it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Iterable
 from copy import copy
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -18,7 +18,6 @@ from motorbus.core.operation import (
     Alone,
     Effect,
     Exchange,
-    Operation,
     Rank,
     Refusal,
     Runnable,
@@ -170,15 +169,17 @@ class Command:
     def _either(self, own: Refusal, stops: Stops) -> MotorbusError | None:
         return own(stops) or self.lost()
 
-    def watched(self, operation: Runnable[T]) -> Operation[T]:
+    async def watched(self, operation: Runnable[T]) -> T:
         """The same operation, of which nothing that moves or gives torque leaves once the command is lost.
 
         It is for what takes several exchanges, as getting ready does: whoever lets an axis go in the middle of that
         must find it limp afterwards. Each such exchange is `guarded`, also those that are said together or alone; what
         stops or lets go (`Rank.STOP`) always leaves. Raises Interrupted in the place of an exchange that did not leave.
         """
-        steps: Generator[Step, Any, T] = iter(operation)
-        advance: Callable[[], Step] = partial(next, steps)
+        if isinstance(operation, Step):
+            only: T = await self._watching(operation)
+            return only
+        advance: Callable[[], Step[Any]] = partial(operation.send, None)
         try:
             while True:
                 try:
@@ -187,15 +188,15 @@ class Command:
                     value: T = end.value
                     return value
                 try:
-                    advance = partial(steps.send, (yield from self._watching(step)))
+                    advance = partial(operation.send, await self._watching(step))
                 except GeneratorExit:
                     raise
                 except BaseException as error:
-                    advance = partial(steps.throw, error)
+                    advance = partial(operation.throw, error)
         finally:
-            steps.close()
+            operation.close()
 
-    def _watching(self, step: Step) -> Step:
+    def _watching(self, step: Step[Any]) -> Step[Any]:
         if isinstance(step, Exchange):
             return self.guarded(step) if step.effect in GUARDED and step.rank is not Rank.STOP else step
         if isinstance(step, Together):
@@ -204,13 +205,13 @@ class Command:
             return Alone(self.watched(step.operation))
         return step
 
-    def stop(self, *, anew: bool = False) -> Operation[dict[str, MotorbusError]]:
+    async def stop(self, *, anew: bool = False) -> dict[str, MotorbusError]:
         """Stop those that nobody else has told anything since; gives the error of each that did not accept, by name.
 
         With `anew` also those for which a stop has left on their bus, where nobody knows whether it was accepted.
         """
         axes = self.untold() if anew else self.held()
-        ended = yield from Together([outcome(axis.able["stop"](axis.device)) for axis in axes])
+        ended = await Together([outcome(axis.able["stop"](axis.device)) for axis in axes])
         errors = {
             axis.name: told for axis, told in zip(axes, ended, strict=True) if isinstance(told, MotorbusError)
         }

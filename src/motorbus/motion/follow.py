@@ -76,7 +76,7 @@ def follow(
         _Following(wanted, Ending(rate, seconds, until), policy == "clamp"),
         rate,
         (*wanted, *wanted.values()),
-        before=group.disable_torque(body, limp) if limp else None,
+        before=(lambda: group.disable_torque(body, limp)) if limp else None,
         jerk=jerk,
         endless=seconds is None and until is None,
         policy=policy,

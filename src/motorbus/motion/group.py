@@ -79,10 +79,10 @@ def stopped(
     return _each(body, body.chosen(names), one.stop, dict, partial(_looked_at, patience=patience))
 
 
-def _looked_at(axes: Sequence[AxisVerbs], act: Act[Enum], patience: float) -> Operation[Told]:
-    told = yield from insisted(axes, act)
+async def _looked_at(axes: Sequence[AxisVerbs], act: Act[Enum], patience: float) -> Told:
+    told = await insisted(axes, act)
     heard = [axis for axis in axes if not isinstance(told[axis.name], MotorbusError)]
-    looked = yield from everyone(heard, lambda axis: standstill.seen(axis, told[axis.name], patience))
+    looked = await everyone(heard, lambda axis: standstill.seen(axis, told[axis.name], patience))
     return {**told, **looked}
 
 

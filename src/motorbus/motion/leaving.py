@@ -117,8 +117,8 @@ class Leaving:
 
     # -- what ----------------------------------------------------------------------------------------------------------
 
-    def _looked(self, axis: AxisVerbs) -> Operation[None]:
-        if (yield from _rest(axis)) is not Rest.STOPPED:
+    async def _looked(self, axis: AxisVerbs) -> None:
+        if await _rest(axis) is not Rest.STOPPED:
             self.said.append(f"{axis.name}: not seen to rest before it was let go")
 
     def _visit(
@@ -141,9 +141,9 @@ class Leaving:
     def _noting(self, step: str, act: Act[Any]) -> Act[Any]:
         """The same, which counts as visited as soon as it has ended, even when an interruption takes the result."""
 
-        def noted(axis: AxisVerbs) -> Any:
+        async def noted(axis: AxisVerbs) -> Any:
             try:
-                told = yield from act(axis)
+                told = await act(axis)
             except MotorbusError as error:
                 self.errors[axis.name] = error
                 self._visited.add((step, axis.name))
@@ -193,18 +193,18 @@ def _fell(axis: AxisVerbs) -> bool:
     return axis.canary.fell and axis.spec.exit == "torque_off"
 
 
-def _rest(axis: AxisVerbs) -> Operation[Rest]:
+async def _rest(axis: AxisVerbs) -> Rest:
     """Whether an axis that was stopped rests; raises nothing, for it is let go all the same."""
     if "position" not in axis.able:
         return Rest.UNSEEN
-    told = yield from outcome(watched(lambda: axis.able["position"](axis.device), PATIENCE))
+    told = await outcome(watched(lambda: axis.able["position"](axis.device), PATIENCE))
     return Rest.UNSEEN if isinstance(told, MotorbusError) else told[0]
 
 
 # -- without its holder ------------------------------------------------------------------------------------------------
 
 
-def given_up(axes: Iterable[AxisVerbs], again: Container[str] = ()) -> Operation[dict[str, MotorbusError]]:
+async def given_up(axes: Iterable[AxisVerbs], again: Container[str] = ()) -> dict[str, MotorbusError]:
     """The axes of one bus when the lease is lost: what moves is stopped, then what is to be limp lets go.
 
     What moves is stopped whatever its `exit` says, `leave` included: nobody is there any more. Nothing is parked, for
@@ -212,15 +212,15 @@ def given_up(axes: Iterable[AxisVerbs], again: Container[str] = ()) -> Operation
     Those whose names are in `again` are stopped as well. Gives the errors by name; every axis is visited.
     """
     there = [axis for axis in axes if not axis.bus.latched]
-    told = yield from insisted([axis for axis in there if moves(axis) or axis.name in again], one.stop)
+    told = await insisted([axis for axis in there if moves(axis) or axis.name in again], one.stop)
     limp = [axis for axis in there if axis.engaged and axis.spec.exit == "torque_off"]
-    return errors_of(told) | errors_of((yield from insisted(limp, one.disable_torque)))
+    return errors_of(told) | errors_of(await insisted(limp, one.disable_torque))
 
 
-def stopped_going_on(axes: Iterable[AxisVerbs]) -> Operation[dict[str, MotorbusError]]:
+async def stopped_going_on(axes: Iterable[AxisVerbs]) -> dict[str, MotorbusError]:
     """Those axes of one bus that were told to go on without an end are told to stop. Gives the errors by name."""
     there = [axis for axis in axes if goes_on(axis) and not axis.bus.latched]
-    return errors_of((yield from insisted(there, one.stop)))
+    return errors_of(await insisted(there, one.stop))
 
 
 def moves(axis: AxisVerbs) -> bool:

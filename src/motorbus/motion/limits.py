@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 from motorbus.core import units
 from motorbus.core.entry import shown
-from motorbus.core.operation import Operation
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.motion.machine import AxisSpec
 from motorbus.motion.machine.model import ACCELERATION, ROUNDING, VELOCITY, Measure
@@ -39,11 +38,11 @@ class Bounds(NamedTuple):
     whose: str
 
 
-def of_device(axis: AxisVerbs) -> Operation[Device]:
+async def of_device(axis: AxisVerbs) -> Device:
     """The device's own limits (rad of the device), asked of it; None where it has none."""
     if "limits" not in axis.able:
         return None
-    found: Device = yield from axis.able["limits"](axis.device)
+    found: Device = await axis.able["limits"](axis.device)
     return found
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Final, Generic, TypeVar
 
-from motorbus.core.operation import Operation, Pause
+from motorbus.core.operation import Pause, Runnable
 from motorbus.errors import Interrupted, MotorbusError
 
 T = TypeVar("T")
@@ -28,7 +28,7 @@ class Meeting(Generic[T]):
         self._said: dict[str, T] = {}
         self._failed: MotorbusError | None = None
 
-    def meet(self, name: str, says: T) -> Operation[Mapping[str, T]]:
+    async def meet(self, name: str, says: T) -> Mapping[str, T]:
         """Say it, and wait until all have. Raises Interrupted when somebody will not come.
 
         Raises ValueError for somebody who was not asked: whoever waits for all would wait for ever.
@@ -39,7 +39,7 @@ class Meeting(Generic[T]):
         while self._said.keys() != self.parties:
             if self._failed is not None:
                 raise _called_off(name, self._failed) from self._failed
-            yield from Pause(LOOK)
+            await Pause(LOOK)
         return self._said
 
     def fail(self, error: MotorbusError) -> None:
@@ -88,21 +88,21 @@ class Seat:
         self._party = party
         self._origin = origin
 
-    def agreed(self, shortest: float, fitted: Callable[[float], float]) -> Operation[float]:
+    async def agreed(self, shortest: float, fitted: Callable[[float], float]) -> float:
         """See `core.timing.Timing`."""
-        needed = yield from self._beat.shortest.meet(self._party, shortest)
+        needed = await self._beat.shortest.meet(self._party, shortest)
         longest = max(needed.values())
-        offered = yield from self._beat.fitted.meet(self._party, fitted(longest))
+        offered = await self._beat.fitted.meet(self._party, fitted(longest))
         return max(longest, *offered.values())
 
-    def start(self, lead: float, meanwhile: Operation[object] | None = None) -> Operation[float]:
+    async def start(self, lead: float, meanwhile: Callable[[], Runnable[object]] | None = None) -> float:
         """See `core.timing.Timing`. Once all are ready there is `NOTICE` left; `meanwhile` is done in that time."""
-        now = (yield from Pause(0)) - self._origin
-        ready = yield from self._beat.ready.meet(self._party, now + lead)
+        now = await Pause(0) - self._origin
+        ready = await self._beat.ready.meet(self._party, now + lead)
         moment = max(ready.values()) + NOTICE + self._origin
         if meanwhile is not None:
-            yield from meanwhile
-        yield from Pause(max(0.0, moment - lead - (yield from Pause(0))))
+            await meanwhile()
+        await Pause(max(0.0, moment - lead - await Pause(0)))
         return moment
 
     def fails(self, error: BaseException) -> None:

@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterable
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar
 
-from motorbus.core.operation import Operation, Runnable
-from motorbus.errors import LimitExceeded, MotionError, NotHomed, RequestError
+from motorbus.core.operation import Runnable, discard
+from motorbus.errors import LimitExceeded, MotionError, MotorbusError, NotHomed, RequestError
 from motorbus.motion import limits
 from motorbus.motion.machine.model import FARTHEST
 from motorbus.motion.safety import canary
@@ -115,7 +115,7 @@ def checked_place(name: str, position: float) -> float:
     return float(position)
 
 
-def journey(axis: AxisVerbs, work: Runnable[T], place: Callable[[Movement, T], Place]) -> Operation[T]:
+async def journey(axis: AxisVerbs, work: Runnable[T], place: Callable[[Movement, T], Place]) -> T:
     """Carry out a movement of one axis and keep account of it: it is engaged, under way, and at rest afterwards.
 
     `place` gives, from what was before and what the movement returned, where the axis is then. A refusal that is
@@ -124,13 +124,18 @@ def journey(axis: AxisVerbs, work: Runnable[T], place: Callable[[Movement, T], P
     Raises RequestError, with nothing sent, while another movement of a reckoned axis is under way, and Refused while it
     is at fault.
     """
-    canary.check(axis)
     movement = Movement()
     try:
+        canary.check(axis)
+    except MotorbusError:
+        discard(work)
+        raise
+    try:
         axis.departs(movement)
-        told = yield from work
+        told = await work
         axis.arrives(movement, place(movement, told))
     except BaseException as error:
+        discard(work)  # if it was refused before it began
         cut_short(axis, movement, error)
         raise
     return told
@@ -151,7 +156,7 @@ def cut_short(axis: AxisVerbs, movement: Movement, error: BaseException) -> None
 # -- verbs of axes whose device moves by a profile of its own ------------------------------------------------------
 
 
-def move_by(axis: AxisVerbs, way: float, *, velocity: float | None = None) -> Operation[float]:
+async def move_by(axis: AxisVerbs, way: float, *, velocity: float | None = None) -> float:
     """Move by so far (rad, m) at so much (rad/s, m/s; None: as fast as the axis may), by the device's own profile.
 
     Returns the way that was gone, *estimated*: in whole steps of the motor. Allowed also where the position is not
@@ -160,12 +165,10 @@ def move_by(axis: AxisVerbs, way: float, *, velocity: float | None = None) -> Op
     """
     check_way(axis, way)
     rate = _rate(axis, velocity)
-    return (
-        yield from _gone(axis, axis.able["move_by"](axis.device, way * axis.spec.ratio, velocity=rate), way)
-    )
+    return await _gone(axis, axis.able["move_by"](axis.device, way * axis.spec.ratio, velocity=rate), way)
 
 
-def jog(axis: AxisVerbs, velocity: float, seconds: float) -> Operation[float]:
+async def jog(axis: AxisVerbs, velocity: float, seconds: float) -> float:
     """Move at a velocity (rad/s, m/s, with its sign) for a while (s), then stop. Returns the way, *estimated*.
 
     Raises LimitExceeded for what `move_by` refuses; else as the device's own verb.
@@ -174,12 +177,10 @@ def jog(axis: AxisVerbs, velocity: float, seconds: float) -> Operation[float]:
     limits.check_velocity(axis.name, axis.spec, velocity)
     way = velocity * seconds
     check_way(axis, way)
-    return (yield from _gone(axis, axis.able["jog"](axis.device, velocity * axis.spec.ratio, seconds), way))
+    return await _gone(axis, axis.able["jog"](axis.device, velocity * axis.spec.ratio, seconds), way)
 
 
-def home(
-    axis: AxisVerbs, *, deadline: float | None = None, velocity: float | None = None
-) -> Operation[float]:
+async def home(axis: AxisVerbs, *, deadline: float | None = None, velocity: float | None = None) -> float:
     """Go to the switch of the axis, at most for so long (s; None: what is usual there). Returns where that is (rad, m).
 
     The `velocity` is in rad/s or m/s, above 0; None is that which is set in the device, or `max_velocity` where that is
@@ -191,11 +192,11 @@ def home(
     if deadline is not None:
         options["deadline"] = deadline
     place = axis.spec.from_device(0.0)
-    yield from journey(axis, axis.able["home"](axis.device, **options), lambda *_: (place, ""))
+    await journey(axis, axis.able["home"](axis.device, **options), lambda *_: (place, ""))
     return place
 
 
-def run(axis: AxisVerbs, number: int, *, timeout: float | None = None) -> Operation[Any]:
+async def run(axis: AxisVerbs, number: int, *, timeout: float | None = None) -> Any:
     """Run a program that is stored in the device, at most for so long (s), and wait for its end.
 
     Returns what the device's own verb does. Where the axis stands afterwards is not known, for its program does not
@@ -203,9 +204,7 @@ def run(axis: AxisVerbs, number: int, *, timeout: float | None = None) -> Operat
     """
     options = {} if timeout is None else {"timeout": timeout}
     moved = f"program {number} has moved it"
-    return (
-        yield from journey(axis, axis.able["run"](axis.device, number, **options), lambda *_: (None, moved))
-    )
+    return await journey(axis, axis.able["run"](axis.device, number, **options), lambda *_: (None, moved))
 
 
 def check_way(axis: AxisVerbs, way: float) -> None:
@@ -243,10 +242,10 @@ def _rate(axis: AxisVerbs, velocity: float | None) -> float:
     return abs(axis.spec.rate_to_device(asked))
 
 
-def _gone(axis: AxisVerbs, work: Runnable[Any], ordered: float) -> Operation[float]:
+async def _gone(axis: AxisVerbs, work: Runnable[Any], ordered: float) -> float:
     """The way that an axis has gone (rad, m): what its device says it has turned, else what was ordered."""
 
     def way(told: object) -> float:
         return float(getattr(told, "angle", ordered * axis.spec.ratio)) / axis.spec.ratio
 
-    return way((yield from journey(axis, work, lambda movement, told: movement.after(way(told)))))
+    return way(await journey(axis, work, lambda movement, told: movement.after(way(told))))

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
 from motorbus.core.family import Identity
-from motorbus.core.operation import Operation, Runnable
+from motorbus.core.operation import Runnable
 from motorbus.errors import DeviceError, LimitExceeded, MotorbusError, NoReply, RequestError
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.body import Body
@@ -52,17 +52,17 @@ class Asked(NamedTuple):
     travel: Device = None
 
 
-def _asked(axis: AxisVerbs) -> Operation[Asked]:
+async def _asked(axis: AxisVerbs) -> Asked:
     identify: Runnable[Identity] = type(axis.device).identify.function(axis.device)
-    identity = yield from identify
+    identity = await identify
     able = axis.bus.family.axis(identity.model)
     travel: Device = None
     if axis.spec.device_limits is not None and "travel" in able:
-        travel = yield from able["travel"](axis.device)
+        travel = await able["travel"](axis.device)
     if axis.spec.exit != "park" or "limits" not in able:
         return Asked(identity, travel=travel)
     try:
-        limits: Device = yield from able["limits"](axis.device)
+        limits: Device = await able["limits"](axis.device)
     except (RequestError, DeviceError) as error:
         return Asked(identity, error, travel)
     return Asked(identity, limits, travel)

@@ -11,7 +11,7 @@ from copy import copy
 from re import escape, search
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
-from motorbus.core.operation import Operation, Runnable, Together, afterwards, outcome
+from motorbus.core.operation import Runnable, Together, afterwards, outcome
 from motorbus.errors import MotorbusError
 
 if TYPE_CHECKING:
@@ -24,29 +24,29 @@ Told: TypeAlias = "dict[str, Any]"
 """What came of each axis, by its name: a value, or the MotorbusError that came instead."""
 
 
-def everyone(axes: Sequence[AxisVerbs], act: Act[Any]) -> Operation[Told]:
+async def everyone(axes: Sequence[AxisVerbs], act: Act[Any]) -> Told:
     """Do it to each, at the same time where the bus allows it; an interruption ends it."""
-    told = yield from Together([outcome(act(axis)) for axis in axes])
+    told = await Together([outcome(act(axis)) for axis in axes])
     return {axis.name: one for axis, one in zip(axes, told, strict=True)}
 
 
-def insisted(axes: Sequence[AxisVerbs], act: Act[Any]) -> Operation[Told]:
+async def insisted(axes: Sequence[AxisVerbs], act: Act[Any]) -> Told:
     """Do it to each whatever happens: an interruption is raised when everybody has been visited.
 
     Doing it must be harmless to repeat.
     """
     told: Told = {}
 
-    def one(axis: AxisVerbs) -> Operation[None]:
-        told[axis.name] = yield from outcome(act(axis))
+    async def one(axis: AxisVerbs) -> None:
+        told[axis.name] = await outcome(act(axis))
 
-    def rest() -> Operation[None]:
-        yield from Together([one(axis) for axis in axes if axis.name not in told])
+    async def rest() -> None:
+        await Together([one(axis) for axis in axes if axis.name not in told])
 
-    def all_of_them() -> Operation[None]:
-        yield from Together([one(axis) for axis in axes])
+    async def all_of_them() -> None:
+        await Together([one(axis) for axis in axes])
 
-    yield from afterwards(all_of_them(), rest)
+    await afterwards(all_of_them(), rest)
     return told
 
 

@@ -49,7 +49,7 @@ def teach(
         teaching,
         rate,
         axes,
-        before=group.disable_torque(body, axes) if limp else None,
+        before=(lambda: group.disable_torque(body, axes)) if limp else None,
         endless=seconds is None and until is None,
         failed=teaching.failed,
     )

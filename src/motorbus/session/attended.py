@@ -18,7 +18,7 @@ from collections.abc import Mapping
 from types import TracebackType
 from typing import Any, Final, Self
 
-from motorbus.core.operation import Operation, Pause, outcome
+from motorbus.core.operation import Pause, outcome
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.body import Body
@@ -121,11 +121,11 @@ class Attending:
         """What goes on without an end is told to stop; where the lease is lost, until all that moves was told so."""
         parts = self._robot.by_bus(self._robot.axes)
 
-        def on(bus: str) -> Operation[dict[str, MotorbusError]]:
+        async def on(bus: str) -> dict[str, MotorbusError]:
             sentry = self._robot._sentry
             while sentry is not None and sentry.busy(bus):
-                yield from outcome(iter(Pause(LOOK)))
-            return (yield from stopped_going_on(parts[bus]))
+                await outcome(Pause(LOOK))
+            return await stopped_going_on(parts[bus])
 
         def combine(results: Mapping[str, Any]) -> dict[str, MotorbusError]:
             found = {

@@ -13,7 +13,7 @@ from threading import Event, Thread
 from typing import Any, Final
 
 from motorbus.bus.background import BackgroundTask
-from motorbus.core.operation import Operation, Pause, outcome
+from motorbus.core.operation import Pause, outcome
 from motorbus.errors import MotorbusError
 from motorbus.motion.body import Body
 from motorbus.motion.leaving import given_up, goes_on, moves, stopped_going_on
@@ -98,11 +98,11 @@ class Sentry:
 
     # -- what ----------------------------------------------------------------------------------------------------------
 
-    def _watching(self, bus: str) -> Operation[None]:
+    async def _watching(self, bus: str) -> None:
         while not self._over.is_set():
             if self._late(bus):
-                yield from self._stopping(bus)
-            yield from outcome(iter(Pause(self._left(bus))))
+                await self._stopping(bus)
+            await outcome(Pause(self._left(bus)))
 
     def _watch(self, bus: str) -> None:
         woken = self._posts[bus].woken
@@ -119,7 +119,7 @@ class Sentry:
                     self._failed(bus, self._lease.losses, self._body.axes.keys(), error)
             woken.wait(0.0 if self._over.is_set() else left)
 
-    def _stopping(self, bus: str) -> Operation[None]:
+    async def _stopping(self, bus: str) -> None:
         """Tell to stop whoever must; nothing that goes wrong is raised, for this bus is looked at again."""
         post, lost = self._posts[bus], self._lease.standing(self._body.now) is Standing.LOST or self.busy(bus)
         loss, axes = self._lease.losses, self._axes(bus)
@@ -128,7 +128,7 @@ class Sentry:
         anew = loss > post.loss
         again = () if anew else post.failed
         try:
-            errors = yield from (given_up(axes, again) if lost else stopped_going_on(axes))
+            errors = await (given_up(axes, again) if lost else stopped_going_on(axes))
         except MemoryError:  # an interruption, behind which nothing here may go on
             raise
         except Exception as error:  # the port is gone: this bus is told again, and the others at any rate

@@ -182,7 +182,7 @@ class World:
         cut, self.link.cut = self.link.cut, NEVER
         bus.run(prepare(node))
         self.link.cut, self.link.left, self.link.sent = cut, 0, []
-        bus.run(iter(Alone(changed(self.job(), node, Course(self.job())))))
+        bus.run(Alone(changed(self.job(), node, Course(self.job()))))
 
     def job(self) -> Job:
         return Job(self.verb, self.old, self.new, bytes(self.servo.memory.live[:40]), (STRANGER,))

@@ -20,6 +20,7 @@ from motorbus.core.operation import (
     Reply,
     Report,
     Runnable,
+    Shielded,
     Tune,
 )
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown
@@ -150,6 +151,8 @@ class Played:
         if isinstance(step, Alone):
             self.alone += 1
             return self.run(step.operation)
+        if isinstance(step, Shielded):
+            return self._shielded(step)
         if isinstance(step, Tune):
             return self._tune(step.rate)
         if isinstance(step, Report):
@@ -160,6 +163,15 @@ class Played:
         else:
             raise AssertionError(f"unexpected step {step!r}")
         return None
+
+    def _shielded(self, step: Shielded[Any]) -> Any:
+        """The end of a guard; an interruption in it is raised when it has ended."""
+        at, self.interrupt_at, first = self.interrupt_at, None, len(self.exchanges)
+        value = self.run(step.operation)
+        self.interrupt_at = at
+        if at is not None and first <= at < len(self.exchanges):
+            raise KeyboardInterrupt
+        return value
 
     def _tune(self, rate: int) -> int:
         """The rate there was; 0 only asks."""

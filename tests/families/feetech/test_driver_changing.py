@@ -216,7 +216,7 @@ def test_an_interruption_when_all_is_over_says_that_it_is() -> None:
     world = World("set_id", {})
     done = world.job()
     operation = guarded(done, Node(OLD))
-    step = next(operation)
+    step = operation.send(None)
     assert isinstance(step, Alone)
 
     def work(bus: Bus) -> None:

@@ -43,10 +43,7 @@ def world(name: str, **options: Any) -> Iterator[tuple[Bus, Servo, Any]]:
 
 
 def later(bus: Bus, seconds: float) -> None:
-    def operation() -> Any:
-        yield from Pause(seconds)
-
-    bus.run(operation())
+    bus.run(Pause(seconds))
 
 
 @pytest.mark.parametrize("name", TABLES)

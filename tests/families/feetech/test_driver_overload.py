@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Operation, Pause
+from motorbus.core.operation import Pause
 from motorbus.errors import DeviceError, MotorbusError, NoReply, RequestError
 from motorbus.families.feetech.driver import Recovery, recover_overload
 from motorbus.families.feetech.driver.overload import REST, TRIPS
@@ -107,8 +107,8 @@ def overloaded(name: str, **options: Any) -> Iterator[tuple[Any, Any]]:
         yield real, servo
 
 
-def pause() -> Operation[None]:
-    yield from Pause(0.1)
+async def pause() -> None:
+    await Pause(0.1)
 
 
 @pytest.mark.parametrize("name", TABLES)

@@ -126,7 +126,7 @@ def test_stop_of_a_new_servo_asks_it_first() -> None:
 
 
 def later(servo: Any, seconds: float) -> None:
-    servo.bus.run(iter(Pause(seconds)))
+    servo.bus.run(Pause(seconds))
 
 
 @pytest.mark.parametrize("name", TABLES)
@@ -251,7 +251,7 @@ def test_a_servo_is_not_sent_back_to_where_it_was_before_the_host_slept(where: s
         servo.enable_torque()
         servo.move(0.5)
         servo.move(5.5, velocity=1.0, wait=False)
-        servo.bus.run(iter(Pause(1.0)))
+        servo.bus.run(Pause(1.0))
         line: Any = servo.bus.link
         write = line.write
         slept: list[float] = []
@@ -269,7 +269,7 @@ def test_a_servo_is_not_sent_back_to_where_it_was_before_the_host_slept(where: s
         line.write = wrote
         assert servo.stop() is Promise.HOLD_ACCEPTED
         line.write = write
-        servo.bus.run(iter(Pause(2.0)))
+        servo.bus.run(Pause(2.0))
         assert len(slept) == 1
         assert real.motion.position(real._now()) - slept[0] > 1000, (
             "counts; it was on its way for two seconds"

@@ -6,7 +6,7 @@ import pytest
 
 from motorbus import Robot
 from motorbus.bus.positions import LastPositions, addressed
-from motorbus.core.operation import Effect, Operation, Pause, Rank, Together
+from motorbus.core.operation import Effect, Pause, Rank, Together
 from motorbus.errors import ChecksumError, MotorbusError, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.feetech import Feetech
 from motorbus.families.feetech.driver import Node, disable_torque, disable_torque_all
@@ -55,18 +55,18 @@ def test_who_is_let_go_does_not_end_the_movement_of_another_and_does_not_hide_it
     with machine(arm="1-3", exit="hold") as (made, sims), Robot.of(made) as robot:
         bus, first = robot["a1"].bus, robot["a1"]
 
-        def off() -> Operation[None]:
-            yield from Pause(0.5)
-            yield from disable_torque_all([2, 3])
+        async def off() -> None:
+            await Pause(0.5)
+            await disable_torque_all([2, 3])
 
-        bus.run(iter(Together([type(first).move.function(first, 0.8), off()])))
+        bus.run(Together([type(first).move.function(first, 0.8), off()]))
         assert first.position() == pytest.approx(0.8, abs=0.01)
         robot["a2"].device.write(status_return_level=0)
         robot["a2"].device.disable_torque()
         bus.run(disable_torque_all([2, 3]))
         sims["arm"][1].unplug()
         sims["arm"][1].plug()
-        bus.run(iter(Pause(1.0)))
+        bus.run(Pause(1.0))
         first.state()
         assert set(robot.faults) == {"a1"}
 
@@ -142,9 +142,8 @@ def test_every_error_is_collected(failure: MotorbusError) -> None:
 @pytest.mark.parametrize("step", range(4))
 def test_an_interruption_does_not_keep_anyone_from_being_let_go(step: int) -> None:
     whole = [all_off(1, 2, 3), off(1), off(2), off(3)]
-    cut = Line(whole[step].sent, KeyboardInterrupt())
-    again = [whole[step]] if step else []
-    played = Played([*whole[:step], cut, *again, *whole[step + 1 :]])
+    cut = [Line(whole[0].sent, KeyboardInterrupt()), *whole[1:]]
+    played = Played(whole, interrupt_at=step) if step else Played(cut)
     with pytest.raises(KeyboardInterrupt):
         played.run(disable_torque_all([1, 2, 3]))
     assert played.script == []

@@ -7,12 +7,8 @@ with the bytes printed there; what comes of it is asked of the simulated servos 
 from __future__ import annotations
 
 import asyncio
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from math import tau
-from pathlib import Path
-from types import FrameType
-from typing import Any
 
 import pytest
 
@@ -295,55 +291,3 @@ def test_a_scan_over_rates_leaves_the_bus_at_its_own(sim: Simulation) -> None:
         assert [(one.node, one.rate) for one in found] == [(1, 1_000_000), (2, 1_000_000)]
         assert bus.rate == 1_000_000
         assert motorbus.feetech.Servo(bus, 2).ping()
-
-
-def interrupted_at(line: int, action: Callable[[], object]) -> bool:
-    """Carry out `action` with Ctrl-C at this line (counted as executed) of the driver; False: it had fewer lines."""
-    left = line
-    driver = str(Path(motorbus.feetech.__file__).parent / "driver")
-
-    def watch(frame: FrameType, event: str, _: object) -> Any:
-        nonlocal left
-        if not frame.f_code.co_filename.startswith(driver):
-            return None
-        if event == "line":
-            left -= 1
-            if left == 0:
-                raise KeyboardInterrupt
-        return watch
-
-    before = sys.gettrace()
-    sys.settrace(watch)
-    try:
-        action()
-    except KeyboardInterrupt:
-        return True
-    finally:
-        sys.settrace(before)
-    return False
-
-
-def test_ctrl_c_at_any_line_of_a_write_leaves_the_lock_closed(bus: Bus, sim: Simulation) -> None:
-    line = 0
-    more = True
-    while more:
-        line += 1
-        servo = motorbus.feetech.Servo(bus, 1)
-        more = interrupted_at(line, lambda: servo.write(position_p=33))  # noqa: B023 - it is called at once
-        assert sim[1].status()["locked"] is True
-        assert servo.ping()
-    assert line > 100
-
-
-def test_ctrl_c_at_any_line_of_torque_off_lets_everyone_go(bus: Bus, sim: Simulation) -> None:
-    servos = [motorbus.feetech.Servo(bus, id) for id in (1, 2, 3)]
-    line = 0
-    more = True
-    while more:
-        line += 1
-        for servo in servos:
-            servo.enable_torque()
-        more = interrupted_at(line, lambda: bus.run(motorbus.feetech.disable_torque_all(servos)))
-        begun = not any(sim[id].status()["torque_enabled"] for id in (1, 2, 3))
-        assert begun or line < 20, "before the first packet nothing is let go; after it everyone"
-    assert line > 50

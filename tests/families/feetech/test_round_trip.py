@@ -360,7 +360,7 @@ def test_a_rate_is_written_by_set_baud(there: Bench) -> None:
     for code in BAUD_CODES_OF[there.servo().identify().table]:
         found = there.servo().set_baud(BAUD_CODES[code], among=(ID,))
         assert (found.node, found.rate) == (ID, BAUD_CODES[code])
-        there.bus.run(iter(Tune(BAUD_CODES[code])))
+        there.bus.run(Tune(BAUD_CODES[code]))
         assert_kept(there, ID, row, code)
 
 

@@ -11,7 +11,7 @@ from random import Random
 
 from motorbus.core.can_bits import bits
 from motorbus.core.family import SimulatedNode
-from motorbus.core.operation import CanFrame, Data, Operation, Together
+from motorbus.core.operation import CanFrame, Data, Together
 from motorbus.errors import MotorbusError
 from motorbus.families.kst import FAMILY, Servo
 from motorbus.families.kst.simulator import KstBus
@@ -71,13 +71,13 @@ class Rig:
         self.good = self.failed = self.wrong = 0
         self.errors: list[MotorbusError] = []
 
-    def reading(self, node: int, count: int) -> Operation[None]:
+    async def reading(self, node: int, count: int) -> None:
         """So many positions of one node, beside those of others."""
         operation = type(self.devices[node]).position.function
         for _ in range(count):
             before = self.servos.heard
             try:
-                value = yield from operation(self.devices[node])
+                value = await operation(self.devices[node])
             except MotorbusError as error:
                 self._fail(error)
             else:
@@ -86,8 +86,8 @@ class Rig:
     def read_all(self, count: int) -> None:
         """So many positions of each node, all nodes at once."""
 
-        def together() -> Operation[None]:
-            yield from Together([self.reading(node, count) for node in self.devices])
+        async def together() -> None:
+            await Together([self.reading(node, count) for node in self.devices])
 
         self.bus.run(together())
 

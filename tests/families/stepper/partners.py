@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from motorbus.bus.blocking import Bus
-from motorbus.core.operation import Operation, Pause, Progress
+from motorbus.core.operation import Pause, Progress
 from motorbus.core.timing import Turned
 from motorbus.errors import Interrupted, MotorbusError
 from motorbus.families.stepper import Controller, driver
@@ -27,24 +27,24 @@ class Partner:
         self.asked: list[str] = []
         self.failures: list[BaseException] = []
 
-    def agreed(self, shortest: float, fitted: Callable[[float], float]) -> Operation[float]:
-        yield from self._thought("agreed")
+    async def agreed(self, shortest: float, fitted: Callable[[float], float]) -> float:
+        await self._thought("agreed")
         self.shortest, self.fit = shortest, fitted(max(self.needs, shortest))
         self.agreed_on = max(self.needs, self.fit)
         return self.agreed_on
 
-    def start(self, lead: float) -> Operation[float]:
+    async def start(self, lead: float) -> float:
         self.lead = lead
-        yield from self._thought("start")
-        self.moment = (yield from Pause(0.05)) + lead
+        await self._thought("start")
+        self.moment = await Pause(0.05) + lead
         return self.moment
 
     def fails(self, error: BaseException) -> None:
         self.failures.append(error)
 
-    def _thought(self, where: str) -> Operation[None]:
+    async def _thought(self, where: str) -> None:
         self.asked.append(where)
-        yield from Pause(self.thinks)
+        await Pause(self.thinks)
         if self._fails == where:
             raise Interrupted("the others do not move", cause="made up")
 

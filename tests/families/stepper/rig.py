@@ -77,9 +77,9 @@ class Rig:
         port = self.random.choice(PORTS)
         seen: list[bool] = []
 
-        def agreed() -> Any:
+        async def agreed() -> Any:
             while len(seen) < 2 or seen[-1] is not seen[-2]:
-                seen.append((yield from read_input(self.device, port)))
+                seen.append(await read_input(self.device, port))
             return seen[-1]
 
         done = self._judged("input", agreed(), 4 * _longest(read_input(self.device, port)))
@@ -96,8 +96,8 @@ class Rig:
         true = [self.there.store.image(project)]
         seen: list[bytes] = []
 
-        def as_read() -> Any:
-            seen.extend((yield from readings(self.device, project)))
+        async def as_read() -> Any:
+            seen.extend(await readings(self.device, project))
             return agreed(self.device, project, seen)
 
         told = self._judged("dump", as_read(), READINGS * _longest(dump_once(self.device, 1)))
@@ -214,8 +214,8 @@ class Rig:
         return sum(ledger.retries for ledger in self.bus.statistics.nodes.values())
 
 
-def _sent(exchange: Exchange[None]) -> Any:
-    yield from exchange
+async def _sent(exchange: Exchange[None]) -> Any:
+    await exchange
     return True
 
 

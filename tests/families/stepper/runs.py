@@ -52,7 +52,7 @@ class Running(Bench):
     def beside(self, *others: Operation[Any], **options: Any) -> Ran:
         """The run, with other operations on the same bus."""
         both: Together[Any] = Together([driver.run(self.device, self.number, **options), *others])
-        found = self.run(iter(both))
+        found = self.run(both)
         assert isinstance(found[0], Ran)
         return found[0]
 
@@ -74,15 +74,15 @@ class Running(Bench):
         return [event for event in self.events if isinstance(event, kind)]
 
 
-def later(seconds: float, do: Callable[[], Operation[Any]]) -> Operation[Any]:
+async def later(seconds: float, do: Callable[[], Operation[Any]]) -> Any:
     """Another operation, after a while."""
-    yield from Pause(seconds)
-    return (yield from do())
+    await Pause(seconds)
+    return await do()
 
 
-def at(seconds: float, do: Callable[[], object]) -> Operation[None]:
+async def at(seconds: float, do: Callable[[], object]) -> None:
     """Something that happens to the controller, after a while."""
-    yield from Pause(seconds)
+    await Pause(seconds)
     do()
 
 

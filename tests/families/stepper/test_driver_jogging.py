@@ -241,7 +241,7 @@ def test_what_was_left_is_over_with_its_time_or_with_a_stop() -> None:
 
     def waits(device: Controller) -> Moved:
         told = leave(device)
-        device.bus.run(iter(Pause(told.seconds)))
+        device.bus.run(Pause(told.seconds))
         return device.jog(-tau, 1.0)
 
     assert isinstance(line.run(waits), Moved)

@@ -211,7 +211,7 @@ def beside(line: Line1, partner: Partner, other: Any, angle: float = 5 * tau) ->
 
     def together(device: Controller) -> list[Any]:
         mine = driver.keep_time(device, angle, partner, velocity=10.0)
-        found: list[Any] = device.bus.run(iter(Together([outcome(mine), outcome(other(device))])))
+        found: list[Any] = device.bus.run(Together([outcome(mine), outcome(other(device))]))
         return found
 
     told, too = line.run(together)  # type: ignore[misc]
@@ -219,16 +219,16 @@ def beside(line: Line1, partner: Partner, other: Any, angle: float = 5 * tau) ->
 
 
 def stopping(seconds: float) -> Any:
-    def work(device: Controller) -> Operation[object]:
-        yield from Pause(seconds)
-        return (yield from driver.stop(device))
+    async def work(device: Controller) -> object:
+        await Pause(seconds)
+        return await driver.stop(device)
 
     return work
 
 
 def emergency(seconds: float) -> Any:
-    def work(device: Any) -> Operation[None]:
-        yield from Pause(seconds)
+    async def work(device: Any) -> None:
+        await Pause(seconds)
         device.bus.estop()
         device.bus.reset()
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import pytest
 
-from motorbus.core.operation import Operation
 from motorbus.errors import Interrupted, OutcomeUnknown, RequestError
 from motorbus.families.stepper import driver
 from motorbus.families.stepper.driver import Estimated, Outcome
@@ -35,10 +34,10 @@ def test_a_stop_before_it_has_left_withdraws_it() -> None:
 def test_a_stop_that_nobody_accepts_leaves_it_running() -> None:
     with Running(made(replace(TURN, distance=16000))) as there:
 
-        def stop() -> Operation[object]:
+        async def stop() -> object:
             there.simulated.switch(reply_fault="lost")
             try:
-                return (yield from driver.stop(there.device))
+                return await driver.stop(there.device)
             except OutcomeUnknown as error:
                 return error
 

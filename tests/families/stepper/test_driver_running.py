@@ -210,7 +210,7 @@ def test_of_two_that_are_asked_for_at_once_one_is_started() -> None:
     with Running() as there:
         other = outcome(driver.run(there.device, 1))
         both: Together[Any] = Together([driver.run(there.device, 1), other])
-        ran, refused = there.run(iter(both))
+        ran, refused = there.run(both)
         assert ran.outcome is Outcome.COMPLETED
         assert isinstance(refused, RequestError)
         assert "may still run" in refused.summary

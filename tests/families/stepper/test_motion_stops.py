@@ -117,15 +117,13 @@ def test_an_echo_of_the_stop_is_no_stop(work: Work) -> None:
 def beside(line: Line1, *works: Callable[[Controller], Operation[Any]]) -> list[Any]:
     """What came of these, begun a tenth of a second apart."""
 
-    def after(
-        seconds: float, device: Controller, work: Callable[[Controller], Operation[Any]]
-    ) -> Operation[Any]:
-        yield from Pause(seconds)
-        return (yield from outcome(work(device)))
+    async def after(seconds: float, device: Controller, work: Callable[[Controller], Operation[Any]]) -> Any:
+        await Pause(seconds)
+        return await outcome(work(device))
 
     def together(device: Controller) -> list[Any]:
         branches = [after(0.1 * number, Controller(device.bus), work) for number, work in enumerate(works)]
-        found: list[Any] = device.bus.run(iter(Together(branches)))
+        found: list[Any] = device.bus.run(Together(branches))
         return found
 
     found = line.run(together)
@@ -138,9 +136,9 @@ def turning(device: Controller) -> Operation[Any]:
 
 
 def stopped_at(moment: float) -> Callable[[Controller], Operation[Any]]:
-    def stopping(device: Controller) -> Operation[Any]:
-        yield from Pause(moment)
-        return (yield from driver.stop(device))
+    async def stopping(device: Controller) -> Any:
+        await Pause(moment)
+        return await driver.stop(device)
 
     return stopping
 
@@ -208,8 +206,8 @@ def test_a_motion_that_is_asked_for_while_a_project_runs_is_refused() -> None:
 def test_an_emergency_and_a_reset_call_off_what_waits(second: str) -> None:
     line = Line1(home_switch="never")
 
-    def strike(device: Any) -> Operation[Any]:
-        yield from Pause(2.5)
+    async def strike(device: Any) -> Any:
+        await Pause(2.5)
         device.bus.estop()
         device.bus.reset()
 
@@ -228,8 +226,8 @@ def test_an_emergency_and_a_reset_call_off_what_is_being_prepared(work: str, mom
     line = Line1(home_switch="never")
     line.pace = True
 
-    def strike(device: Any) -> Operation[Any]:
-        yield from Pause(moment - 0.1)
+    async def strike(device: Any) -> Any:
+        await Pause(moment - 0.1)
         device.bus.estop()
         device.bus.reset()
 

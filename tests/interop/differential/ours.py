@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from motorbus.core.operation import Alone, Answer, CanFrame, Due, Exchange
+from motorbus.core.operation import Alone, Answer, CanFrame, Due, Exchange, Step
 from motorbus.errors import DeviceError, MotorbusError
 from motorbus.families.feetech import FAMILY as FEETECH
 from motorbus.families.feetech import wire
@@ -49,7 +49,7 @@ def sdo_decoded(case: SdoCase) -> Outcome:
     try:
         if request.kind == "upload":
             return Outcome(_run(whole(node, row), tries, steps).hex())
-        _run(iter(download(node, row, request.data, states_length=True)), tries, steps)
+        _run(download(node, row, request.data, states_length=True), tries, steps)
     except Failed as failed:
         return Outcome(None, str(failed))
     except DeviceError as refusal:
@@ -64,7 +64,7 @@ def _run(steps: Any, tries: Tries, frames: Iterator[Sequence[tuple[int, bytes]]]
     given: Any = None
     said: object = None
     come: Sequence[tuple[int, bytes]] = ()
-    operation = iter(steps)
+    operation = steps.__await__() if isinstance(steps, Step) else steps
     while True:
         try:
             step = operation.send(given)

@@ -134,10 +134,12 @@ class Counting:
 def counted(body: Body, count: int, *, interrupts: bool = False, endless: bool = False) -> Errand[int]:
     """Count cycles."""
 
-    def asks() -> Any:
-        return (yield from body.axes["a1"].able["position"](body.axes["a1"].device))
+    async def asks() -> Any:
+        return await body.axes["a1"].able["position"](body.axes["a1"].device)
 
-    return Errand(Counting(count, interrupts), 100, ("a1",), Abreast({"arm": asks()}, dict), endless=endless)
+    return Errand(
+        Counting(count, interrupts), 100, ("a1",), lambda: Abreast({"arm": asks()}, dict), endless=endless
+    )
 
 
 class Counter(Robot):

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from typing import Any, NamedTuple
 
-from motorbus.core.operation import Answer, Due, Exchange, Operation, Reply, Timeout
+from motorbus.core.operation import Answer, Due, Exchange, Reply, Timeout
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import Servo, wire
 from motorbus.families.feetech.driver.exchanges import (
@@ -90,9 +90,9 @@ def write_and_read_back(rig: Rig) -> None:
     data, memory = _word(rig), rig.servos[1].memory
     servo, block = Servo(rig.bus, 1), Block(GOAL_TIME, data)
 
-    def both() -> Operation[None]:
-        yield from write_block(servo, block)
-        yield from verified(servo, block)
+    async def both() -> None:
+        await write_block(servo, block)
+        await verified(servo, block)
 
     rig.bus.run(both())
     assert memory.read(GOAL_TIME, 2) == data, "a false success"

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from motorbus.bus.blocking import Bus
-    from motorbus.core.operation import Operation
 
 NAME: Final = "feetech"
 
@@ -143,10 +142,10 @@ def action(
     return Exit.OK
 
 
-def _action_all(bus: Bus) -> Operation[None]:
+async def _action_all(bus: Bus) -> None:
     everyone = driver.action_all()
-    yield from everyone
-    yield from Pause(
+    await everyone
+    await Pause(
         bus.family.air_time(everyone, bus.rate)
     )  # nobody answers: let it leave before the port is closed
 

@@ -38,36 +38,36 @@ def move_together(
     carried_out(bus, _move_together(servos, list(goals.values()), velocity, acceleration, wait))
 
 
-def _move_together(
+async def _move_together(
     servos: Sequence[driver.Servo],
     goals: Sequence[float],
     velocity: float | None,
     acceleration: float | None,
     wait: bool,
-) -> Operation[None]:
-    for error in (yield from driver.prepare_all(servos)).values():
+) -> None:
+    for error in (await driver.prepare_all(servos)).values():
         raise error
     blocks = []
     for servo, goal in zip(servos, goals, strict=True):
         assert servo.table is not None
-        yield from ask_bound(servo, servo.table)
+        await ask_bound(servo, servo.table)
         block = move_block(servo, servo.table, goal, velocity, acceleration)
         blocks.append(block._replace(under=servo.settings))
     written = written_all(list(sync_writes(servos, blocks)))
     if not wait:
-        yield from written
+        await written
         return
     arrivals = []
     for servo, goal in zip(servos, goals, strict=True):
         assert servo.table is not None
         order = way(servo, servo.table, goal, velocity, acceleration)
         arrivals.append(or_all_stop(arrive(servo, servo.table, order)))
-    yield from stops(_gone(written, arrivals), *servos)
+    await stops(_gone(written, arrivals), *servos)
 
 
-def _gone(written: Operation[None], arrivals: Sequence[Operation[None]]) -> Operation[None]:
-    yield from written
-    yield from Together(arrivals)
+async def _gone(written: Operation[None], arrivals: Sequence[Operation[None]]) -> None:
+    await written
+    await Together(arrivals)
 
 
 def ping_everyone(bus: Bus) -> list[int]:

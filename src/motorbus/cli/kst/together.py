@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from motorbus.bus.blocking import Bus
     from motorbus.cli.dry import DryBus
-    from motorbus.core.operation import Goal, Operation
+    from motorbus.core.operation import Goal
 
 
 def move_together(bus: Bus | DryBus, goals: Mapping[int, float], *, wait: bool = True) -> None:
@@ -29,25 +29,25 @@ def move_together(bus: Bus | DryBus, goals: Mapping[int, float], *, wait: bool =
     carried_out(bus, _move_together(servos, list(goals.values()), wait))
 
 
-def _move_together(servos: Sequence[driver.Servo], to: Sequence[float], wait: bool) -> Operation[None]:
+async def _move_together(servos: Sequence[driver.Servo], to: Sequence[float], wait: bool) -> None:
     goals = []
     for servo, position in zip(servos, to, strict=True):
-        goals.append((yield from goal_of(servo, counts(servo, position))))
+        goals.append(await goal_of(servo, counts(servo, position)))
     if not wait:
-        yield from _sent(servos, goals)
+        await _sent(servos, goals)
         return
     devices = [Moving(one, partial(driver.stop, one), partial(driver.position, one)) for one in servos]
-    yield from stopped_if_interrupted(_gone(servos, goals), *devices)
+    await stopped_if_interrupted(_gone(servos, goals), *devices)
 
 
-def _gone(servos: Sequence[driver.Servo], goals: Sequence[Goal]) -> Operation[None]:
-    yield from send_goal(servos[0], goals[0])
-    yield from or_all_stop(_sent(servos[1:], goals[1:]))
+async def _gone(servos: Sequence[driver.Servo], goals: Sequence[Goal]) -> None:
+    await send_goal(servos[0], goals[0])
+    await or_all_stop(_sent(servos[1:], goals[1:]))
     moves = [Move(goal.value, TOLERANCE, None) for goal in goals]
     pairs = zip(servos, moves, strict=True)
-    yield from Together([or_all_stop(arrive(servo, move)) for servo, move in pairs])
+    await Together([or_all_stop(arrive(servo, move)) for servo, move in pairs])
 
 
-def _sent(servos: Sequence[driver.Servo], goals: Sequence[Goal]) -> Operation[None]:
+async def _sent(servos: Sequence[driver.Servo], goals: Sequence[Goal]) -> None:
     for servo, goal in zip(servos, goals, strict=True):
-        yield from send_goal(servo, goal)
+        await send_goal(servo, goal)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Coroutine
+from contextlib import suppress
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from cyclopts import Parameter
@@ -14,7 +16,7 @@ from motorbus.cli.stepper.events import say
 from motorbus.cli.stepper.files import NAME
 from motorbus.cli.target import face, opened, target
 from motorbus.cli.wording import in_words_of_the_shell
-from motorbus.core.operation import Alone, Progress
+from motorbus.core.operation import Alone, Progress, discard
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.stepper import FAMILY, Controller
 from motorbus.families.stepper.driver import Node
@@ -25,7 +27,7 @@ if TYPE_CHECKING:
 
     from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Output
-    from motorbus.core.operation import Operation, Runnable
+    from motorbus.core.operation import Runnable
 
 T = TypeVar("T")
 
@@ -55,17 +57,20 @@ def verb(name: str, *args: Any, **values: Any) -> Callable[[Controller], Runnabl
     return lambda one: function(one, *args, **values)
 
 
-def unless_lent(one: Node, name: str, orders: Runnable[None]) -> Operation[None]:
+async def unless_lent(one: Node, name: str, orders: Runnable[None]) -> None:
     """Carry these out, with nobody else on the bus; RequestError while a motion that was cut off has borrowed anything.
 
     For the commands that are one frame: their verbs do not ask, for a motion sends them itself.
     """
 
-    def both() -> Operation[None]:
-        yield from refuse_while_lent(one, name)
-        yield from orders
+    async def both() -> None:
+        try:
+            await refuse_while_lent(one, name)
+            await orders
+        finally:
+            discard(orders)
 
-    return (yield from Alone(both()))
+    return await Alone(both())
 
 
 def carried_out(
@@ -104,9 +109,11 @@ def carried_out(
 def _refused_early(do: Callable[[Controller], Runnable[object]]) -> None:
     """Begin it on a controller of no bus, as far as its first step, which is not carried out."""
     try:
-        begun = iter(do(Node()))  # type: ignore[arg-type]
-        next(begun, None)
-        begun.close()
+        begun = do(Node())  # type: ignore[arg-type]
+        if isinstance(begun, Coroutine):
+            with suppress(StopIteration):
+                discard(begun.send(None))
+            begun.close()
     except MotorbusError as error:
         in_words_of_the_shell(error, FAMILY)
         raise

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from motorbus.cli.output import Bar, Output
-    from motorbus.core.operation import Operation
 
 _WORDS: Final = {True: "active", False: "inactive", None: "not known"}
 _PORTS: Final = {"all": int(OutputPort.ALL), "leds": int(OutputPort.LEDS)}
@@ -183,9 +182,9 @@ def _switched(
     return Exit.OK
 
 
-def _each(wanted: list[tuple[int, int]], one: Node) -> Operation[dict[int, bool | None]]:
+async def _each(wanted: list[tuple[int, int]], one: Node) -> dict[int, bool | None]:
     for port, level in wanted:
-        yield from switching.set_output(one, port, bool(level))
+        await switching.set_output(one, port, bool(level))
     return switching.last_commanded(one)
 
 

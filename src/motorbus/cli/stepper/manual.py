@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from motorbus.cli.output import Output
-    from motorbus.core.operation import Operation
 
 EXAMPLES: Final[Mapping[str, str]] = {
     "set_microstep_and_angle": "--microsteps 8 --step-angle 1.8deg",
@@ -99,10 +98,10 @@ def _edit(
     return Exit.OK
 
 
-def _selected_first(name: str, project: int | None, values: Mapping[str, int], one: Node) -> Operation[None]:
+async def _selected_first(name: str, project: int | None, values: Mapping[str, int], one: Node) -> None:
     if project is not None:
-        yield from verb("select", project)(one)  # type: ignore[arg-type]
-    yield from getattr(commands, name)(one, **values)
+        await verb("select", project)(one)  # type: ignore[arg-type]
+    await getattr(commands, name)(one, **values)
 
 
 def _stop(name: str, bus: str, output: Output, options: Mapping[str, str], *, dry_run: bool) -> Exit:

@@ -116,9 +116,9 @@ def read_project(
     return Exit.OK
 
 
-def _read(project: int, one: Node) -> Operation[tuple[bytes, str]]:
+async def _read(project: int, one: Node) -> tuple[bytes, str]:
     check("read_project", {"project": project})
-    data = yield from reading.dump(one, project)
+    data = await reading.dump(one, project)
     program = Program.from_dump(data, name=f"project {project}", order=one.order)
     return data, "" if program.project.is_cleared else program.text()
 

@@ -6,8 +6,8 @@ at its last small goal. Whatever befalls one, the others brake; what went wrong 
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Mapping, Sequence
-from typing import Any, TypeAlias
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from motorbus.core.operation import Exchange
 from motorbus.errors import Interrupted, LimitExceeded, MotorbusError
@@ -15,11 +15,8 @@ from motorbus.motion.abreast import Abreast, settled
 from motorbus.motion.loop.cycle import Part
 from motorbus.motion.loop.grid import Grid
 
-Works: TypeAlias = "Generator[Abreast[Any], Any, Any]"
-"""Pieces of work on several buses, one after the other; each is sent what came of it."""
 
-
-def braked(parts: Mapping[str, Part], grid: Grid) -> Works:
+async def braked(parts: Mapping[str, Part], grid: Grid) -> None:
     """Brake, by the slots of the grid. Who was told something from elsewhere is left alone, and so is a bus that fails.
 
     Raises what went wrong when all others rest. What was sent direct is the last that its device knows.
@@ -32,7 +29,7 @@ def braked(parts: Mapping[str, Part], grid: Grid) -> Works:
     failures: dict[str, MotorbusError] = {}
     while left := {bus: part for bus, part in parts.items() if bus not in failures and _brakes(part)}:
         grid.forgive(latest(left.values()))
-        yield from _cycle(left, grid.take(latest(left.values())), failures)
+        await _cycle(left, grid.take(latest(left.values())), failures)
     for bus, part in parts.items():
         part.release_lost()
         for place in part.places.values():
@@ -46,7 +43,7 @@ def _brakes(part: Part) -> bool:
     return part.brakes()
 
 
-def _cycle(parts: Mapping[str, Part], moment: float, failures: dict[str, MotorbusError]) -> Works:
+async def _cycle(parts: Mapping[str, Part], moment: float, failures: dict[str, MotorbusError]) -> None:
     """One cycle of it; who was told something from elsewhere meanwhile does not keep the others from braking."""
     orders: dict[str, Sequence[Exchange[Any]]] = {}
     for bus, part in parts.items():
@@ -54,7 +51,9 @@ def _cycle(parts: Mapping[str, Part], moment: float, failures: dict[str, Motorbu
             orders[bus] = part.orders(1)
         except MotorbusError as error:
             failures[bus] = error
-    told = yield Abreast({bus: parts[bus].cycle(sent, moment) for bus, sent in orders.items()}, dict)
+    told: Mapping[str, Any] = await Abreast(
+        {bus: parts[bus].cycle(sent, moment) for bus, sent in orders.items()}, dict
+    )
     for bus, found in told.items():
         if not isinstance(found, MotorbusError):
             parts[bus].take(found)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from motorbus.bus.base import BaseBus
 from motorbus.bus.blocking import Bus
 from motorbus.core.family import Positions, Quality, Train
-from motorbus.core.operation import Exchange, Operation, Pause, Together, outcome
+from motorbus.core.operation import Exchange, Pause, Together, outcome
 from motorbus.errors import (
     Faulted,
     LimitExceeded,
@@ -139,7 +139,7 @@ class Part:
         self.unsure = bool(self.left_out)
         return to
 
-    def cycle(self, orders: Sequence[Exchange[Any]], moment: float) -> Operation[list[Any]]:
+    async def cycle(self, orders: Sequence[Exchange[Any]], moment: float) -> list[Any]:
         """Send these from a moment of robot time on, then ask for all positions; what came of each exchange.
 
         Raises Faulted and Overloaded as `Watch.take`, before anything of this has left.
@@ -147,18 +147,18 @@ class Part:
         if (watch := self.watch) is not None:
             now = self.link.now()
             if watch.due(now, moment + self.origin - now) is not None:
-                yield from self._asked(watch, moment)
+                await self._asked(watch, moment)
         for pause in self._wait(moment + self.origin):
-            yield from pause
+            await pause
         self.began = self.link.now() - self.origin
         told: list[Any] = []
         wanted = (*orders, *self.reads)
         if self.abreast:
-            told = yield from Together([_kept(exchange) for exchange in wanted])
+            told = await Together([_kept(exchange) for exchange in wanted])
         else:
             for exchange in wanted:
                 try:
-                    told.append((yield from exchange))
+                    told.append(await exchange)
                 except LOST as error:
                     told.append(error)
         self.ended = self.link.now() - self.origin
@@ -174,7 +174,7 @@ class Part:
         now = link.now()
         if now < begins:  # else there is nothing to wait for
             for pause in self._wait(begins):
-                bus.run(iter(pause))
+                bus.run(pause)
             now = link.now()
         self.began = now - self.origin
 
@@ -187,7 +187,7 @@ class Part:
             while link.now() < moment:
                 pass
 
-    def _asked(self, watch: Watch, moment: float) -> Operation[None]:
+    async def _asked(self, watch: Watch, moment: float) -> None:
         """Ask who is due how he fares, while the wire is free anyway before a slot that begins at this moment.
 
         Who pushes too hard is told to stay where he is.
@@ -196,11 +196,11 @@ class Part:
         goals = {place.node: place.stay() for place in led}
         places = {place.node: place.zero + place.position * place.ratio for place in led}
         try:
-            yield from watch.asking(moment - self.now, goals, places)
+            await watch.asking(moment - self.now, goals, places)
         except Overloaded as error:
             for place in led:
                 if place.node == error.node:
-                    failure = yield from outcome(single.stop(place.axis))
+                    failure = await outcome(single.stop(place.axis))
                     if isinstance(failure, MotorbusError):
                         error.add_note(f"and it did not accept the stop that followed: {failure}")
             raise
@@ -271,7 +271,7 @@ class Part:
 
     # -- the beginning -------------------------------------------------------------------------------------------------
 
-    def begin(self, fresh: Sequence[Place]) -> Operation[None]:
+    async def begin(self, fresh: Sequence[Place]) -> None:
         """Give these torque without a jump, with the caps of the machine file, and see where they stand.
 
         Raises Interrupted when somebody else has told one of them something since its goal was set: nothing of this
@@ -282,12 +282,12 @@ class Part:
         for axis in axes:
             canary.check(axis)
         command = _claimed(fresh)
-        train = yield from train_of(self.bus, axes)
+        train = await train_of(self.bus, axes)
         try:
             for axis in axes:
-                yield from canary.unbroken(axis)
+                await canary.unbroken(axis)
             command.depart()
-            angles = yield from _begun(train, command, self.watch)
+            angles = await _begun(train, command, self.watch)
         except Faulted:
             raise
         except MotionError as error:
@@ -346,35 +346,35 @@ def _claimed(fresh: Iterable[Place]) -> Command:
     return command
 
 
-def _begun(train: Train, command: Command, watch: Watch | None) -> Operation[list[float]]:
+async def _begun(train: Train, command: Command, watch: Watch | None) -> list[float]:
     """Torque on, and as quick in following as the axis may be; where the device of each stands then (rad)."""
 
-    def ready() -> Operation[None]:
+    async def ready() -> None:
         for axis in command.axes:
-            yield from cap(axis)
+            await cap(axis)
         speeds = {axis.spec.node: axis.spec.rate_to_device(axis.spec.max_velocity) for axis in command.axes}
-        yield from train.begin({node: abs(speed) for node, speed in speeds.items()})
+        await train.begin({node: abs(speed) for node, speed in speeds.items()})
 
     try:
-        yield from command.watched(ready())
+        await command.watched(ready())
         if watch is not None:
-            yield from watch.begin(command.axes)
-        return (yield from Together([axis.able["position"](axis.device) for axis in command.axes]))
+            await watch.begin(command.axes)
+        return await Together([axis.able["position"](axis.device) for axis in command.axes])
     except BaseException:
         for axis in command.held():  # they may have torque, and go nowhere
             axis.arrives()
         raise
 
 
-def train_of(bus: BaseBus, axes: Sequence[AxisVerbs]) -> Operation[Train]:
+async def train_of(bus: BaseBus, axes: Sequence[AxisVerbs]) -> Train:
     """These axes of one bus, ready to be asked and told in a loop; nothing is written."""
-    train: Train = yield from axes[0].able["train"]([axis.device for axis in axes], rate=bus.rate)
+    train: Train = await axes[0].able["train"]([axis.device for axis in axes], rate=bus.rate)
     return train
 
 
-def _kept(exchange: Exchange[Any]) -> Operation[Any]:
+async def _kept(exchange: Exchange[Any]) -> Any:
     """Its value, or the error by which it was lost; every other error is raised when all have ended."""
-    found = yield from outcome(exchange)
+    found = await outcome(exchange)
     if isinstance(found, MotorbusError) and not isinstance(found, LOST):
         raise found
     return found

@@ -25,14 +25,14 @@ A collection of garbage may hold Python up for longer than a period. A program w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine, Generator, Iterable, Iterator, Mapping
+from collections.abc import Callable, Coroutine, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Concatenate, Generic, NamedTuple, ParamSpec, Protocol, Self, TypeVar, overload
 
 from motorbus.bus.blocking import Bus
 from motorbus.core.verbs import Said
 from motorbus.errors import MotorbusError
-from motorbus.motion.abreast import Abreast, AsyncConductor, BlockingConductor, Led, LedAsync
+from motorbus.motion.abreast import Abreast, AsyncConductor, BlockingConductor, Led, LedAsync, Works
 from motorbus.motion.body import Body
 from motorbus.motion.budget import RobotBudget
 from motorbus.motion.clamping import Policy
@@ -254,10 +254,10 @@ def _told(failure: MotorbusError, error: BaseException | None) -> None:
     error.add_note(f"and on leaving the loop: {failure}")
 
 
-def _carried(works: Generator[Abreast[Any], Any, T], run: Callable[[Abreast[Any]], Any]) -> T:
+def _carried(works: Works[T], run: Callable[[Abreast[Any]], Any]) -> T:
     """Carry out one piece of work after the other, and give what they come to."""
     try:
-        work = next(works)
+        work = works.send(None)
         while True:
             try:
                 told = run(work)
@@ -270,11 +270,9 @@ def _carried(works: Generator[Abreast[Any], Any, T], run: Callable[[Abreast[Any]
         return found
 
 
-async def _awaited(
-    works: Generator[Abreast[Any], Any, T], run: Callable[[Abreast[Any]], Coroutine[Any, Any, Any]]
-) -> T:
+async def _awaited(works: Works[T], run: Callable[[Abreast[Any]], Coroutine[Any, Any, Any]]) -> T:
     try:
-        work = next(works)
+        work = works.send(None)
         while True:
             try:
                 told = await run(work)
@@ -314,7 +312,7 @@ class Errand(NamedTuple, Generic[T]):
     course: Course[T]
     rate: float
     axes: tuple[str, ...]
-    before: Abreast[Any] | None = None
+    before: Callable[[], Abreast[Any]] | None = None
     jerk: float | None = None
     endless: bool = False
     failed: Callable[[MotorbusError], None] | None = None
@@ -354,7 +352,7 @@ def _blocking(machine: Any, errand: Errand[T]) -> T:
     course, how = errand.course, {"jerk": errand.jerk, "policy": errand.policy}
     with _telling(errand), Loop(machine, machine.conductor, errand.rate, errand.axes, **how) as loop:
         if errand.before is not None:
-            machine.conductor.run(errand.before)
+            machine.conductor.run(errand.before())
         try:
             for state in loop:
                 if not course.step(loop, state):
@@ -370,7 +368,7 @@ async def _awaiting(machine: Any, errand: Errand[T]) -> T:
     with _telling(errand):
         async with AsyncLoop(machine, machine.conductor, errand.rate, errand.axes, **how) as loop:
             if errand.before is not None:
-                await machine.conductor.run(errand.before)
+                await machine.conductor.run(errand.before())
             async for state in loop:
                 if not course.step(loop, state):
                     break

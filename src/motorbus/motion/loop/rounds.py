@@ -4,18 +4,18 @@
     a round    goals out, positions in; before it, in a cycle of its own, torque for axes with their first goal
     leaving    axes that are on their way brake
 
-Each is a generator that yields work on several buses and is sent what came of it. Nothing moves before a goal is set.
+Each is a coroutine that awaits work on several buses. Nothing moves before a goal is set.
 A goal that must not be sent ends its round before anything leaves. Who was stopped from elsewhere, or told to move,
 gets no goal any more: who told it last has the command. So it is with two loops that lead the same axis.
 """
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 from motorbus.bus.blocking import Bus, exchange_on
-from motorbus.core.operation import Exchange, Operation, Report
+from motorbus.core.operation import Exchange, Report
 from motorbus.errors import Faulted, Interrupted, LinkLost, MotorbusError, Overloaded, RequestError
 from motorbus.motion import limits
 from motorbus.motion.abreast import Abreast, settled
@@ -25,7 +25,7 @@ from motorbus.motion.capabilities import AxisVerbs
 from motorbus.motion.clamping import Clamped, Policy, Tidings, check_policy
 from motorbus.motion.command import Command
 from motorbus.motion.limits import Device
-from motorbus.motion.loop.braking import Works, braked, latest, refusals
+from motorbus.motion.loop.braking import braked, latest, refusals
 from motorbus.motion.loop.cycle import Part, train_of
 from motorbus.motion.loop.errors import as_number, check_loop, silence, stopped
 from motorbus.motion.loop.grid import Grid, Statistics
@@ -98,14 +98,14 @@ class Rounds:
 
     # -- entering ------------------------------------------------------------------------------------------------------
 
-    def entering(self) -> Works:
+    async def entering(self) -> None:
         """Ask what must be known, refuse a rate that cannot be, and see where everybody is."""
         if self._entered:
             raise RequestError(
                 "the loop was entered before", expected="a new one for each `with`", advice="nothing was sent"
             )
         parts = self._body.by_bus(self._led)
-        opened = yield Abreast({bus: self._opening(bus, there) for bus, there in parts.items()}, settled)
+        opened = await Abreast({bus: self._opening(bus, there) for bus, there in parts.items()}, settled)
         self.budget = RobotBudget(self.rate, {bus: found[2] for bus, found in opened.items()}, self.without)
         refuse_above(self.budget)
         for bus, (train, devices, _) in opened.items():
@@ -117,24 +117,24 @@ class Rounds:
         self._one = next(iter(self.parts.values())) if len(self.parts) == 1 else None
         self.places = {name: place for name in self._led for place in self._placed() if place.name == name}
         self._all = tuple(self.places.values())
-        yield from self._first_look()
+        await self._first_look()
         self._askable = self.places
         self._entered = True
 
-    def _opening(self, bus: str, there: list[AxisVerbs]) -> Operation[Any]:
+    async def _opening(self, bus: str, there: list[AxisVerbs]) -> Any:
         try:
-            return (yield from self._opened(bus, there))
+            return await self._opened(bus, there)
         except MotorbusError as error:
             name = next((axis.name for axis in there if axis.spec.node == error.node), bus)
             raise named(name, error) from error
 
-    def _opened(self, bus: str, there: list[AxisVerbs]) -> Operation[Any]:
+    async def _opened(self, bus: str, there: list[AxisVerbs]) -> Any:
         face = self._body.buses[bus]
-        train = yield from train_of(face, there)
+        train = await train_of(face, there)
         devices: dict[str, Device] = {}
         angles: dict[int, float] = {}
         for axis in there:
-            device = devices[axis.name] = yield from limits.of_device(axis)
+            device = devices[axis.name] = await limits.of_device(axis)
             angles[axis.spec.node] = 0.0 if device is None else min(max(0.0, device[0]), device[1])
         return train, devices, bus_budget(face, train, [axis.name for axis in there], angles)
 
@@ -146,11 +146,11 @@ class Rounds:
     def _placed(self) -> Iterable[Place]:
         return (place for part in self.parts.values() for place in part.places.values())
 
-    def _first_look(self) -> Works:
+    async def _first_look(self) -> None:
         unheard, begun, looks = set(self.places), self.now, 0
         while looks <= PATIENCE or self.now < begun + SILENCE:
             looks += 1
-            told = yield Abreast({bus: part.cycle((), 0.0) for bus, part in self.parts.items()}, settled)
+            told = await Abreast({bus: part.cycle((), 0.0) for bus, part in self.parts.items()}, settled)
             for bus, part in self.parts.items():
                 missing = part.take(told[bus])
                 unheard -= {place.name for place in part.places.values()} - set(missing)
@@ -181,7 +181,7 @@ class Rounds:
             raise RequestError(f"{name} {why}", expected=f"one of {known}", advice="nothing was sent")
         return as_number(name, goal)
 
-    def round(self) -> Generator[Abreast[Any], Any, LoopState]:
+    async def round(self) -> LoopState:
         """One cycle. Raises LimitExceeded for a goal that must not be sent: then nothing was, and it may go on.
 
         It is raised at the end of the cycle for an axis that is held back: that one stays, and the others go on. Raises
@@ -196,11 +196,11 @@ class Rounds:
         periods = max(1, grid.upcoming(now) - self._stepped)
         self._judge(periods)
         if self._clamps:
-            yield from self._tell_clamps(now)
+            await self._tell_clamps(now)
         if self._fresh and (fresh := self._unbegun()):
             grid.book(now)
             try:
-                yield from self._begin(fresh)
+                await self._begin(fresh)
             finally:
                 now, periods = self.now, 1
                 grid.forgive(now)
@@ -211,7 +211,7 @@ class Rounds:
         if self.buses:
             told = self._exchange(self.buses, orders, moment)
         else:
-            told = yield Abreast(
+            told = await Abreast(
                 {bus: part.cycle(orders[bus], moment) for bus, part in self.parts.items()}, dict
             )
         return self._taken(told, moment, grid.number)
@@ -262,7 +262,7 @@ class Rounds:
             if place.asked is not None:
                 place.judge(periods)
 
-    def _tell_clamps(self, now: float) -> Works:
+    async def _tell_clamps(self, now: float) -> None:
         """Count what was clamped, and tell of it where it has not been told of lately."""
         events: dict[str, list[Clamped]] = {}
         for event in self._clamps:
@@ -271,7 +271,7 @@ class Rounds:
                 events.setdefault(self.places[event.axis].axis.spec.bus, []).append(event)
         self._clamps.clear()
         if events:
-            yield Abreast({bus: _reported(found) for bus, found in events.items()}, settled)
+            await Abreast({bus: _reported(found) for bus, found in events.items()}, settled)
 
     def _release_lost(self) -> None:
         lost = [name for part in self.parts.values() for name in part.release_lost()]
@@ -293,10 +293,10 @@ class Rounds:
             if (found := [one for one in part.places.values() if one.asked is not None and not one.begun])
         }
 
-    def _begin(self, fresh: Mapping[str, list[Place]]) -> Works:
+    async def _begin(self, fresh: Mapping[str, list[Place]]) -> None:
         self._fresh = True
         try:
-            yield Abreast({bus: self.parts[bus].begin(there) for bus, there in fresh.items()}, settled)
+            await Abreast({bus: self.parts[bus].begin(there) for bus, there in fresh.items()}, settled)
         except MotorbusError:
             for part in self.parts.values():
                 part.release_unbegun()
@@ -363,7 +363,7 @@ class Rounds:
 
     # -- leaving -------------------------------------------------------------------------------------------------------
 
-    def leaving(self) -> Works:
+    async def leaving(self) -> None:
         """Those that follow a goal and are on their way brake, as hard as they may, and stay where that ends.
 
         Who was told something from elsewhere is left alone, and so is whoever can be told nothing any more. Raises what
@@ -372,7 +372,7 @@ class Rounds:
         grid, self._grid = self._grid, None
         self.refuse()
         if grid is not None:
-            yield from braked(self.parts, grid)
+            await braked(self.parts, grid)
 
     def refuse(self) -> None:
         """It takes no goals and has no cycles any more."""
@@ -389,6 +389,6 @@ class Rounds:
             )
 
 
-def _reported(events: Iterable[Clamped]) -> Operation[None]:
+async def _reported(events: Iterable[Clamped]) -> None:
     for event in events:
-        yield from Report(event)
+        await Report(event)

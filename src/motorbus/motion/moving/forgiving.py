@@ -9,16 +9,16 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, Final
 
-from motorbus.core.operation import Exchange, Operation, Together, outcome
+from motorbus.core.operation import Exchange, Together, outcome
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown, WireError
 
 LOST: Final = (NoReply, WireError, OutcomeUnknown)
 """The errors of an exchange that may be forgotten."""
 
 
-def forgiven(exchanges: Iterable[Exchange[Any]]) -> Operation[list[Any]]:
+async def forgiven(exchanges: Iterable[Exchange[Any]]) -> list[Any]:
     """What came of each; one that was lost is an error among the values, the first error of another kind is raised."""
-    told = yield from Together([outcome(one) for one in exchanges])
+    told = await Together([outcome(one) for one in exchanges])
     for one in told:
         if isinstance(one, MotorbusError) and not isinstance(one, LOST):
             raise one

@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import copysign, isfinite
 from typing import TYPE_CHECKING
 
-from motorbus.core.operation import Operation, Report
+from motorbus.core.operation import Report
 from motorbus.errors import RequestError
 from motorbus.motion import limits, reckoning
 from motorbus.motion.clamping import Clamped, Policy, check_policy, kept
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from motorbus.motion.capabilities import AxisVerbs
 
 
-def jog(axis: AxisVerbs, velocity: float, seconds: float, *, policy: Policy = "reject") -> Operation[float]:
+async def jog(axis: AxisVerbs, velocity: float, seconds: float, *, policy: Policy = "reject") -> float:
     """Move at a velocity (rad/s, m/s, with its sign) for so long (s), starting and stopping within it.
 
     Returns the way that was gone, as `move_by`. Raises LimitExceeded, and nothing is sent, when the way would lead out
@@ -30,15 +30,15 @@ def jog(axis: AxisVerbs, velocity: float, seconds: float, *, policy: Policy = "r
     check_policy(policy)
     if "train" not in axis.able:
         _check_led(axis, policy)
-        return (yield from reckoning.jog(axis, velocity, seconds))
+        return await reckoning.jog(axis, velocity, seconds)
     way, _ = way_of_jog(axis, velocity, seconds)
-    clamped = (yield from _clamped(axis, way)) if policy == "clamp" else None
+    clamped = await _clamped(axis, way) if policy == "clamp" else None
     if clamped is None:
-        return (yield from move_by(axis, way, velocity=abs(velocity)))
-    yield from Report(clamped)
+        return await move_by(axis, way, velocity=abs(velocity))
+    await Report(clamped)
     if clamped.given == clamped.asked - way:
         return 0.0
-    moved = yield from move_axis(axis, clamped.given, velocity=abs(velocity))
+    moved = await move_axis(axis, clamped.given, velocity=abs(velocity))
     arrived = moved.axes[axis.name]
     return arrived.present - arrived.stood
 
@@ -58,10 +58,10 @@ def way_of_jog(axis: AxisVerbs, velocity: float, seconds: float) -> tuple[float,
     return copysign(own.acceleration * ramp * (seconds - ramp), velocity), own
 
 
-def _clamped(axis: AxisVerbs, way: float) -> Operation[Clamped | None]:
+async def _clamped(axis: AxisVerbs, way: float) -> Clamped | None:
     """How far a jog may lead it where that is less than the whole way: nowhere, where it stands at the end already."""
-    here = axis.spec.from_device((yield from axis.able["position"](axis.device)))
-    device = yield from limits.of_device(axis)
+    here = axis.spec.from_device(await axis.able["position"](axis.device))
+    device = await limits.of_device(axis)
     to = here + way
     _, told = kept(axis.name, axis.spec, to, policy="clamp", device=device)
     if told is None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from motorbus.core.operation import Operation, Together
+from motorbus.core.operation import Together
 from motorbus.errors import Interrupted, MotorbusError, RequestError
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.command import Command
@@ -78,10 +78,10 @@ class Journey:
         buses = dict.fromkeys(axis.spec.bus for axis in self._axes.values())
         return Abreast({bus: self.on(bus) for bus in buses}, self.combine)
 
-    def on(self, bus: str) -> Operation[list[Gone]]:
+    async def on(self, bus: str) -> list[Gone]:
         """All that is to do on one bus."""
         there = {party: axes for party, axes in self._parties.items() if axes[0].spec.bus == bus}
-        return (yield from Together([parts.part(self, party, axes) for party, axes in there.items()]))
+        return await Together([parts.part(self, party, axes) for party, axes in there.items()])
 
     def combine(self, results: Mapping[str, Any]) -> Moved:
         """What came of the whole. Raises what went wrong first, with a note for each axis that did not stop."""
@@ -144,9 +144,9 @@ class Journey:
         """How a part keeps time with the others."""
         return self._beat.of(party, self._origins[bus])
 
-    def meet(self, party: str, facts: Mapping[str, Fact]) -> Operation[Mapping[str, Fact]]:
+    async def meet(self, party: str, facts: Mapping[str, Fact]) -> Mapping[str, Fact]:
         """Say where these axes stand, and get to know where all do."""
-        told = yield from self._facts.meet(party, facts)
+        told = await self._facts.meet(party, facts)
         return {name: fact for one in told.values() for name, fact in one.items()}
 
     def outlined(self, facts: Mapping[str, Fact]) -> Planned:

@@ -6,7 +6,7 @@ Both go through the same steps, and both end in one of two ways: all of it has a
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from inspect import GEN_CLOSED, getgeneratorstate
+from inspect import CORO_CLOSED, getcoroutinestate
 from typing import TYPE_CHECKING, Any, Final
 
 from motorbus.core.family import Positions
@@ -47,20 +47,20 @@ NEAR: Final = 3
 """Its smallest steps; so near to its goal no axis need come."""
 
 
-def part(journey: Journey, party: str, axes: Sequence[AxisVerbs]) -> Operation[Gone]:
+async def part(journey: Journey, party: str, axes: Sequence[AxisVerbs]) -> Gone:
     """One part of a journey, from the first look to the arrival. Whatever ends it early, its axes are told to stop."""
     led = "train" in axes[0].able
     work: LedPart | OwnPart = LedPart(journey, party, axes) if led else OwnPart(journey, party, axes[0])
     journey.commands.append(work.command)
-    yield from afterwards(_failing(journey, axes, work.run()), lambda: _ended(journey, work))
+    await afterwards(_failing(journey, axes, work.run()), lambda: _ended(journey, work))
     assert work.gone is not None
     return work.gone
 
 
-def _failing(journey: Journey, axes: Sequence[AxisVerbs], work: Operation[None]) -> Operation[None]:
+async def _failing(journey: Journey, axes: Sequence[AxisVerbs], work: Operation[None]) -> None:
     """Let the other parts know when this one fails; whose device it was is told by the name of the axis."""
     try:
-        yield from work
+        await work
     except MotorbusError as error:
         told = _told(journey, axes, error)
         journey.fail(told)
@@ -86,10 +86,10 @@ def _told(journey: Journey, axes: Sequence[AxisVerbs], error: MotorbusError) -> 
     return named(whose[0], error) if whose else error
 
 
-def _ended(journey: Journey, work: LedPart | OwnPart) -> Operation[None]:
+async def _ended(journey: Journey, work: LedPart | OwnPart) -> None:
     """Stop what was begun and has not arrived."""
     if work.begun and work.gone is None:
-        journey.unstopped.update((yield from work.stop()))
+        journey.unstopped.update(await work.stop())
 
 
 class LedPart:
@@ -105,19 +105,19 @@ class LedPart:
         self._axes: Final = axes
         self._bus: Final = axes[0].bus
 
-    def stop(self) -> Operation[dict[str, MotorbusError]]:
+    async def stop(self) -> dict[str, MotorbusError]:
         """See `Command.stop`."""
-        return (yield from self.command.stop())
+        return await self.command.stop()
 
-    def run(self) -> Operation[None]:
+    async def run(self) -> None:
         """See `part`."""
         journey, axes = self._journey, self._axes
-        train = yield from self._train()
-        rate, looked = yield from self._looked(train)
-        facts = yield from journey.meet(self._party, looked)
+        train = await self._train()
+        rate, looked = await self._looked(train)
+        facts = await journey.meet(self._party, looked)
         seat = journey.seat(self._party, axes[0].spec.bus)
         shortest = journey.outlined(facts).course.duration
-        planned = journey.agreed(facts, (yield from seat.agreed(shortest, _any)))
+        planned = journey.agreed(facts, await seat.agreed(shortest, _any))
         stream = Stream(
             axes,
             train,
@@ -131,33 +131,33 @@ class LedPart:
             patience=SETTLE if journey.timeout is None else journey.timeout,
             reports=journey.reports(self._party),
         )
-        yield from self._ready(train, facts)
+        await self._ready(train, facts)
         lead = stream.lead(self._bus)
-        streamed = yield from stream.run((yield from seat.start(lead, self._again(train))), lead)
+        streamed = await stream.run(await seat.start(lead, lambda: self._again(train)), lead)
         for axis in axes:
             axis.arrives()
         arrived = {axis.name: _seen(axis, facts[axis.name], planned, streamed) for axis in axes}
         self.gone = Gone(arrived, streamed.tracks, streamed.cycles)
 
-    def _again(self, train: Any) -> Operation[None]:
+    async def _again(self, train: Any) -> None:
         """Ask where they are: others may have needed long, and no goal leaves by what was so a while ago."""
-        yield from Together([outcome(one) for one in train.positions])
+        await Together([outcome(one) for one in train.positions])
 
-    def _train(self) -> Operation[Any]:
+    async def _train(self) -> Any:
         """Those who are led, with all known of them that a cycle needs."""
         axes = self._axes
         try:
-            return (yield from axes[0].able["train"]([axis.device for axis in axes], rate=self._bus.rate))
+            return await axes[0].able["train"]([axis.device for axis in axes], rate=self._bus.rate)
         except NoReply as error:
             silent = [axis for axis in axes if axis.spec.node == error.node]
             if not silent:
                 raise
             raise does_not_begin(silent[0]) from error
 
-    def _looked(self, train: Any) -> Operation[tuple[float, dict[str, Fact]]]:
+    async def _looked(self, train: Any) -> tuple[float, dict[str, Fact]]:
         """At which rate they can be led (Hz), where they stand, and how far and how finely their devices go."""
-        angles = yield from self._angles(train)
-        found = yield from Together([limits.of_device(axis) for axis in self._axes])
+        angles = await self._angles(train)
+        found = await Together([limits.of_device(axis) for axis in self._axes])
         devices = {axis.spec.node: device for axis, device in zip(self._axes, found, strict=True)}
         possible = {node: _inside(angles[node], device) for node, device in devices.items()}
         steps = grains(train, possible)
@@ -168,43 +168,43 @@ class LedPart:
         }
         return rate, facts
 
-    def _angles(self, train: Any) -> Operation[dict[int, float]]:
+    async def _angles(self, train: Any) -> dict[int, float]:
         """Where each stands (rad of the device), by id. Raises NoReply for one that is silent."""
         angles: dict[int, float] = {}
         for _ in range(TRIES):
-            for one in (yield from forgiven(train.positions)):
+            for one in await forgiven(train.positions):
                 angles.update(one.values if isinstance(one, Positions) else {})
             missing = [axis for axis in self._axes if axis.spec.node not in angles]
             if not missing:
                 return angles
         raise does_not_begin(missing[0])
 
-    def _ready(self, train: Any, facts: Mapping[str, Fact]) -> Operation[None]:
+    async def _ready(self, train: Any, facts: Mapping[str, Fact]) -> None:
         """Torque on where they stand, and as quick in following as the axis may be."""
-        angles = yield from self._angles(train)
+        angles = await self._angles(train)
         for axis in self._axes:
             _check_still(axis, facts[axis.name].position, axis.spec.from_device(angles[axis.spec.node]))
-            yield from canary.unbroken(axis)
+            await canary.unbroken(axis)
         self.command.depart()
         self.begun = True
         try:
-            yield from self.command.watched(self._begin(train))
+            await self.command.watched(self._begin(train))
         except MotorbusError as error:
             if (lost := self.command.lost()) is not None:  # what was let go meanwhile tells that in many ways
                 raise lost from error
             raise
-        yield from self.watch.begin(self._axes)
+        await self.watch.begin(self._axes)
 
     def _within(self, axis: AxisVerbs, fact: Fact, planned: Planned) -> float:
         """How near to its goal it must come (rad of the device)."""
         asked = self._journey.tolerance
         return _within(axis, fact, planned) if asked is None else asked * abs(axis.spec.ratio)
 
-    def _begin(self, train: Any) -> Operation[None]:
+    async def _begin(self, train: Any) -> None:
         for axis in self._axes:
-            yield from single.cap(axis)
+            await single.cap(axis)
         speeds = {axis.spec.node: axis.spec.rate_to_device(axis.spec.max_velocity) for axis in self._axes}
-        yield from train.begin({node: abs(speed) for node, speed in speeds.items()})
+        await train.begin({node: abs(speed) for node, speed in speeds.items()})
 
 
 class OwnPart:
@@ -222,33 +222,33 @@ class OwnPart:
         """Whether it may have been told to move."""
         return self._timing.moment is not None
 
-    def stop(self) -> Operation[dict[str, MotorbusError]]:
+    async def stop(self) -> dict[str, MotorbusError]:
         """See `Command.stop`. Its driver has stopped it already, and tells nobody whether that was accepted."""
-        return (yield from self.command.stop(anew=self._axis.under_way))
+        return await self.command.stop(anew=self._axis.under_way)
 
-    def run(self) -> Operation[None]:
+    async def run(self) -> None:
         """See `part`."""
         axis, timing = self._axis, self._timing
         axis.refuse_under_way()
         assert axis.reckoning is not None
         stood = axis.reckoning.known(axis.name)
-        yield from timing.meet(stood)
+        await timing.meet(stood)
         way = timing.planned.goals[axis.name] - stood
         if abs(way) <= NO_WAY:
-            yield from timing.agreed(0.0, _any)
-            yield from timing.start(0.0)
+            await timing.agreed(0.0, _any)
+            await timing.start(0.0)
             self.gone = self._stayed(stood)
             return
         turned = self._turned(way)
-        told = yield from Together([turned, self._watched(turned)])
+        told = await Together([turned, self._watched(turned)])
         assert told[0] is not None
         self.gone = self._arrived(stood, told[0])
 
-    def _turned(self, way: float) -> Operation[Turned]:
+    async def _turned(self, way: float) -> Turned:
         axis, spec, movement = self._axis, self._axis.spec, Movement()
         try:
             self.command.depart(movement)
-            turned: Turned = yield from axis.able["keep_time"](
+            turned: Turned = await axis.able["keep_time"](
                 axis.device,
                 way * spec.ratio,
                 self._timing,
@@ -264,23 +264,23 @@ class OwnPart:
             raise
         return turned
 
-    def _watched(self, turned: Operation[Turned]) -> Operation[None]:
+    async def _watched(self, turned: Operation[Turned]) -> None:
         """While it is under way: stop it when another part fails, and tell how far all of it is."""
         journey, timing = self._journey, self._timing
         reported = -SHOWN
-        while getgeneratorstate(turned) != GEN_CLOSED:  # however that came to its end
-            now = yield from Pause(LOOK)
+        while getcoroutinestate(turned) != CORO_CLOSED:  # however that came to its end
+            now = await Pause(LOOK)
             if timing.moment is None:
                 continue
             if (lost := self._overtaken()) is not None:
                 journey.fail(lost)
             if journey.fate.failure is not None:
-                journey.unstopped.update((yield from self.command.stop()))
+                journey.unstopped.update(await self.command.stop())
                 return
             since = now - timing.moment
             if journey.reports(timing.party) and reported + SHOWN <= since <= timing.duration:
                 reported = since
-                yield from Report(Progress(round(1000 * since), round(1000 * timing.duration), "moving"))
+                await Report(Progress(round(1000 * since), round(1000 * timing.duration), "moving"))
 
     def _overtaken(self) -> MotorbusError | None:
         """The error when somebody else has stopped it. Its driver looks for that more seldom, and stops it itself."""
@@ -320,23 +320,23 @@ class Kept:
         self._seat: Final[Seat] = journey.seat(party, axis.spec.bus)
         self._facts: Mapping[str, Fact] = {}
 
-    def meet(self, position: float) -> Operation[None]:
+    async def meet(self, position: float) -> None:
         """Say where it stands (rad, m), and get to know what the movement shall be."""
-        self._facts = yield from self._journey.meet(self.party, {self._axis.name: Fact(position)})
+        self._facts = await self._journey.meet(self.party, {self._axis.name: Fact(position)})
         self.planned = self._journey.outlined(self._facts)
 
-    def agreed(self, shortest: float, fitted: Callable[[float], float]) -> Operation[float]:
+    async def agreed(self, shortest: float, fitted: Callable[[float], float]) -> float:
         """See `core.timing.Timing`."""
         self._journey.check_asked(self._axis.name, shortest)
         least = max(shortest, self.planned.course.duration)
-        self.duration = yield from self._seat.agreed(least, lambda others: max(others, fitted(others)))
+        self.duration = await self._seat.agreed(least, lambda others: max(others, fitted(others)))
         self._journey.needs[self._axis.name] = max(shortest, fitted(least))
         self.planned = self._journey.agreed(self._facts, self.duration)
         return self.duration
 
-    def start(self, lead: float) -> Operation[float]:
+    async def start(self, lead: float) -> float:
         """See `core.timing.Timing`."""
-        moment = yield from self._seat.start(lead)
+        moment = await self._seat.start(lead)
         self._journey.check()  # all were ready, and one of them may have been stopped since
         self.moment = moment
         return moment

@@ -189,7 +189,7 @@ class Stream:
         """s before the start at which the first goals must leave, so that they have arrived then."""
         return sum(bus.family.air_time(one, bus.rate) for one in self._train.goals(self._goals(0.0)))
 
-    def run(self, start: float, lead: float = 0.0) -> Operation[Streamed]:
+    async def run(self, start: float, lead: float = 0.0) -> Streamed:
         """Lead them along the course, which begins at `start` (s on the link's clock), and see them arrive.
 
         Goals leave `lead` s before their slot. Raises Stalled for an axis that does not follow or arrive, NoReply for
@@ -198,98 +198,98 @@ class Stream:
         """
         self._start = start
         self._lead = lead
-        yield from Together([self._ending(self._tell()), self._ending(self._look())])
-        yield from self._settle()
+        await Together([self._ending(self._tell()), self._ending(self._look())])
+        await self._settle()
         tracks = {name: _track(*rows) for name, rows in self._tracks.items()}
         cycles = Cycles(1 / self._grid.period, self._cycles, self._skipped, self._lost)
         return Streamed(tracks, cycles, self._first)
 
-    def _ending(self, work: Operation[None]) -> Operation[None]:
+    async def _ending(self, work: Operation[None]) -> None:
         """When one of the two ends, however that comes, the other one ends too."""
         try:
-            yield from work
+            await work
         finally:
             self._over = True
 
-    def _tell(self) -> Operation[None]:
+    async def _tell(self) -> None:
         """A goal at each slot of the grid, whatever becomes of the readings."""
         slot = 0
         while not self._over:
-            yield from self._until(slot)
+            await self._until(slot)
             if self._over:
                 return  # an axis does not follow, or nobody hears it
             self._fate.check()
             last = slot == self._grid.last
             at = self._course.duration if last else (slot + 1) * self._grid.period
-            yield from self._order(at)
+            await self._order(at)
             if slot == 0:
-                self._first = (yield from Pause(0)) - self._start
+                self._first = await Pause(0) - self._start
             self._cycles += 1
             if last:
                 return
-            reached = yield from self._next(slot)
+            reached = await self._next(slot)
             self._skipped += reached - slot - 1
             if (gap := (reached - slot) * self._grid.period) > HELD_UP:
                 raise held_up(gap)
             slot = reached
 
-    def _look(self) -> Operation[None]:
+    async def _look(self) -> None:
         """A reading at each slot, behind the goal. One that has to wait for a doubtful device makes no goal late."""
         slot = 0
         while not self._over:
-            yield from self._until(slot)
-            yield from self._read()
+            await self._until(slot)
+            await self._read()
             for axis in self._axes.values():
                 if self._is_behind(axis):
-                    raise (yield from self._stalled(axis))
-            yield from self._ask()
-            yield from self._report(slot * self._grid.period)
-            slot = yield from self._next(slot)
+                    raise await self._stalled(axis)
+            await self._ask()
+            await self._report(slot * self._grid.period)
+            slot = await self._next(slot)
 
-    def _until(self, slot: int) -> Operation[None]:
+    async def _until(self, slot: int) -> None:
         """Wait for a slot. Nobody may wait between this and what is sent, or others go first."""
         due = self._start - self._lead + slot * self._grid.period
-        yield from Pause(max(0.0, due - (yield from Pause(0))))
+        await Pause(max(0.0, due - await Pause(0)))
 
-    def _next(self, slot: int) -> Operation[int]:
-        return self._grid.after(slot, (yield from Pause(0)) + self._lead - self._start)
+    async def _next(self, slot: int) -> int:
+        return self._grid.after(slot, await Pause(0) + self._lead - self._start)
 
-    def _order(self, at: float) -> Operation[None]:
+    async def _order(self, at: float) -> None:
         try:
-            yield from forgiven([self._command.guarded(one) for one in self._train.goals(self._goals(at))])
+            await forgiven([self._command.guarded(one) for one in self._train.goals(self._goals(at))])
         except Refused as error:
             if error.reason in ("step", "velocity") and error.node in self._axes:
-                raise (yield from self._stalled(self._axes[error.node])) from error
-            if error.reason == "stale" and (gap := self._gaps.lately((yield from Pause(0)))):
+                raise await self._stalled(self._axes[error.node]) from error
+            if error.reason == "stale" and (gap := self._gaps.lately(await Pause(0))):
                 raise held_up(gap) from error
             raise
         except Interrupted:
             if self._watch.fault is None:  # else who looks is about to raise that
                 raise
         else:
-            self._gaps.left((yield from Pause(0)))
+            self._gaps.left(await Pause(0))
 
     def _goals(self, at: float) -> dict[int, float]:
         """The goals (rad of the device) for a moment of the course, by id."""
         places = self._course.positions(at)
         return {node: axis.spec.to_device(places[axis.name]) for node, axis in self._axes.items()}
 
-    def _read(self) -> Operation[None]:
+    async def _read(self) -> None:
         """Read the positions, and keep what was heard."""
-        told = yield from forgiven(self._train.positions)
+        told = await forgiven(self._train.positions)
         heard = {node for one in told if isinstance(one, Positions) for node in self._keep(one)}
-        now = yield from Pause(0)
+        now = await Pause(0)
         for node in self._axes.keys() - heard:
             self._lost += 1
             self._check_silent(node, now)
 
-    def _ask(self) -> Operation[None]:
+    async def _ask(self) -> None:
         """How one of them fares, when it is his turn and there is room before the next slot."""
-        now = yield from Pause(0)
+        now = await Pause(0)
         since = now - self._start
         slack = self._grid.period - (since + self._lead) % self._grid.period
         goals = self._goals(min(since, self._course.duration))
-        yield from self._watch.asking(slack, goals, self._places)
+        await self._watch.asking(slack, goals, self._places)
 
     def _keep(self, found: Positions) -> set[int]:
         since = found.at - self._start
@@ -306,38 +306,38 @@ class Stream:
         self._places.update(found.values)
         return set(found.values)
 
-    def _report(self, since: float) -> Operation[None]:
+    async def _report(self, since: float) -> None:
         if self._reports and since >= self._reported:
             self._reported = since + SHOWN
             done, total = round(1000 * since), round(1000 * self._course.duration)
-            yield from Report(Progress(done, total, "moving"))
+            await Report(Progress(done, total, "moving"))
 
     # -- the end of it -------------------------------------------------------------------------------------------------
 
-    def _settle(self) -> Operation[None]:
+    async def _settle(self) -> None:
         """Read positions until all are where they should be, and have come to rest."""
         period = max(self._grid.period, 0.005)
         end = self._start + self._course.duration
-        yield from Pause(max(0.0, end - (yield from Pause(0))))
+        await Pause(max(0.0, end - await Pause(0)))
         exact = False
         while True:
-            yield from self._read()
-            now = yield from Pause(0)
+            await self._read()
+            now = await Pause(0)
             exact = exact or all(self._off(axis) <= STILL for axis in self._axes.values())
             if exact and all(self._arrived(axis, now - end) for axis in self._axes.values()):
                 break
             if now - end > self._patience:
-                yield from self._check_arrived()
-            yield from self._ask()
+                await self._check_arrived()
+            await self._ask()
             self._fate.check()
             self._command.check()
             if not exact:
-                yield from self._order(self._course.duration)  # the last goal may have been lost on the wire
+                await self._order(self._course.duration)  # the last goal may have been lost on the wire
                 exact = True
-            yield from Pause(period)
+            await Pause(period)
         if self._reports:
             total = round(1000 * self._course.duration)
-            yield from Report(Progress(total, total, "moving"))
+            await Report(Progress(total, total, "moving"))
 
     def _arrived(self, axis: AxisVerbs, since: float) -> bool:
         """Whether it was seen in position after the end, twice at the same place; when time is up, once."""
@@ -361,20 +361,20 @@ class Stream:
         _, goals, presents = self._tracks[axis.name]
         return bool(goals) and abs(goals[-1] - presents[-1]) > self._allowed[axis.name]
 
-    def _stalled(self, axis: AxisVerbs) -> Operation[MotorbusError]:
+    async def _stalled(self, axis: AxisVerbs) -> MotorbusError:
         """The error for one that does not follow; raises what is the matter with it, if it tells that."""
-        gap = self._gaps.lately((yield from Pause(0)))
-        yield from self._watch.examine(axis)
+        gap = self._gaps.lately(await Pause(0))
+        await self._watch.examine(axis)
         if gap:
             return held_up(gap)
         goal, present = (row[-1] for row in self._tracks[axis.name][1:])
         return behind(axis, goal, present, self._allowed[axis.name], self._watch.alarms(axis))
 
-    def _check_arrived(self) -> Operation[None]:
+    async def _check_arrived(self) -> None:
         """Raise Stalled for those that are not in position, or what is the matter with one of them."""
         short = [axis for axis in self._axes.values() if self._off(axis) > self._within[axis.name]]
         for axis in short:
-            yield from self._watch.examine(axis)
+            await self._watch.examine(axis)
         if short:
             near = self._within[short[0].name] / abs(short[0].spec.ratio)
             presents = {name: rows[2] for name, rows in self._tracks.items()}

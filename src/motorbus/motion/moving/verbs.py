@@ -11,7 +11,7 @@ from math import copysign, isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
 from motorbus.core.entry import shown
-from motorbus.core.operation import Operation, outcome
+from motorbus.core.operation import outcome
 from motorbus.errors import RequestError
 from motorbus.motion import limits, reckoning
 from motorbus.motion.abreast import Abreast
@@ -184,14 +184,14 @@ def replay(
     journey = Journey(plan.axes, plan, body.origins, rate)
     buses = dict.fromkeys(axis.spec.bus for axis in plan.axes.values())
 
-    def on(bus: str) -> Operation[list[object]]:
+    async def on(bus: str) -> list[object]:
         try:
-            yield from approach.on(bus)
+            await approach.on(bus)
         except BaseException as error:
             journey.fail(approach.fate.failure or error)
             journey.unstopped.update(approach.unstopped)
             raise
-        return list((yield from journey.on(bus)))
+        return list(await journey.on(bus))
 
     return Abreast({bus: on(bus) for bus in buses}, journey.combine)
 
@@ -246,7 +246,7 @@ def _replayed(
 # -- one axis ----------------------------------------------------------------------------------------------------------
 
 
-def move_axis(
+async def move_axis(
     axis: AxisVerbs,
     to: float,
     *,
@@ -255,7 +255,7 @@ def move_axis(
     duration: float | None = None,
     tolerance: float | None = None,
     timeout: float | None = None,
-) -> Operation[Moved]:
+) -> Moved:
     """Move to a position (rad, m) within a velocity and an acceleration (rad/s, m/s and per s²), and those of the axis.
 
     As quick as these allow, or in `duration` (s). Returns when it is there; `tolerance` and `timeout` as in
@@ -265,34 +265,34 @@ def move_axis(
     limits.check_goal(axis.name, axis.spec, to)
     own = limits.limits_for(axis.name, axis.spec, velocity=velocity, acceleration=acceleration)
     _check_end(tolerance, timeout)
-    return (yield from _alone(axis, _to(to), own, duration, tolerance=tolerance, timeout=timeout))
+    return await _alone(axis, _to(to), own, duration, tolerance=tolerance, timeout=timeout)
 
 
-def move_by(axis: AxisVerbs, way: float, *, velocity: float | None = None) -> Operation[float]:
+async def move_by(axis: AxisVerbs, way: float, *, velocity: float | None = None) -> float:
     """Move by so far (rad, m) from where it is, at so much (rad/s, m/s; None: the fastest that the axis may).
 
     Returns the way that was gone: measured, or *estimated* where the device does not tell where it is. Such an axis may
     be moved by a way also while nobody knows where it is. Raises as `move`.
     """
     if "train" not in axis.able:
-        return (yield from reckoning.move_by(axis, way, velocity=velocity))
+        return await reckoning.move_by(axis, way, velocity=velocity)
     limits.check_finite(axis.name, "way", way)
     own = limits.limits_for(axis.name, axis.spec, velocity=velocity)
-    return _gone((yield from _alone(axis, _by(way), own)).axes[axis.name])
+    return _gone((await _alone(axis, _by(way), own)).axes[axis.name])
 
 
-def _alone(
+async def _alone(
     axis: AxisVerbs,
     goal: Callable[[float], float],
     own: Limits,
     duration: float | None = None,
     **end: float | None,
-) -> Operation[Moved]:
+) -> Moved:
     _check("trapezoid", duration)
     axes = {axis.name: axis}
     plan = PointToPoint(axes, {axis.name: goal}, {axis.name: own}, "trapezoid", duration)
     journey = Journey(axes, plan, {axis.spec.bus: 0.0}, **end)
-    told = yield from outcome(journey.on(axis.spec.bus))
+    told = await outcome(journey.on(axis.spec.bus))
     return journey.combine({axis.spec.bus: told})
 
 

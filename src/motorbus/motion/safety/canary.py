@@ -13,7 +13,7 @@ from math import inf
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from motorbus.core.family import Health
-from motorbus.core.operation import Operation, Report, outcome
+from motorbus.core.operation import Report, outcome
 from motorbus.errors import Faulted, Refused
 from motorbus.motion.safety.gate import Gate
 
@@ -99,25 +99,25 @@ def looked_at(axis: AxisVerbs, health: Health, *, led: bool = False) -> Faulted 
     return error
 
 
-def looked_after(axis: AxisVerbs, now: float) -> Operation[None]:
+async def looked_after(axis: AxisVerbs, now: float) -> None:
     """Of an axis that was given torque from here: ask how it fares, unless that was done lately.
 
     A fault is noted and reported, and raises nothing; an answer that was lost tells nothing.
     """
     if not axis.engaged or "health" not in axis.able or now - axis.canary.at < HEALTH:
         return
-    found = yield from outcome(axis.able["health"](axis.device))
+    found = await outcome(axis.able["health"](axis.device))
     if isinstance(found, Health) and looked_at(axis, found) is not None:
-        yield from Report(FaultNoted(axis.name, why(axis)))
+        await Report(FaultNoted(axis.name, why(axis)))
 
 
-def unbroken(axis: AxisVerbs) -> Operation[None]:
+async def unbroken(axis: AxisVerbs) -> None:
     """Of an axis that is to get torque: raise Faulted where it had some from here, and its device has not kept it.
 
     One that was given none from here, or was let go since, is not asked.
     """
     if holds(axis):
-        yield from kept(axis)
+        await kept(axis)
 
 
 def holds(axis: AxisVerbs) -> bool:
@@ -125,13 +125,13 @@ def holds(axis: AxisVerbs) -> bool:
     return axis.engaged and axis.canary.is_armed(_stops(axis))
 
 
-def kept(axis: AxisVerbs) -> Operation[None]:
+async def kept(axis: AxisVerbs) -> None:
     """Of an axis that was told to hold: raise Faulted where its device has not kept its torque."""
     if "health" not in axis.able:
         return
-    found = yield from outcome(axis.able["health"](axis.device))
+    found = await outcome(axis.able["health"](axis.device))
     if isinstance(found, Health) and (error := looked_at(axis, found)) is not None:
-        yield from Report(FaultNoted(axis.name, why(axis)))
+        await Report(FaultNoted(axis.name, why(axis)))
         raise error
 
 

@@ -12,7 +12,7 @@ from enum import Enum
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from motorbus.core.family import Quality
-from motorbus.core.operation import Operation, Pause, Runnable, outcome
+from motorbus.core.operation import Pause, Runnable, outcome
 from motorbus.errors import MotorbusError
 from motorbus.motion.capabilities import stop
 from motorbus.motion.moving.forgiving import LOST
@@ -96,36 +96,36 @@ class Standstill:
         return Rest.MOVING if self._moved and self._seen else Rest.UNSEEN
 
 
-def stopped(axis: AxisVerbs, *, patience: float = PATIENCE) -> Operation[Stopped]:
+async def stopped(axis: AxisVerbs, *, patience: float = PATIENCE) -> Stopped:
     """Decelerate and stay, then look whether it rests, for at most `patience` s; gives what was promised and seen.
 
     Raises as `stop` when the device did not accept it; that it was not seen to rest is no error: see `Stopped.rest`.
     """
-    promise: Enum = yield from stop(axis)
-    return (yield from seen(axis, promise, patience))
+    promise: Enum = await stop(axis)
+    return await seen(axis, promise, patience)
 
 
-def seen(axis: AxisVerbs, promise: Enum, patience: float = PATIENCE) -> Operation[Stopped]:
+async def seen(axis: AxisVerbs, promise: Enum, patience: float = PATIENCE) -> Stopped:
     """Look at an axis that was stopped, until it is seen to rest or for `patience` s; its silence is no error."""
     if "position" not in axis.able:
         return Stopped(promise, Rest.UNSEEN)
-    rest, place = yield from watched(lambda: axis.able["position"](axis.device), patience)
+    rest, place = await watched(lambda: axis.able["position"](axis.device), patience)
     return Stopped(promise, rest, None if place is None else axis.spec.from_device(place))
 
 
-def watched(
+async def watched(
     ask: Callable[[], Runnable[float]], patience: float = PATIENCE
-) -> Operation[tuple[Rest, float | None]]:
+) -> tuple[Rest, float | None]:
     """Ask a device where it is (rad) until it is seen to rest, for at most `patience` s; what was seen, and where last.
 
     It is asked three times at least, whatever the patience. Its silence is no error.
     """
     judge, track = Standstill(), Track()
-    begun = yield from Pause(0)
+    begun = await Pause(0)
     asked = 0
     while True:
-        told = yield from outcome(ask())
-        now = yield from Pause(0)
+        told = await outcome(ask())
+        now = await Pause(0)
         asked += 1
         if isinstance(told, LOST):
             judge.lost()
@@ -135,6 +135,6 @@ def watched(
             break
         if now - begun >= patience and asked >= READS:
             break
-        yield from Pause(PAUSE)
+        await Pause(PAUSE)
     sample = track.sample
     return judge.rest, None if sample is None else sample.value

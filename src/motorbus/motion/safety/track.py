@@ -13,7 +13,7 @@ from math import isfinite
 from typing import Final, NamedTuple
 
 from motorbus.core.family import Quality
-from motorbus.core.operation import Operation, Pause, Runnable
+from motorbus.core.operation import Pause, Runnable
 from motorbus.errors import WireError
 
 FASTEST: Final = 20.0
@@ -119,15 +119,15 @@ class Track:
         return sample
 
 
-def believed(track: Track, ask: Callable[[], Runnable[float]]) -> Operation[float]:
+async def believed(track: Track, ask: Callable[[], Runnable[float]]) -> float:
     """Ask a device where it is (rad), and again where that cannot be, until two readings agree.
 
     Raises WireError when three readings cannot be believed.
     """
     found: list[float] = []
     while len(found) < READINGS:
-        found.append((yield from ask()))
-        if track.take(found[-1], (yield from Pause(0))).quality is not Quality.SUSPECT:
+        found.append(await ask())
+        if track.take(found[-1], await Pause(0)).quality is not Quality.SUSPECT:
             return found[-1]
     raise WireError(
         f"its readings do not agree: {', '.join(f'{one:.4g}' for one in found)} rad of its device",

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final
 
 from motorbus.bus.base import BaseBus
 from motorbus.core.family import Health
-from motorbus.core.operation import Exchange, Operation, Pause, Report, outcome
+from motorbus.core.operation import Exchange, Pause, Report, outcome
 from motorbus.errors import Faulted, MotorbusError, NoReply, Overloaded, WireError
 from motorbus.motion.safety import canary
 from motorbus.motion.safety.canary import HEALTH
@@ -54,7 +54,7 @@ class Watch:
 
     # -- who is watched ------------------------------------------------------------------------------------------------
 
-    def begin(self, axes: Iterable[AxisVerbs]) -> Operation[None]:
+    async def begin(self, axes: Iterable[AxisVerbs]) -> None:
         """Watch these from here on: they have got torque, and no goal yet. Each is asked once.
 
         Raises Faulted and Overloaded as `take`; an answer that is lost is forgiven.
@@ -67,8 +67,8 @@ class Watch:
             self.dismiss(node)
             self._strains[node] = Strain() if axis.spec.guard else None
             self._turns.appendleft(node)
-            told = yield from outcome(axis.able["health"](axis.device))
-            yield from self._took(node, told, NOBODY, (yield from Pause(0)))
+            told = await outcome(axis.able["health"](axis.device))
+            await self._took(node, told, NOBODY, await Pause(0))
 
     def dismiss(self, node: int) -> None:
         """It is led no more, and asked no more."""
@@ -143,41 +143,41 @@ class Watch:
         if verdict in (Verdict.OVERLOADED, Verdict.HOT):
             raise _overloaded(axis, strain, state.at)
 
-    def asking(
+    async def asking(
         self,
         slack: float = inf,
         goals: Mapping[int, float] = NOBODY,
         places: Mapping[int, float] = NOBODY,
-    ) -> Operation[None]:
+    ) -> None:
         """Ask who is due, if anybody is, and judge the answer; raises as `take`."""
-        wanted = self.due((yield from Pause(0)), slack)
+        wanted = self.due(await Pause(0), slack)
         if wanted is not None:
             node = self._turns[0]  # whose turn it is when the answer comes may be another's
-            told = yield from outcome(wanted)
-            yield from self._took(node, told, goals, (yield from Pause(0)), places)
+            told = await outcome(wanted)
+            await self._took(node, told, goals, await Pause(0), places)
 
-    def examine(self, axis: AxisVerbs) -> Operation[None]:
+    async def examine(self, axis: AxisVerbs) -> None:
         """Ask this one at once, for it does not do as it was told. Raises as `take` what is the matter with it."""
         node = axis.spec.node
         if node in self._strains:
             self._turns.remove(node)
             self._turns.appendleft(node)
-            told = yield from outcome(axis.able["health"](axis.device))
-            yield from self._took(node, told, NOBODY, (yield from Pause(0)))
+            told = await outcome(axis.able["health"](axis.device))
+            await self._took(node, told, NOBODY, await Pause(0))
 
-    def _took(
+    async def _took(
         self,
         node: int,
         told: Health | MotorbusError,
         goals: Mapping[int, float],
         now: float,
         places: Mapping[int, float] = NOBODY,
-    ) -> Operation[None]:
+    ) -> None:
         try:
             self.take(node, told, goals, now, places)
         except Faulted:
             axis = self._axes[node]
-            yield from Report(canary.FaultNoted(axis.name, canary.why(axis)))
+            await Report(canary.FaultNoted(axis.name, canary.why(axis)))
             raise
 
     # -- turns -----------------------------------------------------------------------------------------------------

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 from motorbus.core.entry import Table
 from motorbus.core.family import State
-from motorbus.core.operation import Operation
 from motorbus.families.feetech.driver.exchanges import read_block
 from motorbus.families.feetech.driver.feedback import state_exchange
 from motorbus.families.feetech.driver.identity import known
@@ -35,24 +34,24 @@ class Bounds(NamedTuple):
     low: float
 
 
-def alarms(node: Node) -> Operation[tuple[str, ...]]:
+async def alarms(node: Node) -> tuple[str, ...]:
     """Each alarm that is set, in words with the figures behind it; () when there is none. Changes nothing."""
-    table = yield from known(node)
-    state = yield from state_exchange(node, table)
+    table = await known(node)
+    state = await state_exchange(node, table)
     if not state.alarm:
         return ()
-    bounds = yield from bounds_of(node, table)
+    bounds = await bounds_of(node, table)
     return in_words(state, bounds)
 
 
-def bounds_of(node: Node, table: Table) -> Operation[Bounds]:
+async def bounds_of(node: Node, table: Table) -> Bounds:
     """What this servo bears, as it is set now."""
 
     def take(data: bytes) -> Bounds:
         rows = (table["max_temperature"], table["max_voltage"], table["min_voltage"])
         return Bounds(*(float(row.to_value(row.decode(data[row.address - _FIRST :][:1]))) for row in rows))
 
-    return (yield from read_block(node, _FIRST, _COUNT, take))
+    return await read_block(node, _FIRST, _COUNT, take)
 
 
 def in_words(state: State, bounds: Bounds) -> tuple[str, ...]:

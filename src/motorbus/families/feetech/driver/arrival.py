@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 from motorbus.core.entry import Table
 from motorbus.core.family import State
-from motorbus.core.operation import Operation, Pause
+from motorbus.core.operation import Pause
 from motorbus.errors import MotionError, Stalled
 from motorbus.families.feetech.driver.blocked import Blocked, blocked
 from motorbus.families.feetech.driver.feedback import state_exchange
@@ -63,12 +63,12 @@ class Move(NamedTuple):
         return 1.0 + 2.0 * (way / speed + ramps)
 
 
-def arrive(node: Node, table: Table, move: Move) -> Operation[None]:
+async def arrive(node: Node, table: Table, move: Move) -> None:
     """Poll until the move is over. Raises Stalled, or MotionError when the time is up."""
     look = state_exchange(node, table)
     if move.turn is not None:
-        yield from Pause(POLL)  # a goal that is whole turns away looks like this place until it moves
-    state = yield from look
+        await Pause(POLL)  # a goal that is whole turns away looks like this place until it moves
+    state = await look
     begun = progressed = state.at
     mark = place = _place(state, move, move.start)
     allowance = move.allowance(abs(place - move.goal))
@@ -76,12 +76,12 @@ def arrive(node: Node, table: Table, move: Move) -> Operation[None]:
         if abs(place - mark) >= move.progress:
             mark, progressed = place, state.at
         elif state.at - progressed > move.patience:
-            why = yield from blocked(node, table, state)
+            why = await blocked(node, table, state)
             raise _stalled(node, place, move, why)
         if state.at - begun > allowance:
             raise _late(node, place, move, allowance)
-        yield from Pause(POLL)
-        state = yield from look
+        await Pause(POLL)
+        state = await look
         place = _place(state, move, place if move.start is not None else None)
 
 

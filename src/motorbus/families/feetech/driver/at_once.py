@@ -16,7 +16,7 @@ from typing import Final, NamedTuple, TypeVar
 
 from motorbus.core.entry import Table, Value
 from motorbus.core.goal import Later
-from motorbus.core.operation import Alone, Operation, afterwards, outcome
+from motorbus.core.operation import Alone, afterwards, outcome
 from motorbus.errors import DeviceError, MotorbusError, RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import Block, acknowledged
@@ -39,13 +39,13 @@ class _Share(NamedTuple):
     block: Block
 
 
-def reg_write_all(
+async def reg_write_all(
     values: Mapping[One, Mapping[str, Value]],
     *,
     rate: int = RATE,
     despite_alarms: bool = False,
     replaces: bool = True,
-) -> Operation[None]:
+) -> None:
     """REG WRITE to each of these, `{id or servo: {name: value}}` in API units, then ACTION for all: all or nothing.
 
     Raises what the first of them raises that is silent, refused, or does not acknowledge (OutcomeUnknown): ACTION is
@@ -57,11 +57,11 @@ def reg_write_all(
     for orders in values.values():
         check_values(orders)
     nodes = distinct(values)
-    errors = yield from prepare_all(nodes, rate=rate)
+    errors = await prepare_all(nodes, rate=rate)
     if errors:
         raise next(iter(errors.values()))
     shares = [_share(node, orders) for node, orders in zip(nodes, values.values(), strict=True)]
-    yield from Alone(_all_or_nothing(shares, despite_alarms=despite_alarms, replaces=replaces))
+    await Alone(_all_or_nothing(shares, despite_alarms=despite_alarms, replaces=replaces))
 
 
 def _share(node: Node, orders: Mapping[str, Value]) -> _Share:
@@ -71,34 +71,34 @@ def _share(node: Node, orders: Mapping[str, Value]) -> _Share:
     return _Share(node, node.table, block)
 
 
-def _all_or_nothing(shares: Sequence[_Share], *, despite_alarms: bool, replaces: bool) -> Operation[None]:
+async def _all_or_nothing(shares: Sequence[_Share], *, despite_alarms: bool, replaces: bool) -> None:
     handed: list[_Share] = []
     trouble: list[BaseException] = []
     if not replaces:
         for node, table, _ in shares:
-            yield from _nothing_waits(node, table)
-    yield from afterwards(
+            await _nothing_waits(node, table)
+    await afterwards(
         _released(shares, handed, trouble, despite_alarms), lambda: _taken_back(handed, trouble, replaces)
     )
 
 
-def _released(
+async def _released(
     shares: Sequence[_Share], handed: list[_Share], trouble: list[BaseException], despite_alarms: bool
-) -> Operation[None]:
+) -> None:
     try:
         for share in shares:
             handed.append(share)
-            yield from hand_over(*share)
+            await hand_over(*share)
             if share.node.alarm and not despite_alarms:
                 raise _alarmed(share.node)
-        yield from action_all([share.node for share in shares])
+        await action_all([share.node for share in shares])
     except BaseException as error:
         trouble.append(error)
         raise
 
 
-def _nothing_waits(node: Node, table: Table) -> Operation[None]:
-    if (yield from waits(node, table)) != IDLE:
+async def _nothing_waits(node: Node, table: Table) -> None:
+    if await waits(node, table) != IDLE:
         raise RequestError(
             f"a REG WRITE waits in node {node.node} already, and may not be replaced by another one",
             expected="servos in which nothing waits",
@@ -117,14 +117,14 @@ def _alarmed(node: Node) -> DeviceError:
     )
 
 
-def _taken_back(handed: Sequence[_Share], trouble: list[BaseException], replaces: bool) -> Operation[None]:
+async def _taken_back(handed: Sequence[_Share], trouble: list[BaseException], replaces: bool) -> None:
     """Visit everyone who may hold something, whatever happens to some, once something went wrong."""
     if not trouble:
         return
     left = []
     for share in handed:
         _withdraw(share.node)
-        failure = (yield from outcome(_harmless(share))) if replaces else None
+        failure = await outcome(_harmless(share)) if replaces else None
         if isinstance(failure, MotorbusError) or not replaces:
             left.append(str(share.node.node))
     if left:
@@ -140,9 +140,9 @@ def _withdraw(node: Node) -> None:
         node.pending = node.pending._replace(withdrawn=True)
 
 
-def _harmless(share: _Share) -> Operation[None]:
+async def _harmless(share: _Share) -> None:
     """Put in its place what does nothing. Said again when it is not acknowledged, for twice is as good as once."""
     block = Block(share.table["lock"].address, _CLOSED)
     request = wire.reg_write(share.node.node, block.address, block.data)
     later = Later(share.node.node)
-    yield from acknowledged(share.node, request, block, refusal=lambda _: None, later=later)
+    await acknowledged(share.node, request, block, refusal=lambda _: None, later=later)

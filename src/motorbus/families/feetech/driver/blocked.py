@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 from motorbus.core.entry import Table
 from motorbus.core.family import State
-from motorbus.core.operation import Operation, outcome
+from motorbus.core.operation import outcome
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech.driver.alarm import bounds_of, in_words
 from motorbus.families.feetech.driver.identity import prepare, writable
@@ -41,27 +41,27 @@ class Blocked(NamedTuple):
     settings: tuple[str, ...]
 
 
-def blockers(node: Node) -> Operation[tuple[str, ...]]:
+async def blockers(node: Node) -> tuple[str, ...]:
     """What keeps this servo from obeying, in words; () when nothing does. Reads only.
 
     Judged by the mode it is in: in velocity mode a goal velocity of 0 is told, in position mode limits that leave no
     way. What is mechanical (blocked, too heavy a load) no register tells.
     """
-    yield from prepare(node)
-    table = yield from writable(node)
-    raws = yield from read_raw(node, *(name for name in _ASKED if name in table))
+    await prepare(node)
+    table = await writable(node)
+    raws = await read_raw(node, *(name for name in _ASKED if name in table))
     return (*_mode(node, raws), *_power(node, table, raws), *_alarms(table, raws))
 
 
-def blocked(node: Node, table: Table, state: State) -> Operation[Blocked]:
+async def blocked(node: Node, table: Table, state: State) -> Blocked:
     """What can be said about a servo that did not get where it should, of which this is the last sample.
 
     Never raises on account of the servo: what it does not answer is left out.
     """
-    settings = yield from outcome(blockers(node))
+    settings = await outcome(blockers(node))
     told: tuple[str, ...] = state.alarm
     if told:
-        bounds = yield from outcome(bounds_of(node, table))
+        bounds = await outcome(bounds_of(node, table))
         told = told if isinstance(bounds, MotorbusError) else in_words(state, bounds)
     return Blocked(told, () if isinstance(settings, MotorbusError) else settings)
 

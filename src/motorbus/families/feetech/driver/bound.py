@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from motorbus.core.entry import Entry, Table
-from motorbus.core.operation import Operation, Report
+from motorbus.core.operation import Report
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.exchanges import Block, read_block
 from motorbus.families.feetech.driver.node import Node
@@ -31,7 +31,7 @@ class Powerless(NamedTuple):
         )
 
 
-def ask_bound(node: Node, table: Table, current: float | None = None) -> Operation[None]:
+async def ask_bound(node: Node, table: Table, current: float | None = None) -> None:
     """Read the present bound unless it is known, or is about to be set; nothing where the map has none.
 
     Reports `Powerless` when it is 0. Raises RequestError when its protection current is 0 as well.
@@ -39,10 +39,10 @@ def ask_bound(node: Node, table: Table, current: float | None = None) -> Operati
     if not node.control.current or node.bound is not None or current is not None:
         return
     row = table[node.control.current]
-    node.bound = yield from read_block(node, row.address, row.size, row.decode)
+    node.bound = await read_block(node, row.address, row.size, row.decode)
     if not node.bound:
         raw = raw_bound(node, row, None)
-        yield from Report(Powerless(node.node, float(row.to_value(raw))))
+        await Report(Powerless(node.node, float(row.to_value(raw))))
 
 
 def raw_bound(node: Node, row: Entry, current: float | None) -> int:

@@ -18,7 +18,7 @@ import math
 from typing import Final, NamedTuple
 
 from motorbus.core.entry import Entry, Table, is_number, shown
-from motorbus.core.operation import Effect, Operation, Rank, Timeout
+from motorbus.core.operation import Effect, Rank, Timeout
 from motorbus.errors import DeviceError, MotorbusError, RequestError, VerificationFailed
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver import eeprom
@@ -87,17 +87,17 @@ class _Plan(NamedTuple):
     reads: int
 
 
-def zero(node: Node) -> Operation[Zero]:
+async def zero(node: Node) -> Zero:
     """Where this servo has its zero now; changes nothing. Raises RequestError where its map has no homing offset."""
-    yield from prepare(node)
-    table = yield from writable(node)
+    await prepare(node)
+    table = await writable(node)
     position, offset = table["present_position"], _offset_row(node, table)
-    pose = yield from _pose(node, position, offset)
+    pose = await _pose(node, position, offset)
     told = float(node.value(position, pose.position))
     return Zero(told, float(offset.to_value(pose.offset)), pose.offset, node.limits)
 
 
-def calibrate(node: Node, to: float | None = None, how: str = "auto") -> Operation[Calibration]:
+async def calibrate(node: Node, to: float | None = None, how: str = "auto") -> Calibration:
     """Make the present pose read `to` rad (None: the middle of the turn), for good; the servo goes limp and stays so.
 
     `how`: "switch" (128, for the middle only), "instruction" (0x0B), "offset" (the register itself), or "auto" for
@@ -107,14 +107,14 @@ def calibrate(node: Node, to: float | None = None, how: str = "auto") -> Operati
     does not obey, VerificationFailed when position or offset do not read as they must.
     """
     _sensible(node, to, how)
-    yield from prepare(node)
-    table = yield from writable(node)
+    await prepare(node)
+    table = await writable(node)
     job = _job(node, table, to, how)
-    pose = yield from _pose(node, job.position, job.offset)
+    pose = await _pose(node, job.position, job.offset)
     if not 0 <= pose.position < job.turn:
         raise _turned(node, job, pose)
     plan = _planned(node, job, pose)
-    return (yield from eeprom.unlocked(node, table, lambda: _renamed(node, job, plan, table["lock"].address)))
+    return await eeprom.unlocked(node, table, lambda: _renamed(node, job, plan, table["lock"].address))
 
 
 def shortest(distance: int, turn: int) -> int:
@@ -243,14 +243,12 @@ def _turned(node: Node, job: _Job, pose: Pose) -> RequestError:
 # -- doing it ------------------------------------------------------------------------------------------------
 
 
-def _pose(node: Node, position: Entry, offset: Entry) -> Operation[Pose]:
+async def _pose(node: Node, position: Entry, offset: Entry) -> Pose:
     def told(data: bytes) -> int:
         return _offset_told(node, offset, data)
 
-    held = yield from read_block(node, offset.address, offset.size, told, timeout=Timeout.STORE)
-    here = yield from read_block(
-        node, position.address, position.size, position.decode, timeout=Timeout.STORE
-    )
+    held = await read_block(node, offset.address, offset.size, told, timeout=Timeout.STORE)
+    here = await read_block(node, position.address, position.size, position.decode, timeout=Timeout.STORE)
     return Pose(here, held)
 
 
@@ -271,13 +269,13 @@ def _offset_told(node: Node, row: Entry, data: bytes) -> int:
     )
 
 
-def _renamed(node: Node, job: _Job, plan: _Plan, lock: int) -> Operation[Calibration]:
-    now = yield from _pose(node, job.position, job.offset)
+async def _renamed(node: Node, job: _Job, plan: _Plan, lock: int) -> Calibration:
+    now = await _pose(node, job.position, job.offset)
     if now != plan.pose:  # it gave way when it went limp
         plan = _planned(node, job, now)
-    yield from eeprom.still_open(node, lock)
-    doubt = yield from _ordered(node, job, plan)
-    found = yield from _pose(node, job.position, job.offset)
+    await eeprom.still_open(node, lock)
+    doubt = await _ordered(node, job, plan)
+    found = await _pose(node, job.position, job.offset)
     after = Pose(plan.reads, plan.offset)
     if found != after:
         _judge(node, job, plan, found, doubt)
@@ -301,11 +299,11 @@ def _renamed(node: Node, job: _Job, plan: _Plan, lock: int) -> Operation[Calibra
     )
 
 
-def _ordered(node: Node, job: _Job, plan: _Plan) -> Operation[MotorbusError | None]:
+async def _ordered(node: Node, job: _Job, plan: _Plan) -> MotorbusError | None:
     """Give the order; the doubt that is left about whether it was heard. Saying it twice does no more than once."""
     if plan.way is Middle.OFFSET:
         data = job.offset.encode(plan.offset)
-        yield from eeprom.stored(node, Block(job.offset.address, data, Effect.PERSISTENT))
+        await eeprom.stored(node, Block(job.offset.address, data, Effect.PERSISTENT))
         return None
     if plan.way is Middle.SWITCH:
         request = wire.write(node.node, TORQUE_ENABLE, bytes((_MIDDLE,)))
@@ -315,11 +313,11 @@ def _ordered(node: Node, job: _Job, plan: _Plan) -> Operation[MotorbusError | No
         block = Block(0, b"", Effect.PERSISTENT)
     doubt = None
     try:
-        yield from acknowledged(node, request, block, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
+        await acknowledged(node, request, block, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
     except DOUBTS as error:
         doubt = error
     if plan.way is Middle.SWITCH:
-        yield from disable_torque(node)  # what 128 leaves in the switch is not published
+        await disable_torque(node)  # what 128 leaves in the switch is not published
     return doubt
 
 

@@ -7,7 +7,7 @@ bounds the current. Source: `table.CONTROL`.
 from __future__ import annotations
 
 from motorbus.core.entry import Storage
-from motorbus.core.operation import Goal, Operation
+from motorbus.core.operation import Goal
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.bound import raw_bound, refuse_current
 from motorbus.families.feetech.driver.exchanges import Block
@@ -19,13 +19,13 @@ from motorbus.families.feetech.driver.tuning import limiting, set_torque_limit
 from motorbus.families.feetech.table import Mode
 
 
-def cap_torque(node: Node, fraction: float) -> Operation[None]:
+async def cap_torque(node: Node, fraction: float) -> None:
     """Bound its torque to this fraction of the stall torque, 0 to 1, until power-off.
 
     Raises RequestError outside 0 to 1, and for a servo whose torque is bounded by EEPROM alone; else errors as
     `set_torque_limit`.
     """
-    table = yield from writable(node)
+    table = await writable(node)
     row = limiting(table)
     if row.storage is not Storage.RAM:
         raise RequestError(
@@ -34,16 +34,16 @@ def cap_torque(node: Node, fraction: float) -> Operation[None]:
             advice="set_torque_limit() sets it for good; nothing was sent",
             node=node.node,
         )
-    yield from set_torque_limit(node, fraction)
+    await set_torque_limit(node, fraction)
 
 
-def cap_current(node: Node, current: float) -> Operation[None]:
+async def cap_current(node: Node, current: float) -> None:
     """Bound its current (A, above 0) until power-off, or until an order brings another bound.
 
     Raises RequestError for a servo without such a register, a current that is none, or in a mode in which the register
     is no bound.
     """
-    table = yield from asked_anew(node)
+    table = await asked_anew(node)
     refuse_current(node, current)
     if node.known_mode not in (Mode.POSITION, Mode.VELOCITY):
         raise RequestError(
@@ -56,4 +56,4 @@ def cap_current(node: Node, current: float) -> Operation[None]:
     raw = raw_bound(node, row, current)
     value = float(node.value(row, raw))
     goal = Goal(node.node, "cap", value, 0.0, float(node.value(row, row.high)))
-    yield from ordered(node, table, Block(row.address, row.encode(raw), row.effect, (goal,)))
+    await ordered(node, table, Block(row.address, row.encode(raw), row.effect, (goal,)))

@@ -12,7 +12,6 @@ from motorbus.core.operation import (
     INTENT,
     Alone,
     Journal,
-    Operation,
     Report,
     Tune,
     afterwards,
@@ -34,7 +33,7 @@ from motorbus.families.feetech.driver.placing import (
 from motorbus.families.feetech.driver.recovery import recovered
 
 
-def guarded(job: Job, node: Node) -> Operation[None]:
+async def guarded(job: Job, node: Node) -> None:
     """Carry out the job on this servo with nobody else on the bus, once nothing has come between since all was looked
     over: other tasks of this program may have changed a servo meanwhile, this one, or another one to the same place.
 
@@ -42,7 +41,7 @@ def guarded(job: Job, node: Node) -> Operation[None]:
     """
     done: list[str] = []
     try:
-        yield from Alone(_once_more(job, node, done))
+        await Alone(_once_more(job, node, done))
     except BaseException as error:
         for end in done:  # an interruption that came when all was over
             error.add_note(_became(job, end))
@@ -51,17 +50,17 @@ def guarded(job: Job, node: Node) -> Operation[None]:
         node.forget_settings()
 
 
-def _once_more(job: Job, node: Node, done: list[str]) -> Operation[None]:
-    yield from Report(Journal(job.verb, ASKED, {}))
-    yield from afterwards(_unchanged(job), lambda: iter(Tune(job.old.rate)))
+async def _once_more(job: Job, node: Node, done: list[str]) -> None:
+    await Report(Journal(job.verb, ASKED, {}))
+    await afterwards(_unchanged(job), lambda: Tune(job.old.rate))
     learn(node, job.image)
-    yield from changed(job, node, Course(job))
+    await changed(job, node, Course(job))
     done.append("new")
 
 
-def _unchanged(job: Job) -> Operation[None]:
+async def _unchanged(job: Job) -> None:
     """Is it as it was, is its new place free, and the id that a servo has whose own is torn?"""
-    if (yield from whoever(job.old.id)) != job.image:
+    if await whoever(job.old.id) != job.image:
         raise RequestError(
             f"node {job.old.id} is not what it was a moment ago",
             expected="the same servo with the same settings",
@@ -71,12 +70,12 @@ def _unchanged(job: Job) -> Operation[None]:
         )
     shipped = Place(SHIPPED_ID, job.old.rate)
     if job.verb == SET_ID and SHIPPED_ID not in (job.old.id, job.new.id, *job.others):
-        refuse_taken(shipped, (yield from whoever(shipped.id)))
-    yield from Tune(job.new.rate)
-    refuse_taken(job.new, (yield from whoever(job.new.id)))
+        refuse_taken(shipped, await whoever(shipped.id))
+    await Tune(job.new.rate)
+    refuse_taken(job.new, await whoever(job.new.id))
 
 
-def changed(job: Job, node: Node, course: Course) -> Operation[None]:
+async def changed(job: Job, node: Node, course: Course) -> None:
     """Carry out the job on this servo, whose settings are known, and close its journal; the rate is the bus's own in
     the end. On failure or interruption it is brought to one of both places, locked, as far as can be.
 
@@ -84,7 +83,7 @@ def changed(job: Job, node: Node, course: Course) -> Operation[None]:
     """
     ends: list[str | MotorbusError] = []
     try:
-        yield from afterwards(_attempt(job, node, course, ends), lambda: _settled(job, course, ends))
+        await afterwards(_attempt(job, node, course, ends), lambda: _settled(job, course, ends))
     except BaseException as error:
         if isinstance(error, MotorbusError) and ends == ["new"]:
             return
@@ -101,14 +100,14 @@ def _became(job: Job, end: str | MotorbusError) -> str:
     return f"the servo is {called(job, job.new if end == 'new' else job.old)}, and locked"
 
 
-def _attempt(job: Job, node: Node, course: Course, ends: list[str | MotorbusError]) -> Operation[None]:
-    yield from _begun(course)
-    there = yield from rewritten(job, node, job.new, course)
-    yield from followed(job, there, job.new, course)
-    yield from locked(job, there)
+async def _attempt(job: Job, node: Node, course: Course, ends: list[str | MotorbusError]) -> None:
+    await _begun(course)
+    there = await rewritten(job, node, job.new, course)
+    await followed(job, there, job.new, course)
+    await locked(job, there)
     if job.old.rate != job.new.rate:
-        yield from Tune(job.old.rate)
-    if (yield from look(job.old.id)) != b"":
+        await Tune(job.old.rate)
+    if await look(job.old.id) != b"":
         raise VerificationFailed(
             f"a servo answers as {job.old.id} after node {job.old.id} became {called(job, job.new)}",
             expected="silence",
@@ -116,25 +115,26 @@ def _attempt(job: Job, node: Node, course: Course, ends: list[str | MotorbusErro
             advice="take one of them off the bus, then recover()",
             node=job.old.id,
         )
-    yield from course.end("new")
+    await course.end("new")
     ends.append("new")
 
 
-def _begun(course: Course) -> Operation[None]:
+async def _begun(course: Course) -> None:
     """Record the intent. What cannot be recorded does not begin, and the servo need not be looked for."""
     try:
-        yield from course.reach(INTENT)
+        await course.reach(INTENT)
     except MotorbusError:
-        closed = yield from outcome(course.end("old"))  # the record may be on the disk all the same
+        closed = await outcome(course.end("old"))  # the record may be on the disk all the same
         if closed is None or isinstance(closed, RequestError):  # that of another change says so
             course.reached.clear()
         raise
 
 
-def _settled(job: Job, course: Course, ends: list[str | MotorbusError]) -> Operation[None]:
+async def _settled(job: Job, course: Course, ends: list[str | MotorbusError]) -> None:
     """Whatever has happened: bring it to one of both places, and set the rate of the bus back."""
-    try:
+
+    async def recover() -> None:
         if course.reached and not ends:
-            ends.append((yield from outcome(recovered(job, course))))
-    finally:
-        yield from Tune(job.old.rate)
+            ends.append(await outcome(recovered(job, course)))
+
+    await afterwards(recover(), lambda: Tune(job.old.rate))

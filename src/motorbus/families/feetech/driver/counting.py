@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from motorbus.core.entry import Table
-from motorbus.core.operation import Effect, Exchange, Operation, Rank, Timeout, afterwards, outcome
+from motorbus.core.operation import Effect, Exchange, Rank, Timeout, afterwards, outcome
 from motorbus.errors import RequestError, VerificationFailed
 from motorbus.families.feetech.driver import eeprom
 from motorbus.families.feetech.driver.exchanges import PRESENT, Block, confirmed, read_block
@@ -78,15 +78,15 @@ class _Change(NamedTuple):
     after: bytes
 
 
-def many_turns(node: Node) -> Operation[ManyTurns]:
+async def many_turns(node: Node) -> ManyTurns:
     """How this servo counts, asked anew; changes nothing. Raises RequestError where its map has one turn only."""
-    image = yield from _image(node)
-    table = yield from writable(node)
+    image = await _image(node)
+    table = await writable(node)
     _refuse_one_turn(node, table)
-    return (yield from _counts(node, table, image))
+    return await _counts(node, table, image)
 
 
-def set_many_turns(node: Node, on: bool, limits: tuple[float, float] | None = None) -> Operation[Recounted]:
+async def set_many_turns(node: Node, on: bool, limits: tuple[float, float] | None = None) -> Recounted:
     """Let goals and position count over many turns, for good, or within one; the servo goes limp and stays so.
 
     On: both position limits become 0 and bit 4 of its own phase register is set, the other bits staying as they are.
@@ -100,15 +100,15 @@ def set_many_turns(node: Node, on: bool, limits: tuple[float, float] | None = No
     """
     if not isinstance(on, bool):
         raise RequestError(f"{on!r} is neither True nor False", advice="nothing was sent", node=node.node)
-    image = yield from _image(node)
-    table = yield from writable(node)
+    image = await _image(node)
+    table = await writable(node)
     _refuse_one_turn(node, table)
     if node.known_mode is not Mode.POSITION:
         raise unheeded(node, Mode.POSITION, "cannot be told over how many turns it counts")
-    before = yield from _counts(node, table, image)
+    before = await _counts(node, table, image)
     raws = _limits(node, table, on, limits, before)
-    yield from eeprom.unlocked(node, table, lambda: _recounted(node, table, on, raws, image))
-    after = yield from _counts(node, table, (yield from _image(node)))
+    await eeprom.unlocked(node, table, lambda: _recounted(node, table, on, raws, image))
+    after = await _counts(node, table, await _image(node))
     return Recounted(before, after, f"it is limp now; {_FORGETS}" if on else "it is limp now")
 
 
@@ -202,52 +202,50 @@ def _widest(node: Node, table: Table) -> str:
 # -- doing it ------------------------------------------------------------------------------------------------
 
 
-def _recounted(node: Node, table: Table, on: bool, limits: tuple[int, int], image: bytes) -> Operation[None]:
+async def _recounted(node: Node, table: Table, on: bool, limits: tuple[int, int], image: bytes) -> None:
     row, low, high = (table[name] for name in ("phase", "min_position_limit", "max_position_limit"))
     seen = image[low.address : row.address + row.size]
-    again = yield from read_block(node, low.address, len(seen), bytes, timeout=Timeout.STORE)
+    again = await read_block(node, low.address, len(seen), bytes, timeout=Timeout.STORE)
     if again != seen:
         raise _unsteady(node, low.address, seen, again)
     phase = image[row.address]
     bit = _Change(row.address, row.encode(phase), row.encode(with_many_turns_told(phase, on)))
     wide = low.size + high.size
     bounds = _Change(low.address, seen[:wide], low.encode(limits[0]) + high.encode(limits[1]))
-    yield from _changed(node, table["lock"].address, (bit, bounds) if on else (bounds, bit))
+    await _changed(node, table["lock"].address, (bit, bounds) if on else (bounds, bit))
 
 
-def _changed(node: Node, lock: int, changes: Sequence[_Change]) -> Operation[None]:
+async def _changed(node: Node, lock: int, changes: Sequence[_Change]) -> None:
     """All of these while the lock is open, each read back; or none of them."""
     begun: list[_Change] = []
     trouble: list[BaseException] = []
-    yield from afterwards(
+    await afterwards(
         _attempt(node, lock, changes, begun, trouble), lambda: _put_back(node, lock, begun, trouble)
     )
 
 
-def _attempt(
+async def _attempt(
     node: Node, lock: int, changes: Sequence[_Change], begun: list[_Change], trouble: list[BaseException]
-) -> Operation[None]:
+) -> None:
     try:
         for change in changes:
-            yield from eeprom.still_open(node, lock)
+            await eeprom.still_open(node, lock)
             begun.append(change)
-            yield from eeprom.stored(node, Block(change.address, change.after, Effect.PERSISTENT))
-        yield from eeprom.still_open(node, lock)
+            await eeprom.stored(node, Block(change.address, change.after, Effect.PERSISTENT))
+        await eeprom.still_open(node, lock)
         begun.clear()
     except BaseException as error:
         trouble.append(error)
         raise
 
 
-def _put_back(
-    node: Node, lock: int, begun: list[_Change], trouble: Sequence[BaseException]
-) -> Operation[None]:
+async def _put_back(node: Node, lock: int, begun: list[_Change], trouble: Sequence[BaseException]) -> None:
     """What was there before, where something has gone wrong: the last one first, and each is tried."""
     if not begun:
         return
     restored = True
     for change in reversed(begun):
-        restored &= (yield from outcome(_restored(node, lock, change))) is None
+        restored &= await outcome(_restored(node, lock, change)) is None
     if restored:
         told = "its limits and its phase register are as they were"
     else:
@@ -257,13 +255,13 @@ def _put_back(
         error.add_note(told)
 
 
-def _restored(node: Node, lock: int, change: _Change) -> Operation[None]:
+async def _restored(node: Node, lock: int, change: _Change) -> None:
     """Open the lock again, for whoever has lost its supply has closed it, let it go limp once more, for it may have
     begun with torque on, and write what was there."""
     opened = Block(lock, b"\0", Effect.PERSISTENT)
-    yield from confirmed(node, opened, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
-    yield from disable_torque(node)
-    yield from eeprom.stored(node, Block(change.address, change.before, Effect.PERSISTENT))
+    await confirmed(node, opened, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
+    await disable_torque(node)
+    await eeprom.stored(node, Block(change.address, change.before, Effect.PERSISTENT))
 
 
 def _unsteady(node: Node, address: int, seen: bytes, again: bytes) -> VerificationFailed:

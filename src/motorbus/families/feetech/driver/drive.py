@@ -9,7 +9,7 @@ Source: STS3215 memory table V3.6; FEETECH SDK headers; servolab, measured on ST
 from __future__ import annotations
 
 from motorbus.core.entry import Table, is_number, shown
-from motorbus.core.operation import Effect, Goal, Operation
+from motorbus.core.operation import Effect, Goal
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.families.feetech.driver.arrival import Move, arrive
 from motorbus.families.feetech.driver.bound import ask_bound, refuse_current
@@ -22,9 +22,9 @@ from motorbus.families.feetech.driver.rest import ON, asked_anew, ordered, unpub
 from motorbus.families.feetech.table import Mode
 
 
-def set_velocity(
+async def set_velocity(
     node: Node, velocity: float, *, acceleration: float | None = None, current: float | None = None
-) -> Operation[None]:
+) -> None:
     """Turn at `velocity` rad/s, whose sign is the direction; 0 stands still. For velocity mode.
 
     `acceleration` (rad/s²) and, on HLS, the bound of the current (A) stay as they are when left out; a bound of 0 is
@@ -33,7 +33,7 @@ def set_velocity(
     """
     _number(node, velocity, "velocity in rad/s")
     finite(node, 0.0, acceleration, current)
-    table = yield from asked_anew(node)
+    table = await asked_anew(node)
     _heed(node, Mode.VELOCITY, "cannot be given a velocity")
     refuse_current(node, current)
     row = table["goal_velocity"]
@@ -41,17 +41,17 @@ def set_velocity(
     low, high = (float(node.value(row, bound)) for bound in (row.low, row.high))
     goal = Goal(node.node, "velocity", float(node.value(row, raw)), low, high)
     block = Block(row.address, row.encode(raw), row.effect, (goal,), under=node.settings)
-    yield from ask_bound(node, table, current)
+    await ask_bound(node, table, current)
     if current is not None or not node.bound:
         block = with_bound(node, table, block, current)
     if acceleration is not None:
         ramp = ramp_of(node, table, acceleration)
         address = table["goal_position"].address - len(ramp)
-        yield from confirmed(node, Block(address, ramp))
-    yield from ordered(node, table, block)
+        await confirmed(node, Block(address, ramp))
+    await ordered(node, table, block)
 
 
-def set_duty(node: Node, duty: float) -> Operation[None]:
+async def set_duty(node: Node, duty: float) -> None:
     """Drive the bridge with this duty, -1 to 1, open loop: how fast that turns depends on the load. For PWM mode.
 
     A positive duty turned an STS3215 towards smaller angles, opposite to a positive velocity (servolab). Raises
@@ -66,24 +66,24 @@ def set_duty(node: Node, duty: float) -> Operation[None]:
             advice="give a fraction; nothing was sent",
             node=node.node,
         )
-    table = yield from asked_anew(node)
+    table = await asked_anew(node)
     if not node.control.duty:
         raise unpublished_duty(node)
     _heed(node, Mode.PWM, "cannot be given a duty")
     row = table[node.control.duty]
     raw = round(duty / DUTY)
     goal = Goal(node.node, "load", raw * DUTY, -1.0, 1.0)
-    yield from ordered(node, table, Block(row.address, row.encode(raw), row.effect, (goal,)))
+    await ordered(node, table, Block(row.address, row.encode(raw), row.effect, (goal,)))
 
 
-def set_current(node: Node, current: float) -> Operation[None]:
+async def set_current(node: Node, current: float) -> None:
     """Push with this current in A, whose sign is the direction, whatever that turns. For current mode, which HLS have.
 
     It is the current of the motor's phase. Raises RequestError in another mode and on other maps, LimitExceeded when it
     is no finite number or more than the register takes (13.3 A).
     """
     _number(node, current, "current in A")
-    table = yield from asked_anew(node)
+    table = await asked_anew(node)
     _heed(node, Mode.CURRENT, "cannot be given a current")
     row = table[node.control.current]
     raw = node.raw(row, current)
@@ -96,10 +96,10 @@ def set_current(node: Node, current: float) -> Operation[None]:
             node=node.node,
         )
     goal = Goal(node.node, "current", float(row.to_value(raw)), low, high)
-    yield from ordered(node, table, Block(row.address, row.encode(raw), row.effect, (goal,)))
+    await ordered(node, table, Block(row.address, row.encode(raw), row.effect, (goal,)))
 
 
-def step(
+async def step(
     node: Node,
     by: float,
     *,
@@ -108,7 +108,7 @@ def step(
     wait: bool = True,
     tolerance: float | None = None,
     timeout: float | None = None,
-) -> Operation[None]:
+) -> None:
     """Go `by` rad from where it is, over the end of a turn if need be. For step mode, which STS and SMBL have.
 
     Torque goes on: on STS by itself, on SMBL by a packet that goes before. Never sent twice, for the servo would go
@@ -118,27 +118,27 @@ def step(
     is interrupted the servo keeps moving, since no goal of step mode holds: a note says so; disable_torque() ends it.
     """
     finite(node, by, velocity, acceleration, tolerance, timeout)
-    table = yield from asked_anew(node)
+    table = await asked_anew(node)
     _heed(node, Mode.STEP, "cannot step")
     block = _step_block(node, table, by, velocity, acceleration)._replace(under=node.settings)
     goal = block.goals[0].value
     if not node.control.goal_switches_on:
-        yield from confirmed(node, ON)  # which alone moves nothing in step mode
+        await confirmed(node, ON)  # which alone moves nothing in step mode
     if not wait:
-        yield from confirmed(node, block)
+        await confirmed(node, block)
         return
     row = table["present_position"]
-    raw = yield from read_block(node, PRESENT, row.size, row.decode)
+    raw = await read_block(node, PRESENT, row.size, row.decode)
     start = float(node.value(row, raw))
     move = way(node, table, start + goal, velocity, acceleration, tolerance, timeout)
     settings = node.settings
     turn = settings.turn * move.resolution if settings is not None and not settings.accumulates else None
-    yield from stops(_stepped(node, table, block, move._replace(start=start, turn=turn)), node)
+    await stops(_stepped(node, table, block, move._replace(start=start, turn=turn)), node)
 
 
-def _stepped(node: Node, table: Table, block: Block, move: Move) -> Operation[None]:
-    yield from confirmed(node, block)
-    yield from arrive(node, table, move)
+async def _stepped(node: Node, table: Table, block: Block, move: Move) -> None:
+    await confirmed(node, block)
+    await arrive(node, table, move)
 
 
 def _step_block(

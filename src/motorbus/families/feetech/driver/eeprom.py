@@ -82,11 +82,11 @@ class Torque:
         self._node = 0
         self._stops = -1
 
-    def taken(self, node: Node) -> Operation[None]:
+    async def taken(self, node: Node) -> None:
         """Torque off again, and remember how many stops have left for this servo. Refused when others left since."""
         self._node = node.node
         block = limp(node.node)._replace(refusal=self._count)
-        yield from confirmed(node, block, rank=Rank.CONFIGURATION)
+        await confirmed(node, block, rank=Rank.CONFIGURATION)
 
     def _count(self, stops: Stops) -> MotorbusError | None:
         if self._stops < 0:
@@ -118,9 +118,9 @@ class Change(NamedTuple):
     before: bytes
 
 
-def store(
+async def store(
     node: Node, table: Table, blocks: Sequence[Block], *, always: bool = False, torque: Torque | None = None
-) -> Operation[bool]:
+) -> bool:
     """Make these EEPROM registers hold this for good, with nobody else on the bus meanwhile; gives whether it wrote.
 
     They are read first, and only those are written that hold something else; when none does, there is no unlock and no
@@ -132,42 +132,42 @@ def store(
 
     With `torque` the servo gets back the torque that this takes from it, and `TorqueAfterWrite` is reported.
     """
-    return (yield from Alone(_stored_unlike(node, table, blocks, always, torque)))
+    return await Alone(_stored_unlike(node, table, blocks, always, torque))
 
 
-def _stored_unlike(
+async def _stored_unlike(
     node: Node, table: Table, blocks: Sequence[Block], always: bool, torque: Torque | None
-) -> Operation[bool]:
+) -> bool:
     lock = table["lock"].address
     changes: list[Change] = []
     for block in blocks:
-        changes += yield from _unlike(node, table, block, always)
+        changes += await _unlike(node, table, block, always)
     if not changes:
-        if (yield from read_block(node, lock, 1, bytes, timeout=Timeout.STORE)) == _OPEN:
-            yield from _locked(node, lock, (), (), Torque())
+        if await read_block(node, lock, 1, bytes, timeout=Timeout.STORE) == _OPEN:
+            await _locked(node, lock, (), (), Torque())
         return False
     begun: list[Change] = []
 
-    def write() -> Operation[None]:
+    async def write() -> None:
         for change in changes:
             if moves(table, change.block):
-                yield from still_open(node, lock)
+                await still_open(node, lock)
             begun.append(change)
             block = change.block._replace(effect=Effect.PERSISTENT)  # it is limp: nothing can move
-            yield from stored(node, block)
+            await stored(node, block)
 
     if torque is not None:
-        torque.was_on = not (yield from is_limp(node))
-    yield from _guarded(node, table, write, begun, torque or Torque())
+        torque.was_on = not await is_limp(node)
+    await _guarded(node, table, write, begun, torque or Torque())
     return True
 
 
-def _unlike(node: Node, table: Table, block: Block, always: bool) -> Operation[list[Change]]:
+async def _unlike(node: Node, table: Table, block: Block, always: bool) -> list[Change]:
     """The runs of whole registers in this block that are to be written; RAM, which wears nothing, as it is given."""
     rows = sorted(rows_in(table, block), key=lambda row: row.address)
     if not any(row.storage is Storage.EEPROM for row in rows):
         return [Change(block, b"")]
-    found = yield from read_block(node, block.address, len(block.data), bytes, timeout=Timeout.STORE)
+    found = await read_block(node, block.address, len(block.data), bytes, timeout=Timeout.STORE)
     if always:
         return [Change(block, found)]
     runs: list[range] = []
@@ -189,22 +189,22 @@ def _unlike(node: Node, table: Table, block: Block, always: bool) -> Operation[l
     ]
 
 
-def unlocked(node: Node, table: Table, work: Callable[[], Operation[T]]) -> Operation[T]:
+async def unlocked(node: Node, table: Table, work: Callable[[], Operation[T]]) -> T:
     """Carry out `work` on a limp servo whose lock is open, with nobody else on the bus; the lock is closed again.
 
     Its settings are forgotten before anybody else has the bus again, so what others made by them meanwhile is refused.
     """
-    return (yield from Alone(_guarded(node, table, work, (), Torque())))
+    return await Alone(_guarded(node, table, work, (), Torque()))
 
 
-def _guarded(
+async def _guarded(
     node: Node, table: Table, work: Callable[[], Operation[T]], begun: Sequence[Change], torque: Torque
-) -> Operation[T]:
+) -> T:
     lock, pending = table["lock"].address, table["reg_write_pending"].address
     trouble: list[BaseException] = []
     doubted, node.unsure = node.unsure, set()
     try:
-        done = yield from afterwards(
+        done = await afterwards(
             _opened(node, lock, pending, work, trouble, torque),
             lambda: _locked(node, lock, trouble, begun, torque),
         )
@@ -226,45 +226,45 @@ def moves(table: Table, block: Block) -> bool:
     return any(row.effect is Effect.MOTION or row.name in _LIMITS for row in rows_in(table, block))
 
 
-def _opened(
+async def _opened(
     node: Node,
     lock: int,
     pending: int,
     work: Callable[[], Operation[T]],
     trouble: list[BaseException],
     torque: Torque,
-) -> Operation[T]:
+) -> T:
     try:
-        yield from _put(node, _lock(lock, 0))
+        await _put(node, _lock(lock, 0))
         torque.opened = True
         if not torque.was_on:
-            yield from disable_torque(node)
+            await disable_torque(node)
         else:
-            if (yield from is_limp(node)):
+            if await is_limp(node):
                 torque.stays_off = "another caller has switched it off"
-            yield from torque.taken(node)
-        yield from _harmless(node, pending)
-        done = yield from work()
-        yield from still_open(node, lock)
+            await torque.taken(node)
+        await _harmless(node, pending)
+        done = await work()
+        await still_open(node, lock)
         return done
     except BaseException as error:
         trouble.append(error)
         raise
 
 
-def _harmless(node: Node, pending: int) -> Operation[None]:
+async def _harmless(node: Node, pending: int) -> None:
     """See that no REG WRITE waits that would do more than switch torque off."""
-    if (yield from read_block(node, pending, 1, bytes, timeout=Timeout.STORE)) != _IDLE:
+    if await read_block(node, pending, 1, bytes, timeout=Timeout.STORE) != _IDLE:
         request = wire.reg_write(node.node, LIMP.address, LIMP.data)
         block = Block(LIMP.address, LIMP.data)
-        yield from acknowledged(node, request, block, rank=Rank.CONFIGURATION, later=Later(node.node))
+        await acknowledged(node, request, block, rank=Rank.CONFIGURATION, later=Later(node.node))
 
 
-def still_open(node: Node, lock: int) -> Operation[None]:
+async def still_open(node: Node, lock: int) -> None:
     """A servo that has lost its supply meanwhile comes back with its lock closed: it then takes every write, reads back
     right, and keeps none. Raises OutcomeUnknown, also when that cannot be found out."""
     try:
-        found = yield from read_block(node, lock, 1, bytes, timeout=Timeout.STORE)
+        found = await read_block(node, lock, 1, bytes, timeout=Timeout.STORE)
     except DOUBTS as error:
         raise unread(node, error) from error
     if found != _OPEN:
@@ -278,41 +278,41 @@ def still_open(node: Node, lock: int) -> Operation[None]:
         )
 
 
-def stored(node: Node, block: Block) -> Operation[None]:
+async def stored(node: Node, block: Block) -> None:
     """Write one block while the lock is open (see `unlocked`), and read it back."""
     node.unsure.update(
         range(block.address, block.address + len(block.data))
     )  # until the lock was seen to the end
-    yield from _put(node, block)
+    await _put(node, block)
     if block.address <= _STATUS_RETURN_LEVEL < block.address + len(block.data):
         node.forget_settings()  # from now on it may acknowledge differently
-    yield from verified(node, block, timeout=Timeout.STORE)
+    await verified(node, block, timeout=Timeout.STORE)
 
 
-def _put(node: Node, block: Block) -> Operation[None]:
-    yield from confirmed(node, block, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
+async def _put(node: Node, block: Block) -> None:
+    await confirmed(node, block, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
 
 
-def _locked(
+async def _locked(
     node: Node, lock: int, trouble: Sequence[BaseException], begun: Sequence[Change], torque: Torque
-) -> Operation[None]:
+) -> None:
     """Close the lock and see that it is closed. When something has gone wrong already, that is what is raised, and
     a lock that cannot be closed is told with it; whoever may have restarted with torque on is let go before, and what
     it took behind a lock that closed by itself is taken back."""
     if trouble:
         if torque.was_on:
-            yield from _still_ours(node, lock, torque)
+            await _still_ours(node, lock, torque)
         is_off = torque.was_on and not torque.stays_off  # `taken` has just been acknowledged
-        if (is_off or (yield from outcome(disable_torque(node))) is None) and begun:
-            yield from outcome(_taken_back(node, lock, begun))
+        if (is_off or await outcome(disable_torque(node)) is None) and begun:
+            await outcome(_taken_back(node, lock, begun))
     for _ in range(_ATTEMPTS):
-        failure = yield from outcome(_closed(node, lock))
+        failure = await outcome(_closed(node, lock))
         if failure is None:
-            yield from _torque_restored(node, trouble, torque)
+            await _torque_restored(node, trouble, torque)
             return
     assert failure is not None
     torque.stays_off = torque.stays_off or "its EEPROM lock may be open"
-    yield from _torque_restored(node, trouble or [failure], torque)
+    await _torque_restored(node, trouble or [failure], torque)
     if not trouble:
         raise failure
     trouble[0].add_note(
@@ -321,45 +321,45 @@ def _locked(
     )
 
 
-def _still_ours(node: Node, lock: int, torque: Torque) -> Operation[None]:
+async def _still_ours(node: Node, lock: int, torque: Torque) -> None:
     """After a failure: may the torque be given back? Not after a stop of another caller, nor after a restart."""
-    stopped = yield from outcome(torque.taken(node))
+    stopped = await outcome(torque.taken(node))
     if stopped is not None:
         torque.stays_off = torque.stays_off or stopped.summary
     if torque.opened:
         torque.opened = False  # this may run again after an interrupt, when the lock is closed
-        found = yield from outcome(read_block(node, lock, 1, bytes, timeout=Timeout.STORE))
+        found = await outcome(read_block(node, lock, 1, bytes, timeout=Timeout.STORE))
         if found != _OPEN:
             torque.stays_off = torque.stays_off or "it has restarted, or does not answer"
 
 
-def _torque_restored(node: Node, trouble: Sequence[BaseException], torque: Torque) -> Operation[None]:
+async def _torque_restored(node: Node, trouble: Sequence[BaseException], torque: Torque) -> None:
     """Goal := present position and torque on where the torque was on; the outcome is reported, or noted on an error."""
     if not torque.was_on:
         return
     why = torque.stays_off
     if not why:
-        failure = yield from outcome(torque_on_unless(node, torque.refusal))
+        failure = await outcome(torque_on_unless(node, torque.refusal))
         why = "" if failure is None else failure.summary
     event = TorqueAfterWrite(node.node, not why, why)
     if trouble:
         trouble[0].add_note(str(event))
     else:
-        yield from Report(event)
+        await Report(event)
 
 
-def _taken_back(node: Node, lock: int, begun: Sequence[Change]) -> Operation[None]:
+async def _taken_back(node: Node, lock: int, begun: Sequence[Change]) -> None:
     """Where the lock has closed by itself, registers that hold for now what they do not keep become what they were:
     or whoever applies the same again, another program as well, would find it there and write nothing."""
-    if (yield from read_block(node, lock, 1, bytes, timeout=Timeout.STORE)) == _OPEN:
+    if await read_block(node, lock, 1, bytes, timeout=Timeout.STORE) == _OPEN:
         return
     for change in reversed([one for one in begun if one.before]):
-        yield from _put(node, change.block._replace(data=change.before, effect=Effect.PERSISTENT))
+        await _put(node, change.block._replace(data=change.before, effect=Effect.PERSISTENT))
 
 
-def _closed(node: Node, lock: int) -> Operation[None]:
-    yield from _put(node, _lock(lock, 1))
-    yield from verified(node, _lock(lock, 1), timeout=Timeout.STORE)
+async def _closed(node: Node, lock: int) -> None:
+    await _put(node, _lock(lock, 1))
+    await verified(node, _lock(lock, 1), timeout=Timeout.STORE)
 
 
 def _lock(address: int, value: int) -> Block:

@@ -20,7 +20,6 @@ from motorbus.core.operation import (
     Effect,
     Exchange,
     Goal,
-    Operation,
     Rank,
     Refusal,
     Stops,
@@ -253,9 +252,9 @@ def write_block(
     )
 
 
-def confirmed(
+async def confirmed(
     node: Node, block: Block, *, rank: Rank = Rank.CONTROL, timeout: Timeout = Timeout.REPLY
-) -> Operation[None]:
+) -> None:
     """WRITE; when no acknowledgement is due, or none came, find out by reading back.
 
     Raises OutcomeUnknown when that cannot be found out, VerificationFailed when the write did not take effect.
@@ -263,25 +262,25 @@ def confirmed(
     doubt: MotorbusError | None = None
     exchange = write_block(node, block, rank=rank, timeout=timeout)
     try:
-        yield from exchange
+        await exchange
     except DOUBTS as error:
         doubt = error
     if doubt is None and exchange.replies:
         return
     if doubt is not None and not block.repeatable:
         raise doubt
-    yield from verified(node, block, doubt, timeout=timeout)
+    await verified(node, block, doubt, timeout=timeout)
 
 
-def verified(
+async def verified(
     node: Node, block: Block, doubt: MotorbusError | None = None, *, timeout: Timeout = Timeout.REPLY
-) -> Operation[None]:
+) -> None:
     """Read back what was written. Raises VerificationFailed when it differs, OutcomeUnknown when nobody answers.
 
     `doubt` is how the write itself failed, if it did.
     """
     try:
-        found = yield from read_block(node, block.address, len(block.data), bytes, timeout=timeout)
+        found = await read_block(node, block.address, len(block.data), bytes, timeout=timeout)
     except DOUBTS as error:
         if isinstance(doubt, OutcomeUnknown):
             raise doubt from error

@@ -12,7 +12,7 @@ from typing import Final, TypeVar
 from motorbus.core.agreed import agreed
 from motorbus.core.entry import Entry, Table
 from motorbus.core.family import State
-from motorbus.core.operation import Exchange, Operation, Runnable
+from motorbus.core.operation import Exchange, Runnable
 from motorbus.errors import DeviceError
 from motorbus.families.feetech.driver.exchanges import PRESENT, read_block
 from motorbus.families.feetech.driver.gauge import quantity
@@ -69,9 +69,9 @@ def state_of(node: Node, table: Table, data: bytes) -> State:
     )
 
 
-def _after(node: Node, say: Callable[[Node], Runnable[T]]) -> Operation[T]:
-    yield from known(node)
-    return (yield from say(node))
+async def _after(node: Node, say: Callable[[Node], Runnable[T]]) -> T:
+    await known(node)
+    return await say(node)
 
 
 def _raw(row: Entry, data: bytes) -> int:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple, TypeVar
 
 from motorbus.core.entry import Table, Value, shown
-from motorbus.core.operation import Answer, Due, Exchange, Goal, Operation, Whole, outcome
+from motorbus.core.operation import Answer, Due, Exchange, Goal, Whole, outcome
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import (
@@ -52,9 +52,9 @@ class GroupResult(NamedTuple):
 # -- read ----------------------------------------------------------------------------------------------------
 
 
-def sync_read(
+async def sync_read(
     names: Sequence[str], ids: Iterable[int | Node], *, rate: int = RATE, air: float = AIR
-) -> Operation[GroupResult]:
+) -> GroupResult:
     """These registers of all these servos, by as few SYNC READs as keep each train of replies within `air` s.
 
     Servos that know no SYNC READ are read one by one; maps may be mixed, and each value is read by the servo's own map.
@@ -63,11 +63,11 @@ def sync_read(
     """
     check_names(names)
     nodes = distinct(ids)
-    errors = yield from prepare_all(nodes, rate=rate, air=air)
+    errors = await prepare_all(nodes, rate=rate, air=air)
     raws: dict[int, dict[str, int]] = {node.node: {} for node in nodes if node.node not in errors}
     for table, group in _by_table(node for node in nodes if node.node in raws):
         for span in spans(rows_of(table, names)):
-            yield from _sync_read_span(span, group, raws, errors, rate, air)
+            await _sync_read_span(span, group, raws, errors, rate, air)
     answered = [node for node in nodes if node.node not in errors]
     return GroupResult(
         {node.node: _values(node, names, raws[node.node]) for node in answered},
@@ -77,31 +77,31 @@ def sync_read(
     )
 
 
-def prepare_all(
+async def prepare_all(
     ids: Iterable[int | Node], *, rate: int = RATE, air: float = AIR
-) -> Operation[dict[int, MotorbusError]]:
+) -> dict[int, MotorbusError]:
     """Read identity, limits, mode and units of all of these that are not known yet; the errors by id."""
     nodes = [node for node in distinct(ids) if node.table is None or node.settings is None]
     errors: dict[int, MotorbusError] = {}
     for part in trains(nodes, IMAGE, rate, air):
-        images = yield from collected(part, 0, IMAGE, errors)
+        images = await collected(part, 0, IMAGE, errors)
         for node in part:
             if node.node in images:
                 learn(node, images[node.node])
     return errors
 
 
-def _sync_read_span(
+async def _sync_read_span(
     span: Span,
     group: Sequence[Node],
     raws: dict[int, dict[str, int]],
     errors: dict[int, MotorbusError],
     rate: int,
     air: float,
-) -> Operation[None]:
+) -> None:
     here = [node for node in group if node.node not in errors]
     for part in trains(here, span.size, rate, air):
-        found = yield from collected(part, span.address, span.size, errors)
+        found = await collected(part, span.address, span.size, errors)
         for id, data in found.items():
             raws[id].update(decode(span, data))
 
@@ -153,20 +153,20 @@ def sync_exchange(
     return exchange(count, more if more > count else None)
 
 
-def collected(
+async def collected(
     nodes: Sequence[Node], address: int, count: int, errors: dict[int, MotorbusError]
-) -> Operation[dict[int, bytes]]:
+) -> dict[int, bytes]:
     """One block of each: by SYNC READ, and by READ of those whom it did not bring; the errors of the rest by id.
 
     Those whose map is known to have no SYNC READ are not asked by it, and wait for nobody. What servos do whose
     predecessor in the list is silent is not documented.
     """
     able = [node for node in nodes if node.control.sync_read]
-    heard = (yield from outcome(block_of_each(able, address, count))) if able else {}
+    heard = await outcome(block_of_each(able, address, count)) if able else {}
     found = {} if isinstance(heard, MotorbusError) else heard
     for node in nodes:
         if node.node not in found:
-            data = yield from outcome(read_block(node, address, count, bytes))
+            data = await outcome(read_block(node, address, count, bytes))
             if isinstance(data, MotorbusError):
                 errors[node.node] = data
             else:
@@ -227,12 +227,12 @@ def _values(node: Node, names: Sequence[str], raws: Mapping[str, int]) -> dict[s
 # -- write ---------------------------------------------------------------------------------------------------
 
 
-def sync_write(
+async def sync_write(
     values: Mapping[One, Mapping[str, Value]],
     *,
     rate: int = RATE,
     air: float = AIR,
-) -> Operation[None]:
+) -> None:
     """Write the same adjoining RAM registers of many servos: `{id or servo: {name: value}}`, in API units.
 
     One packet serves up to 83 servos with two bytes each; more are split, and so are servos in whose maps the registers
@@ -244,7 +244,7 @@ def sync_write(
     for orders in values.values():
         check_values(orders)
     nodes = distinct(values)
-    errors = yield from prepare_all(nodes, rate=rate, air=air)
+    errors = await prepare_all(nodes, rate=rate, air=air)
     if errors:
         raise next(iter(errors.values()))
     refuse_other_names(nodes, list(values.values()))
@@ -252,14 +252,14 @@ def sync_write(
         block_of(node, orders)._replace(under=node.settings)
         for node, orders in zip(nodes, values.values(), strict=True)
     ]
-    yield from written_all(list(sync_writes(nodes, blocks)))
+    await written_all(list(sync_writes(nodes, blocks)))
 
 
-def written_all(exchanges: Sequence[Exchange[None]]) -> Operation[None]:
+async def written_all(exchanges: Sequence[Exchange[None]]) -> None:
     """These one after the other; an error of a later one is told with a note that the first ones have left."""
     for sent, exchange in enumerate(exchanges):
         try:
-            yield from exchange
+            await exchange
         except MotorbusError as error:
             if sent:
                 error.add_note(f"{sent} of {len(exchanges)} packets had left before this one")

@@ -12,7 +12,7 @@ from typing import Final
 
 from motorbus.core.entry import Table
 from motorbus.core.family import Health, State
-from motorbus.core.operation import Operation, Runnable
+from motorbus.core.operation import Runnable
 from motorbus.families.feetech.driver.exchanges import PRESENT, read_block
 from motorbus.families.feetech.driver.feedback import FEEDBACK, state_of
 from motorbus.families.feetech.driver.identity import known
@@ -40,9 +40,9 @@ def health(node: Node) -> Runnable[Health]:
     return read_block(node, TORQUE_ENABLE, WHOLE, take)
 
 
-def _met(node: Node) -> Operation[Health]:
-    yield from known(node)
-    return (yield from health(node))
+async def _met(node: Node) -> Health:
+    await known(node)
+    return await health(node)
 
 
 def _health(node: Node, table: Table, data: bytes) -> Health:

@@ -13,7 +13,7 @@ from typing import Final
 
 from motorbus.core.entry import Access, Entry, Table, changed
 from motorbus.core.family import Identity
-from motorbus.core.operation import Due, Exchange, Operation, Rank, Timeout
+from motorbus.core.operation import Due, Exchange, Rank, Timeout
 from motorbus.errors import DeviceError, NoReply
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import ACKNOWLEDGED, acknowledged, read_block
@@ -41,10 +41,10 @@ _COMMON: Final = frozenset(
 _ONE_UNIT_IN_ALL_MAPS: Final = ("V", "°C", "fraction")
 
 
-def ping(node: Node) -> Operation[bool]:
+async def ping(node: Node) -> bool:
     """Is it there? Silence is the answer False; bytes that are no answer raise WireError."""
     try:
-        yield from ping_exchange(node)
+        await ping_exchange(node)
     except NoReply:
         return False
     return True
@@ -87,19 +87,19 @@ def prepare(node: Node) -> Exchange[Identity]:
     return kept
 
 
-def known(node: Node) -> Operation[Table]:
+async def known(node: Node) -> Table:
     """The register map of this servo; asks it when its settings are not known yet."""
     if node.table is not None and node.settings is not None:
         return node.table
-    identity: Identity = yield prepare(node)  # as `yield from` it, without a generator of its own
+    identity = await prepare(node)
     if node.table is None:  # who answered stands for a servo and is none, as in a dry run: its answer says so
         return TABLES[identity.table]
     return node.table
 
 
-def writable(node: Node) -> Operation[Table]:
+async def writable(node: Node) -> Table:
     """As `known`, for those who will write. Raises DeviceError when the map is not known."""
-    table = yield from known(node)
+    table = await known(node)
     refuse_unless_writable(node)
     return table
 

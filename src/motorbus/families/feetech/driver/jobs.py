@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 
 from motorbus.core.entry import Table
 from motorbus.core.family import Readdressed
-from motorbus.core.operation import OUTCOME, REACHED, Effect, Journal, Operation, Report
+from motorbus.core.operation import OUTCOME, REACHED, Effect, Journal, Report
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.exchanges import Block
 from motorbus.families.feetech.driver.identity import identity_of
@@ -162,30 +162,30 @@ class Course:
         self.job = job
         self.reached = list(reached)
 
-    def reach(self, state: str, place: Place | None = None) -> Operation[None]:
+    async def reach(self, state: str, place: Place | None = None) -> None:
         """Record that this state is reached; with a place, of which of both the value is meant."""
         word = state if place is None else f"{state} {self.job.value(place)}"
         facts = {} if self.reached else self.job.facts()
         if not self.reached:
-            yield from self._readdressed()
+            await self._readdressed()
         self.reached.append(word)
-        yield from Report(Journal(self.job.verb, word, facts))
+        await Report(Journal(self.job.verb, word, facts))
 
-    def resume(self, state: str) -> Operation[None]:
+    async def resume(self, state: str) -> None:
         """The same for whoever takes it up again, maybe on a bus whose journal knows nothing of it: all is told."""
         facts = {**self.job.facts(), REACHED: list(self.reached)}
-        yield from self._readdressed()
+        await self._readdressed()
         self.reached.append(state)
-        yield from Report(Journal(self.job.verb, state, facts))
+        await Report(Journal(self.job.verb, state, facts))
 
-    def _readdressed(self) -> Operation[None]:
+    async def _readdressed(self) -> None:
         if self.job.new.id != self.job.old.id:
-            yield from Report(Readdressed(self.job.old.id, self.job.new.id))
+            await Report(Readdressed(self.job.old.id, self.job.new.id))
 
-    def end(self, outcome: str) -> Operation[None]:
+    async def end(self, outcome: str) -> None:
         """Record how it ended: "new" or "old"."""
         self.reached.append(OUTCOME)
-        yield from Report(Journal(self.job.verb, OUTCOME, {"outcome": outcome, **self.job.name()}))
+        await Report(Journal(self.job.verb, OUTCOME, {"outcome": outcome, **self.job.name()}))
 
     @property
     def following(self) -> bool:

@@ -12,7 +12,7 @@ from typing import Final, Literal
 
 from motorbus.core.entry import Entry, shown
 from motorbus.core.family import Positions
-from motorbus.core.operation import UNLIKE, Answer, Exchange, Operation, Unlike, Whole, outcome
+from motorbus.core.operation import UNLIKE, Answer, Exchange, Unlike, Whole, outcome
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, places, read_block, settings_of_now
 from motorbus.families.feetech.driver.gauge import Packets, measure
@@ -61,7 +61,7 @@ def position_reads(
     return found + [_alone(node) for node in nodes if not node.control.sync_read]
 
 
-def read_positions(servos: Sequence[Node], *, rate: int = RATE, air: float = AIR) -> Operation[Positions]:
+async def read_positions(servos: Sequence[Node], *, rate: int = RATE, air: float = AIR) -> Positions:
     """The present positions of all of these, of whatever map; made anew for each cycle.
 
     Who does not answer is missing from the values, and costs the others nothing. Raises RequestError when a servo is
@@ -70,7 +70,7 @@ def read_positions(servos: Sequence[Node], *, rate: int = RATE, air: float = AIR
     values: dict[int, float] = {}
     at = float("-inf")
     for exchange in position_reads(servos, rate=rate, air=air):
-        found = yield from outcome(exchange)
+        found = await outcome(exchange)
         if isinstance(found, DOUBTS):
             continue
         if isinstance(found, MotorbusError):

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from motorbus.core.entry import Table
-from motorbus.core.operation import Effect, Operation
+from motorbus.core.operation import Effect
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver import eeprom
 from motorbus.families.feetech.driver.bound import leaving_current_mode
@@ -23,19 +23,19 @@ from motorbus.families.feetech.driver.torque import disable_torque
 from motorbus.families.feetech.table import Mode
 
 
-def mode(node: Node) -> Operation[Mode]:
+async def mode(node: Node) -> Mode:
     """What the servo heeds now, asked anew: position, velocity, pwm, step or current.
 
     Raises DeviceError when its register map is not known, RequestError for a mode that no source explains.
     """
-    yield from prepare(node)
-    yield from writable(node)
+    await prepare(node)
+    await writable(node)
     if node.known_mode is None:
         raise unknown_mode(node)
     return node.known_mode
 
 
-def set_mode(node: Node, mode: Mode | str, *, limits: tuple[float, float] | None = None) -> Operation[None]:
+async def set_mode(node: Node, mode: Mode | str, *, limits: tuple[float, float] | None = None) -> None:
     """Put the servo into a mode, for good; it is limp afterwards, and `enable_torque` begins at rest. The mode that it
     has already is not written again.
 
@@ -46,8 +46,8 @@ def set_mode(node: Node, mode: Mode | str, *, limits: tuple[float, float] | None
     errors of a guarded write to EEPROM.
     """
     wanted = _named(mode)
-    yield from prepare(node)
-    table = yield from writable(node)
+    await prepare(node)
+    table = await writable(node)
     if wanted not in node.control.has:
         raise _lacking(node, wanted)
     if wanted is Mode.PWM and not node.control.duty:
@@ -57,11 +57,11 @@ def set_mode(node: Node, mode: Mode | str, *, limits: tuple[float, float] | None
         if node.control.modes
         else _by_limits(node, table, wanted, limits)
     )
-    if not (yield from eeprom.store(node, table, leaving_current_mode(node, table, wanted, blocks))):
-        yield from disable_torque(node)
-    yield from prepare(node)
+    if not await eeprom.store(node, table, leaving_current_mode(node, table, wanted, blocks)):
+        await disable_torque(node)
+    await prepare(node)
     if wanted in (Mode.VELOCITY, Mode.PWM, Mode.CURRENT):
-        yield from ordered(node, table, at_rest(node, table, wanted))
+        await ordered(node, table, at_rest(node, table, wanted))
 
 
 def _named(mode: Mode | str) -> Mode:

@@ -14,7 +14,7 @@ from typing import Final, TypeVar
 
 from motorbus.core.entry import Table, is_number, shown
 from motorbus.core.interrupted import Moving, stopped_if_interrupted
-from motorbus.core.operation import Effect, Operation, Pause, Runnable, outcome
+from motorbus.core.operation import Effect, Pause, Runnable, outcome
 from motorbus.errors import LimitExceeded, MotorbusError, RequestError, VerificationFailed
 from motorbus.families.feetech.driver.arrival import Move, arrive
 from motorbus.families.feetech.driver.bound import ask_bound
@@ -80,7 +80,7 @@ _AT_REST: Final = {
 # -- hold and let go -----------------------------------------------------------------------------------------
 
 
-def enable_torque(node: Node, *, jump: float = 0.0) -> Operation[None]:
+async def enable_torque(node: Node, *, jump: float = 0.0) -> None:
     """Torque on without a jump: the goal becomes the present position with it (velocity, duty or current 0 there).
 
     One packet carries both, so that a servo which starts anew in between is limp and nothing else; the switch is read
@@ -94,10 +94,10 @@ def enable_torque(node: Node, *, jump: float = 0.0) -> Operation[None]:
     of many turns that tells its position within one (there `jump` must be as much as all of them); for a `jump` that
     is no finite number from 0 on; MotionError when its torque is off again at once, or it has forgotten its turns.
     """
-    yield from torque_on_unless(node, None, jump=jump)
+    await torque_on_unless(node, None, jump=jump)
 
 
-def stop(node: Node) -> Operation[Promise]:
+async def stop(node: Node) -> Promise:
     """Decelerate and stay: the goal becomes the position of this moment (velocity, duty or current 0 in those modes).
 
     Mode and limits are read anew, for another program may have changed them. Returns what was promised. A limp STS
@@ -110,7 +110,7 @@ def stop(node: Node) -> Operation[Promise]:
     servo of many turns that tells its position within one. Raises MotionError, with the servo limp, when it has
     forgotten its turns meanwhile; VerificationFailed when it reads back something else three times.
     """
-    table = yield from asked_anew(node)
+    table = await asked_anew(node)
     mode = node.known_mode
     if mode is None:
         raise unknown_mode(node)
@@ -123,8 +123,8 @@ def stop(node: Node) -> Operation[Promise]:
     for again in reversed(range(_TRIES)):
         try:
             if mode is Mode.POSITION:
-                return (yield from _stay(node, table))
-            yield from ordered(node, table, at_rest(node, table, mode))
+                return await _stay(node, table)
+            await ordered(node, table, at_rest(node, table, mode))
             break
         except VerificationFailed:  # where no acknowledgement is due, this is how a lost packet shows
             if not again:
@@ -132,7 +132,7 @@ def stop(node: Node) -> Operation[Promise]:
     return _AT_REST[mode]
 
 
-def _stay(node: Node, table: Table) -> Operation[Promise]:
+async def _stay(node: Node, table: Table) -> Promise:
     """Goal := here, unless that could set a limp servo into motion.
 
     A host that sleeps between the reading and the goal would send it back to where it was. So a reading that is too old
@@ -140,39 +140,39 @@ def _stay(node: Node, table: Table) -> Operation[Promise]:
     three times at most, for a stop is sent whatever happens.
     """
     for again in reversed(range(_TRIES)):
-        asked = yield from Pause(0.0)
-        here = yield from outcome(held(node, table))
+        asked = await Pause(0.0)
+        here = await outcome(held(node, table))
         told = node.at
         doubtful = isinstance(here, RequestError) or (isinstance(here, Block) and outside(node, table, here))
-        if doubtful and (yield from is_limp(node)):
+        if doubtful and await is_limp(node):
             return Promise.LIMP
         if isinstance(here, MotorbusError):
             raise here
-        waited = (yield from Pause(0.0)) - told
+        waited = await Pause(0.0) - told
         if again and (waited > OLD or told - asked > SLEPT):
             continue
-        yield from ordered(node, table, here)
-        if not again or (yield from Pause(0.0)) - asked <= SLEPT:
-            yield from not_turns_away(node, table, here)
+        await ordered(node, table, here)
+        if not again or await Pause(0.0) - asked <= SLEPT:
+            await not_turns_away(node, table, here)
             break
     return Promise.OUTSIDE_ACCEPTED if doubtful else Promise.HOLD_ACCEPTED
 
 
-def calmed(node: Node, table: Table) -> Operation[None]:
+async def calmed(node: Node, table: Table) -> None:
     """What a servo that has torque and no force would go for becomes where it is, or no velocity, duty or current.
 
     For whoever is about to give it its force back. Does nothing to a limp one, and in step mode, where nothing waits.
     Raises LimitExceeded when it stands outside its limits, to which it would go; errors as enable_torque() otherwise.
     """
     mode = node.known_mode
-    if mode is Mode.STEP or (yield from is_limp(node)):
+    if mode is Mode.STEP or await is_limp(node):
         return
     if mode is None:
         raise unknown_mode(node)
     if mode is not Mode.POSITION:
-        yield from ordered(node, table, at_rest(node, table, mode))
+        await ordered(node, table, at_rest(node, table, mode))
         return
-    block = yield from held(node, table)
+    block = await held(node, table)
     if outside(node, table, block):
         raise LimitExceeded(
             f"node {node.node} stands outside its limits: with its force back it would go for the nearer one",
@@ -180,13 +180,13 @@ def calmed(node: Node, table: Table) -> Operation[None]:
             advice="disable_torque() first, then enable_torque(jump=…) bounds that way; nothing was sent",
             node=node.node,
         )
-    yield from ordered(node, table, block)
+    await ordered(node, table, block)
 
 
 # -- move ----------------------------------------------------------------------------------------------------
 
 
-def move(
+async def move(
     node: Node,
     to: float,
     *,
@@ -196,7 +196,7 @@ def move(
     wait: bool = True,
     tolerance: float | None = None,
     timeout: float | None = None,
-) -> Operation[None]:
+) -> None:
     """Move to `to` rad, at most at `velocity` rad/s and `acceleration` rad/s² (None: the servo's maximum).
 
     Mode and limits are read first, each time: another program may have changed them (a loop that cannot spare that
@@ -214,38 +214,38 @@ def move(
     MotionError when its torque is off again at once.
     """
     finite(node, to, velocity, acceleration, current, tolerance, timeout)
-    table = yield from asked_anew(node)
-    yield from ask_bound(node, table, current)
+    table = await asked_anew(node)
+    await ask_bound(node, table, current)
     block = move_block(node, table, to, velocity, acceleration, current)
     if not wait:
         node.last_move = None
-        yield from _sent(node, table, block)
+        await _sent(node, table, block)
         return
     order = way(node, table, block.goals[0].value, velocity, acceleration, tolerance, timeout)
-    yield from stops(_gone(node, table, block, order), node)
+    await stops(_gone(node, table, block, order), node)
 
 
-def stops(move: Runnable[T], *nodes: Node) -> Operation[T]:
+async def stops(move: Runnable[T], *nodes: Node) -> T:
     """Order a move and wait for it; when that is interrupted the servos stop and hold. A limp one stays limp."""
     devices = [Moving(node, partial(_stopped, node), partial(position, node)) for node in nodes]
-    return (yield from stopped_if_interrupted(move, *devices))
+    return await stopped_if_interrupted(move, *devices)
 
 
-def _stopped(node: Node) -> Operation[Promise | None]:
-    if (yield from outcome(is_limp(node))) is True:
+async def _stopped(node: Node) -> Promise | None:
+    if await outcome(is_limp(node)) is True:
         return None
-    return (yield from stop(node))
+    return await stop(node)
 
 
-def _gone(node: Node, table: Table, block: Block, order: Move) -> Operation[None]:
-    yield from _sent(node, table, block)
-    yield from arrive(node, table, order)
+async def _gone(node: Node, table: Table, block: Block, order: Move) -> None:
+    await _sent(node, table, block)
+    await arrive(node, table, order)
 
 
-def _sent(node: Node, table: Table, block: Block) -> Operation[None]:
-    yield from ordered(node, table, block)
+async def _sent(node: Node, table: Table, block: Block) -> None:
+    await ordered(node, table, block)
     if not node.control.goal_switches_on:
-        yield from surely_on(node)
+        await surely_on(node)
 
 
 def way(

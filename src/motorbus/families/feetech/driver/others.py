@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from motorbus.core.operation import Operation, Progress, Report, Timeout, outcome
+from motorbus.core.operation import Progress, Report, Timeout, outcome
 from motorbus.errors import LinkLost, NoReply, RequestError
 from motorbus.families.feetech.driver.exchanges import read_block
 from motorbus.families.feetech.driver.identity import identity_of
@@ -20,38 +20,38 @@ from motorbus.families.feetech.table import TABLES
 _HEAD: Final = 5
 
 
-def others_than(node: Node, asked: Sequence[int], ids: Sequence[int]) -> Operation[list[int]]:
+async def others_than(node: Node, asked: Sequence[int], ids: Sequence[int]) -> list[int]:
     """Who else is on this bus, of these ids and the one as shipped, where a servo may appear whose own is torn; the
     silent ones are asked twice. A servo whose second id is one of `ids` raises RequestError."""
     others = []
     asked = list(dict.fromkeys((*asked, SHIPPED_ID)))
     for done, id in enumerate(asked):
-        yield from Report(Progress(done + 1, len(asked), f"who else is there? id {id}"))
+        await Report(Progress(done + 1, len(asked), f"who else is there? id {id}"))
         if id == node.node:
             continue
-        head = yield from outcome(_head(id))
+        head = await outcome(_head(id))
         if isinstance(head, NoReply):
-            head = yield from outcome(_head(id))
+            head = await outcome(_head(id))
         if isinstance(head, LinkLost):
             raise head
         if isinstance(head, NoReply):
             continue
         others.append(id)
         if isinstance(head, bytes):
-            yield from _refuse_second(id, head, ids)
+            await _refuse_second(id, head, ids)
     return others
 
 
-def _head(id: int) -> Operation[bytes]:
-    return (yield from read_block(Node(id), 0, _HEAD, bytes, timeout=Timeout.SCAN))
+async def _head(id: int) -> bytes:
+    return await read_block(Node(id), 0, _HEAD, bytes, timeout=Timeout.SCAN)
 
 
-def _refuse_second(id: int, head: bytes, ids: Sequence[int]) -> Operation[None]:
+async def _refuse_second(id: int, head: bytes, ids: Sequence[int]) -> None:
     table = TABLES.get(identity_of(id, head).table)
     if table is None or "second_id" not in table:
         return
     row = table["second_id"]
-    second = yield from read_block(Node(id), row.address, row.size, row.decode)
+    second = await read_block(Node(id), row.address, row.size, row.decode)
     if second in ids and second != id:
         raise RequestError(
             f"servo {id} has {second} as its second id: it would obey every write to {second} without a word",

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 from motorbus.core.entry import Table
 from motorbus.core.family import State
-from motorbus.core.operation import Operation, Pause, outcome
+from motorbus.core.operation import Pause, outcome
 from motorbus.errors import DeviceError, MotorbusError, RequestError
 from motorbus.families.feetech.driver.alarm import alarms
 from motorbus.families.feetech.driver.feedback import state_exchange
@@ -38,7 +38,7 @@ class Recovery(NamedTuple):
     remaining: tuple[str, ...]
 
 
-def recover_overload(node: Node, *, rest: float = REST) -> Operation[Recovery]:
+async def recover_overload(node: Node, *, rest: float = REST) -> Recovery:
     """Bring a servo back whose overload (or over-current) protection has tripped; it holds where it stands then.
 
     Between the two it is limp for `rest` s, and an arm sags. Does nothing when neither alarm is set. Raises
@@ -47,21 +47,21 @@ def recover_overload(node: Node, *, rest: float = REST) -> Operation[Recovery]:
     sent, when `rest` is no finite number from 0 on.
     """
     _check(node, rest)
-    table = yield from writable(node)
-    tripped = tuple(name for name in (yield from state_exchange(node, table)).alarm if name in TRIPS)
+    table = await writable(node)
+    tripped = tuple(name for name in (await state_exchange(node, table)).alarm if name in TRIPS)
     if tripped:
-        yield from disable_torque(node)
-        yield from Pause(rest)
+        await disable_torque(node)
+        await Pause(rest)
         try:
-            yield from enable_torque(node)
-            stays = yield from _tripped(node, table)
+            await enable_torque(node)
+            stays = await _tripped(node, table)
         except MotorbusError as error:
-            yield from _let_go(node, error)
+            await _let_go(node, error)
             raise
         if stays:
-            yield from disable_torque(node)
+            await disable_torque(node)
             raise _stays(node, tripped)
-    return Recovery(tripped, (yield from alarms(node)))
+    return Recovery(tripped, await alarms(node))
 
 
 def _check(node: Node, rest: float) -> None:
@@ -75,17 +75,17 @@ def _check(node: Node, rest: float) -> None:
         )
 
 
-def _let_go(node: Node, error: MotorbusError) -> Operation[None]:
+async def _let_go(node: Node, error: MotorbusError) -> None:
     """Whatever came of switching its torque on, it ends limp."""
-    failure = yield from outcome(disable_torque(node))
+    failure = await outcome(disable_torque(node))
     if failure is not None:
         error.add_note(
             f"node {node.node} may still hold: disable_torque() was not acknowledged ({failure.summary})"
         )
 
 
-def _tripped(node: Node, table: Table) -> Operation[bool]:
-    state: State = yield from state_exchange(node, table)
+async def _tripped(node: Node, table: Table) -> bool:
+    state: State = await state_exchange(node, table)
     return bool(TRIPS.intersection(state.alarm))
 
 

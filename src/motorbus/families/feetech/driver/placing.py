@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from motorbus.core.operation import Effect, Operation, Pause, Rank, Timeout, Tune
+from motorbus.core.operation import Effect, Pause, Rank, Timeout, Tune
 from motorbus.errors import NoReply, OutcomeUnknown, RequestError, WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import Block, confirmed, read_block, unanswered, verified
@@ -34,52 +34,52 @@ NOISE: Final = b"\xff"
 """Stands for bytes that are no answer."""
 
 
-def rewritten(job: Job, node: Node, goal: Place, course: Course, before: bytes = b"") -> Operation[Node]:
+async def rewritten(job: Job, node: Node, goal: Place, course: Course, before: bytes = b"") -> Node:
     """Write the cell with the lock open and see the servo at its goal; gives it as it is there, its lock open.
 
     `before` are its registers 0 to 39 as they are now, where they may differ from those of the job.
 
     Raises OutcomeUnknown when it is not seen there, or its lock has been closed since: it has lost its supply.
     """
-    yield from unlocked(job, node)
-    yield from course.reach(WRITING, goal)
+    await unlocked(job, node)
+    await course.reach(WRITING, goal)
     block = job.block(goal)
     request = wire.write(node.node, block.address, block.data)
-    yield from unanswered(request, block.effect, rank=Rank.CONFIGURATION)
-    yield from Pause(COMMIT)
-    yield from Tune(goal.rate)
-    image = yield from seen(goal.id)
+    await unanswered(request, block.effect, rank=Rank.CONFIGURATION)
+    await Pause(COMMIT)
+    await Tune(goal.rate)
+    image = await seen(goal.id)
     if not job.is_at(goal, image, before):
         raise _not_there(job, goal, image)
     there = like(node, goal.id)
-    yield from _still_open(job, there)
-    yield from course.reach(WRITTEN, goal)
+    await _still_open(job, there)
+    await course.reach(WRITTEN, goal)
     return there
 
 
-def followed(job: Job, node: Node, goal: Place, course: Course) -> Operation[None]:
+async def followed(job: Job, node: Node, goal: Place, course: Course) -> None:
     """Write the second id of a servo that is at its goal, its lock open, where it goes along (`Job.second`).
 
     Raises VerificationFailed when it reads back different, OutcomeUnknown when the lock has been closed since.
     """
     if job.second is None:
         return
-    yield from course.reach(SECOND, goal)
+    await course.reach(SECOND, goal)
     block = Block(job.second, bytes((goal.id,)), Effect.PERSISTENT)
-    yield from confirmed(node, block, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
-    yield from Pause(COMMIT)
-    yield from verified(node, block, timeout=Timeout.STORE)
-    yield from _still_open(job, node)
+    await confirmed(node, block, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
+    await Pause(COMMIT)
+    await verified(node, block, timeout=Timeout.STORE)
+    await _still_open(job, node)
 
 
-def unlocked(job: Job, node: Node) -> Operation[None]:
+async def unlocked(job: Job, node: Node) -> None:
     """Open the lock of a servo, and let it go limp: in this order, for one that restarts later has its lock closed."""
-    yield from confirmed(node, Block(job.lock, OPEN, Effect.PERSISTENT), timeout=Timeout.STORE)
-    yield from disable_torque(node)
+    await confirmed(node, Block(job.lock, OPEN, Effect.PERSISTENT), timeout=Timeout.STORE)
+    await disable_torque(node)
 
 
-def _still_open(job: Job, node: Node) -> Operation[None]:
-    if (yield from read_block(node, job.lock, 1, bytes)) != OPEN:
+async def _still_open(job: Job, node: Node) -> None:
+    if await read_block(node, job.lock, 1, bytes) != OPEN:
         raise OutcomeUnknown(
             f"node {node.node} has closed its lock by itself: it has lost its supply in the middle of the change",
             expected="an open lock",
@@ -89,25 +89,25 @@ def _still_open(job: Job, node: Node) -> Operation[None]:
         )
 
 
-def locked(job: Job, node: Node) -> Operation[None]:
+async def locked(job: Job, node: Node) -> None:
     """Close the lock of a servo, whose settings are known, and see that it is closed."""
     block = Block(job.lock, CLOSED, Effect.PERSISTENT)
-    yield from confirmed(node, block, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
-    yield from verified(node, block, timeout=Timeout.STORE)
+    await confirmed(node, block, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
+    await verified(node, block, timeout=Timeout.STORE)
 
 
-def look(id: int) -> Operation[bytes]:
+async def look(id: int) -> bytes:
     """Registers 0 to 39 of whoever answers to this id; b"" for silence. Raises WireError for what is no answer."""
     try:
-        return (yield from read_block(Node(id), 0, IMAGE, bytes))
+        return await read_block(Node(id), 0, IMAGE, bytes)
     except NoReply:
         return b""
 
 
-def whoever(id: int) -> Operation[bytes]:
+async def whoever(id: int) -> bytes:
     """As `look`; what is no answer counts as somebody."""
     try:
-        return (yield from look(id))
+        return await look(id)
     except WireError:
         return NOISE
 
@@ -126,14 +126,14 @@ def refuse_taken(place: Place, image: bytes) -> None:
     )
 
 
-def seen(id: int) -> Operation[bytes]:
+async def seen(id: int) -> bytes:
     """As `look`, for a servo that ought to be there and may still be starting."""
     for _ in range(LOOKS - 1):
-        image = yield from look(id)
+        image = await look(id)
         if image != b"":
             return image
-        yield from Pause(AWAKE)
-    return (yield from look(id))
+        await Pause(AWAKE)
+    return await look(id)
 
 
 def met(id: int, image: bytes) -> Node:

@@ -15,7 +15,6 @@ from motorbus.core.operation import (
     ASKED,
     Alone,
     Journal,
-    Operation,
     Pause,
     Report,
     Timeout,
@@ -38,7 +37,7 @@ from motorbus.families.feetech.driver.sharing import refuse_duplicates
 from motorbus.families.feetech.table import BAUD_CODES, BAUD_CODES_OF
 
 
-def set_baud(node: Node, rate: int, *, among: Sequence[int] = ()) -> Operation[Found]:
+async def set_baud(node: Node, rate: int, *, among: Sequence[int] = ()) -> Found:
     """Let this servo speak at `rate` bit/s from now on, for good; gives where it is now. The bus keeps its own rate.
 
     The servo goes limp. `among` are the ids that other servos on this bus may have; () means every one, which takes
@@ -50,21 +49,21 @@ def set_baud(node: Node, rate: int, *, among: Sequence[int] = ()) -> Operation[F
     """
     _refuse_unknown(rate)
     asked = [one.node for one in as_nodes(among or range(wire.MAX_ID + 1))]
-    yield from Report(Journal(SET_BAUD, ASKED, {}))
-    image = yield from met_alone(node)
-    table = yield from writable(node)
+    await Report(Journal(SET_BAUD, ASKED, {}))
+    image = await met_alone(node)
+    table = await writable(node)
     _refuse_lacking(node, table, rate)
-    present = yield from Tune(0)
+    present = await Tune(0)
     job = Job(SET_BAUD, Place(node.node, present), Place(node.node, rate), image)
     if rate == present:
-        yield from Alone(locked(job, node))
+        await Alone(locked(job, node))
         return Found(node.node, rate, node.identity)
-    yield from refuse_duplicates(node)
-    yield from Alone(afterwards(_look_there(job.new), lambda: iter(Tune(present))))
-    yield from Alone(afterwards(_look_around(job), lambda: iter(Tune(present))))
-    others = yield from others_than(node, asked, (node.node,))
+    await refuse_duplicates(node)
+    await Alone(afterwards(_look_there(job.new), lambda: Tune(present)))
+    await Alone(afterwards(_look_around(job), lambda: Tune(present)))
+    others = await others_than(node, asked, (node.node,))
     job = job._replace(others=tuple(others))
-    yield from guarded(job, node)
+    await guarded(job, node)
     return Found(node.node, rate, node.identity)
 
 
@@ -88,13 +87,13 @@ def _refuse_lacking(node: Node, table: Table, rate: int) -> None:
         )
 
 
-def _look_there(there: Place) -> Operation[None]:
+async def _look_there(there: Place) -> None:
     """Is the link able to have this rate, and is the id free there?"""
-    yield from Tune(there.rate)
-    refuse_taken(there, (yield from whoever(there.id)))
+    await Tune(there.rate)
+    refuse_taken(there, await whoever(there.id))
 
 
-def _look_around(job: Job) -> Operation[None]:
+async def _look_around(job: Job) -> None:
     """Has nobody its id at any other rate? One whose rate is torn may appear at each of them, and must be the only one.
 
     A rate that the link does not have is no place where anybody is looked for, before or after.
@@ -102,18 +101,18 @@ def _look_around(job: Job) -> Operation[None]:
     for rate in BAUD_CODES.values():
         if rate in (job.old.rate, job.new.rate):
             continue
-        refusal = yield from outcome(iter(Tune(rate)))
+        refusal = await outcome(Tune(rate))
         if isinstance(refusal, LinkLost):
             raise refusal
         if isinstance(refusal, MotorbusError):
             continue
-        yield from Pause(DRAIN)
-        image = yield from outcome(_glance(job.old.id))
+        await Pause(DRAIN)
+        image = await outcome(_glance(job.old.id))
         if isinstance(image, LinkLost):
             raise image
         if not isinstance(image, NoReply):
             refuse_taken(Place(job.old.id, rate), image if isinstance(image, bytes) else NOISE)
 
 
-def _glance(id: int) -> Operation[bytes]:
-    return (yield from read_block(Node(id), 0, IMAGE, bytes, timeout=Timeout.SCAN))
+async def _glance(id: int) -> bytes:
+    return await read_block(Node(id), 0, IMAGE, bytes, timeout=Timeout.SCAN)

@@ -21,7 +21,6 @@ from typing import Any, Final, NamedTuple
 from motorbus.core.operation import (
     Alone,
     Effect,
-    Operation,
     Pause,
     Progress,
     Rank,
@@ -77,7 +76,7 @@ class Seen(NamedTuple):
     image: bytes
 
 
-def recover(node: Node, change: str, facts: Mapping[str, Any], *, alone: bool = False) -> Operation[str]:
+async def recover(node: Node, change: str, facts: Mapping[str, Any], *, alone: bool = False) -> str:
     """End a change that was cut off, as the journal tells of it: `change` its verb, `facts` what was known then.
 
     Gives "new" when the servo is under its new id or rate now, "old" when the change was taken back; locked in both
@@ -89,14 +88,14 @@ def recover(node: Node, change: str, facts: Mapping[str, Any], *, alone: bool = 
     """
     job = job_of(change, facts)
     course = Course(job, facts.get("reached", ()))
-    present = yield from Tune(0)
+    present = await Tune(0)
 
-    def work() -> Operation[str]:
-        yield from course.resume(RESUMED)
-        return (yield from recovered(job, course, alone=alone))
+    async def work() -> str:
+        await course.resume(RESUMED)
+        return await recovered(job, course, alone=alone)
 
     try:
-        return (yield from Alone(afterwards(work(), lambda: iter(Tune(present)))))
+        return await Alone(afterwards(work(), lambda: Tune(present)))
     except BaseException as error:
         if not isinstance(error, MotorbusError):  # one of ours says itself what to do
             error.add_note("the change may still be unfinished: recover() ends it")
@@ -105,96 +104,96 @@ def recover(node: Node, change: str, facts: Mapping[str, Any], *, alone: bool = 
         node.forget_settings()
 
 
-def recovered(job: Job, course: Course, *, alone: bool = False) -> Operation[str]:
+async def recovered(job: Job, course: Course, *, alone: bool = False) -> str:
     """As `recover`, with the bus for itself; may leave it at another rate."""
     for attempt in range(_REPEATS):
-        found = yield from _found(job, course, alone)
-        ended = yield from outcome(_ended(job, course, found))
+        found = await _found(job, course, alone)
+        ended = await outcome(_ended(job, course, found))
         if isinstance(ended, str):
-            yield from course.end(ended)
+            await course.end(ended)
             return ended
         if attempt == _REPEATS - 1:
             raise ended
-        yield from Pause(AWAKE)
+        await Pause(AWAKE)
     raise AssertionError("the loop above ends by itself")
 
 
-def _ended(job: Job, course: Course, found: Seen) -> Operation[str]:
+async def _ended(job: Job, course: Course, found: Seen) -> str:
     """Bring the servo that was found to one of both places, for good, and lock it."""
     goal = found.place if found.place in (job.old, job.new) else job.old
     ended: list[str] = []
-    yield from afterwards(
+    await afterwards(
         _brought(job, course, found, goal, ended),
-        lambda: _closed(job, found, goal) if not ended else iter(Tune(0)),
+        lambda: _closed(job, found, goal) if not ended else Tune(0),
     )
     return "new" if goal == job.new else "old"
 
 
-def _brought(job: Job, course: Course, found: Seen, goal: Place, ended: list[str]) -> Operation[None]:
+async def _brought(job: Job, course: Course, found: Seen, goal: Place, ended: list[str]) -> None:
     place = found.place
-    yield from Tune(place.rate)
+    await Tune(place.rate)
     node = met(place.id, found.image)
-    again = place == goal and course.doubtful(goal) and (yield from _may_be_lost(job, node, course))
+    again = place == goal and course.doubtful(goal) and await _may_be_lost(job, node, course)
     follows = job.second is not None and (course.following or found.image[job.second] != goal.id)
     if place != goal or again or follows:
-        yield from others_than(node, job.others, (place.id, goal.id))
+        await others_than(node, job.others, (place.id, goal.id))
     if again:
-        yield from course.reach(AGAIN)
+        await course.reach(AGAIN)
     if place != goal or again:
-        node = yield from rewritten(job, node, goal, course, found.image)
+        node = await rewritten(job, node, goal, course, found.image)
     if follows:
-        yield from unlocked(job, node)
-        yield from followed(job, node, goal, course)
-    yield from locked(job, node)
+        await unlocked(job, node)
+        await followed(job, node, goal, course)
+    await locked(job, node)
     ended.append("locked")
 
 
-def _closed(job: Job, found: Seen, goal: Place) -> Operation[None]:
+async def _closed(job: Job, found: Seen, goal: Place) -> None:
     """Close the lock of a servo that could not be brought to its goal, wherever it is by now, as far as it answers."""
-    yield from Pause(COMMIT)  # a lock that closes too early may drop what is being stored
+    await Pause(COMMIT)  # a lock that closes too early may drop what is being stored
     for place in dict.fromkeys((found.place, goal)):
-        yield from Tune(place.rate)
-        image = yield from outcome(look(place.id))
+        await Tune(place.rate)
+        image = await outcome(look(place.id))
         if isinstance(image, bytes) and image and job.is_like_it(image):
-            yield from outcome(locked(job, met(place.id, image)))
+            await outcome(locked(job, met(place.id, image)))
 
 
-def _may_be_lost(job: Job, node: Node, course: Course) -> Operation[bool]:
+async def _may_be_lost(job: Job, node: Node, course: Course) -> bool:
     """May the write have met a closed lock, so that the value is gone at the next power-off?"""
-    return AGAIN in course.reached or (yield from read_block(node, job.lock, 1, bytes)) != OPEN
+    return AGAIN in course.reached or await read_block(node, job.lock, 1, bytes) != OPEN
 
 
 # -- where is it? -------------------------------------------------------------------------------------------------
 
 
-def _found(job: Job, course: Course, alone: bool) -> Operation[Seen]:
+async def _found(job: Job, course: Course, alone: bool) -> Seen:
     """The servo, wherever it is. Raises NoReply, or OutcomeUnknown when two of them could be it."""
     for round in range(ROUNDS):
-        here = yield from _among(job, (job.new, job.old))
+        here = await _among(job, (job.new, job.old))
         mine = [one for one in here if job.is_it(one.image)] or here
         if len(mine) > 1:
-            raise (yield from _two(job, mine))
+            raise await _two(job, mine)
         if mine:
             return mine[0]
-        yield from Report(Progress(round + 1, ROUNDS, f"looking for node {job.old.id}"))
-        yield from Pause(AWAKE)
+        await Report(Progress(round + 1, ROUNDS, f"looking for node {job.old.id}"))
+        await Pause(AWAKE)
     if alone:
-        yield from _refuse_others(job)
-    lost = yield from _lost(job, alone)
+        await _refuse_others(job)
+    lost = await _lost(job, alone)
     if lost is not None:
         return lost
     if alone and job.verb == SET_ID:
-        return (yield from _called_back(job, course))
+        return await _called_back(job, course)
     raise _nowhere(job)
 
 
-def _among(job: Job, places: Iterable[Place]) -> Operation[list[Seen]]:
+async def _among(job: Job, places: Iterable[Place]) -> list[Seen]:
     """Who of its kind answers at these places; nobody else did before the change began, see `guarded`."""
     found = []
     for place in dict.fromkeys(places):
-        yield from Tune(place.rate)
+        await Tune(place.rate)
         try:
-            image = yield from look(place.id)
+            image = await look(place.id)
         except WireError as garbled:
             raise _several(job, place) from garbled
         if image and job.is_like_it(image):
@@ -202,7 +201,7 @@ def _among(job: Job, places: Iterable[Place]) -> Operation[list[Seen]]:
     return found
 
 
-def _lost(job: Job, alone: bool) -> Operation[Seen | None]:
+async def _lost(job: Job, alone: bool) -> Seen | None:
     """Where a servo may be whose cell holds neither value: as shipped; when it is alone, under any id at all.
 
     Whoever answered there before the change began is somebody else, and may look just like it.
@@ -214,11 +213,11 @@ def _lost(job: Job, alone: bool) -> Operation[Seen | None]:
     else:
         places = elsewhere(job, (job.old.id,), tuple(BAUD_CODES.values()))
     for place in places:
-        one = yield from _glimpsed(job, place)
+        one = await _glimpsed(job, place)
         if one is not None:
             return one
     if SHIPPED_ID in taken and job.verb == SET_ID:
-        yield from _hidden(job)
+        await _hidden(job)
     return None
 
 
@@ -227,38 +226,38 @@ def _others(job: Job, alone: bool) -> set[int]:
     return set(job.others) - ({SHIPPED_ID} if alone else set())
 
 
-def _glimpsed(job: Job, place: Place) -> Operation[Seen | None]:
+async def _glimpsed(job: Job, place: Place) -> Seen | None:
     """One of its kind at a place where nobody answered before; silence is the usual answer and is not waited for."""
-    image = yield from outcome(_asked(place))
+    image = await outcome(_asked(place))
     if isinstance(image, LinkLost):
         raise image
     return Seen(place, image) if isinstance(image, bytes) and job.is_like_it(image) else None
 
 
-def _asked(place: Place) -> Operation[bytes]:
-    yield from Tune(place.rate)  # a rate that this link cannot have is no place to look at
-    return (yield from read_block(Node(place.id), 0, IMAGE, bytes, timeout=Timeout.SCAN))
+async def _asked(place: Place) -> bytes:
+    await Tune(place.rate)  # a rate that this link cannot have is no place to look at
+    return await read_block(Node(place.id), 0, IMAGE, bytes, timeout=Timeout.SCAN)
 
 
-def _hidden(job: Job) -> Operation[None]:
+async def _hidden(job: Job) -> None:
     """Raise OutcomeUnknown when it seems to have joined another servo at the id as shipped."""
-    yield from Tune(job.old.rate)
-    found = yield from outcome(duplicates(Node(SHIPPED_ID), _GLANCE))
+    await Tune(job.old.rate)
+    found = await outcome(duplicates(Node(SHIPPED_ID), _GLANCE))
     if not isinstance(found, MotorbusError) and found.suspected:
         raise _several(job, Place(SHIPPED_ID, job.old.rate))
 
 
-def _called_back(job: Job, course: Course) -> Operation[Seen]:
+async def _called_back(job: Job, course: Course) -> Seen:
     """Give a servo that answers to no id its old one by broadcast; nobody else is there to hear it."""
-    yield from Tune(job.old.rate)
+    await Tune(job.old.rate)
     limp = wire.write(wire.BROADCAST, LIMP.address, LIMP.data)
-    yield from unanswered(limp, LIMP.effect, rank=Rank.STOP)
-    yield from course.reach(WRITING, job.old)
+    await unanswered(limp, LIMP.effect, rank=Rank.STOP)
+    await course.reach(WRITING, job.old)
     for block in (Block(job.lock, OPEN, Effect.PERSISTENT), job.block(job.old)):
         request = wire.write(wire.BROADCAST, block.address, block.data)
-        yield from unanswered(request, block.effect, rank=Rank.CONFIGURATION)
-        yield from Pause(COMMIT)
-    found = yield from _among(job, (job.old,))
+        await unanswered(request, block.effect, rank=Rank.CONFIGURATION)
+        await Pause(COMMIT)
+    found = await _among(job, (job.old,))
     if not found:
         raise NoReply(
             f"the servo that was {job.old.id} does not answer after a broadcast either",
@@ -269,12 +268,12 @@ def _called_back(job: Job, course: Course) -> Operation[Seen]:
     return found[0]
 
 
-def _refuse_others(job: Job) -> Operation[None]:
+async def _refuse_others(job: Job) -> None:
     """Raise RequestError when somebody answers who cannot be the servo, or more than one does."""
-    yield from Tune(job.old.rate)
+    await Tune(job.old.rate)
     there = []
     for id in range(wire.MAX_ID + 1):
-        answer = yield from outcome(read_block(Node(id), 0, IMAGE, bytes, timeout=Timeout.SCAN))
+        answer = await outcome(read_block(Node(id), 0, IMAGE, bytes, timeout=Timeout.SCAN))
         if isinstance(answer, LinkLost):
             raise answer
         if not isinstance(answer, NoReply):
@@ -310,11 +309,11 @@ def _nowhere(job: Job) -> NoReply:
 # -- what cannot be decided ---------------------------------------------------------------------------------------
 
 
-def _two(job: Job, found: Sequence[Seen]) -> Operation[MotorbusError]:
+async def _two(job: Job, found: Sequence[Seen]) -> MotorbusError:
     """Both places are taken by servos of its kind: lock both, for one of them may be open, and say so."""
     for one in found:
-        yield from Tune(one.place.rate)
-        yield from outcome(locked(job, met(one.place.id, one.image)))
+        await Tune(one.place.rate)
+        await outcome(locked(job, met(one.place.id, one.image)))
     where = " and ".join(f"{one.place.id} at {one.place.rate} bit/s" for one in found)
     return OutcomeUnknown(
         f"servos answer as {where}: which of them is the one that was to change is not known",

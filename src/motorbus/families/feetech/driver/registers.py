@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 from motorbus.core.entry import Entry, Storage, Table, Value
 from motorbus.core.goal import Later
-from motorbus.core.operation import Effect, Exchange, Operation, Refusal, Runnable, Stops
+from motorbus.core.operation import Effect, Exchange, Refusal, Runnable, Stops
 from motorbus.errors import MotorbusError, OutcomeUnknown, RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver import eeprom
@@ -56,25 +56,25 @@ class Span(NamedTuple):
     rows: tuple[Entry, ...]
 
 
-def read(node: Node, /, *names: str) -> Operation[dict[str, Value]]:
+async def read(node: Node, /, *names: str) -> dict[str, Value]:
     """Registers in API units by name, all that can be read when none is named.
 
     Raises RequestError for an unknown name (nothing is sent then), NoReply when the servo is silent.
     """
-    raws = yield from read_raw(node, *names)
+    raws = await read_raw(node, *names)
     assert node.table is not None
     table = node.table
     return {name: node.value(table[name], raw) for name, raw in raws.items()}
 
 
-def read_raw(node: Node, /, *names: str) -> Operation[dict[str, int]]:
+async def read_raw(node: Node, /, *names: str) -> dict[str, int]:
     """Registers as raw values by name, all that can be read when none is named."""
     check_names(names)
-    table = yield from known(node)
+    table = await known(node)
     rows = rows_of(table, names)
     found: dict[str, int] = {}
     for span in spans(rows):
-        data = yield from read_block(node, span.address, span.size, bytes)
+        data = await read_block(node, span.address, span.size, bytes)
         found.update(decode(span, data))
     return {row.name: found[row.name] for row in rows}
 
@@ -112,7 +112,7 @@ def _end(row: Entry) -> int:
     return row.address + row.size
 
 
-def write(node: Node, /, **values: Value) -> Operation[None]:
+async def write(node: Node, /, **values: Value) -> None:
     """Write registers by name, in API units; all are checked before the first is sent.
 
     Registers in EEPROM are read first, and what differs goes through the guarded sequence: unlock, torque off, write,
@@ -125,21 +125,21 @@ def write(node: Node, /, **values: Value) -> Operation[None]:
     it go limp as well. Raises RequestError for what cannot or must not be written so, and for goals together with
     EEPROM; DeviceError when the register map is not known, VerificationFailed when EEPROM reads back different.
     """
-    yield from _written(node, values, always=False)
+    await _written(node, values, always=False)
 
 
-def write_limp(node: Node, values: Mapping[str, Value]) -> Operation[None]:
+async def write_limp(node: Node, values: Mapping[str, Value]) -> None:
     """As `write`, and torque stays off after a write to EEPROM."""
-    yield from _written(node, values, always=False, restore=False)
+    await _written(node, values, always=False, restore=False)
 
 
-def torque_after_write(node: Node, /, **values: Value) -> Operation[str | None]:
+async def torque_after_write(node: Node, /, **values: Value) -> str | None:
     """What a write of these registers does to the torque: None when it is off, or none of them is in EEPROM; "" when
     the servo gets it back; else why it stays off."""
     check_values(values)
-    table = yield from writable(node)
+    table = await writable(node)
     orders = orders_of(node, table, values)
-    if not any(order.row.storage is Storage.EEPROM for order in orders) or (yield from is_limp(node)):
+    if not any(order.row.storage is Storage.EEPROM for order in orders) or await is_limp(node):
         return None
     return _stays_off(node, orders)
 
@@ -158,19 +158,17 @@ def _stays_off(node: Node, orders: Sequence[Order]) -> str:
     return "torque_enable is written too" if "torque_enable" in raws else ""
 
 
-def rewrite(node: Node, /, **values: Value) -> Operation[None]:
+async def rewrite(node: Node, /, **values: Value) -> None:
     """As `write`, and registers in EEPROM are written for good whatever they read: one more write to each cell.
 
     For settings that another program may have made with the lock closed: they read as set, and are gone at power-off.
     """
-    yield from _written(node, values, always=True)
+    await _written(node, values, always=True)
 
 
-def _written(
-    node: Node, values: Mapping[str, Value], *, always: bool, restore: bool = True
-) -> Operation[None]:
+async def _written(node: Node, values: Mapping[str, Value], *, always: bool, restore: bool = True) -> None:
     check_values(values)
-    table = yield from writable(node)
+    table = await writable(node)
     orders = orders_of(node, table, values)
     _refuse_goals_among_settings(node, orders)
     kept = list(blocks(node, [order for order in orders if order.row.storage is Storage.EEPROM]))
@@ -179,14 +177,14 @@ def _written(
     if kept:
         torque = eeprom.Torque(_stays_off(node, orders)) if restore else None
         stored = _kept(node, table, orders, kept)
-        wrote = yield from eeprom.store(node, table, stored, always=always, torque=torque)
+        wrote = await eeprom.store(node, table, stored, always=always, torque=torque)
         limp |= not wrote and any(order.row.effect is Effect.TORQUE for order in live)
     if limp:
-        yield from disable_torque(node)
-        yield from _confirmed_limp(node, [order for order in live if limps(order.row)])
+        await disable_torque(node)
+        await _confirmed_limp(node, [order for order in live if limps(order.row)])
     made = None if kept else node.settings
     for block in list(blocks(node, [order for order in live if not limps(order.row)])):
-        yield from confirmed(node, block._replace(under=made))
+        await confirmed(node, block._replace(under=made))
 
 
 def _refuse_goals_among_settings(node: Node, orders: Sequence[Order]) -> None:
@@ -210,13 +208,13 @@ def _kept(node: Node, table: Table, orders: Iterable[Order], kept: Sequence[Bloc
     return kept
 
 
-def _confirmed_limp(node: Node, orders: Sequence[Order]) -> Operation[None]:
+async def _confirmed_limp(node: Node, orders: Sequence[Order]) -> None:
     """Write what would move a servo that holds to one that was made limp, which it cannot move."""
     for block in blocks(node, orders):
-        yield from confirmed(node, block._replace(effect=Effect.NONE))
+        await confirmed(node, block._replace(effect=Effect.NONE))
 
 
-def reg_write(node: Node, /, **values: Value) -> Operation[None]:
+async def reg_write(node: Node, /, **values: Value) -> None:
     """REG WRITE: hand over a write of adjoining RAM registers that is carried out at the next ACTION.
 
     A second one replaces the first; a power cycle loses it. It survives torque off and an emergency stop, so `action`
@@ -224,8 +222,8 @@ def reg_write(node: Node, /, **values: Value) -> Operation[None]:
     well. Never sent twice: raises OutcomeUnknown when it was not acknowledged.
     """
     check_values(values)
-    table = yield from writable(node)
-    yield from hand_over(node, table, to_hand_over(node, table, values))
+    table = await writable(node)
+    await hand_over(node, table, to_hand_over(node, table, values))
 
 
 def to_hand_over(node: Node, table: Table, values: Mapping[str, Value]) -> Block:
@@ -233,13 +231,13 @@ def to_hand_over(node: Node, table: Table, values: Mapping[str, Value]) -> Block
     return only_block(node, orders_of(node, table, values), "REG WRITE")._replace(repeatable=False)
 
 
-def hand_over(node: Node, table: Table, block: Block) -> Operation[None]:
+async def hand_over(node: Node, table: Table, block: Block) -> None:
     """REG WRITE one block, and see that it was taken. Raises OutcomeUnknown when nobody knows."""
     request = wire.reg_write(node.node, block.address, block.data)
     exchange = acknowledged(node, request, block, refusal=_handed_over(node, block), later=Later(node.node))
-    yield from exchange
+    await exchange
     if not exchange.replies:
-        yield from _pending(node, table, exchange)
+        await _pending(node, table, exchange)
     if not block.goals:
         node.pending = None
 
@@ -258,9 +256,9 @@ def _handed_over(node: Node, block: Block) -> Refusal:
     return refusal
 
 
-def _pending(node: Node, table: Table, exchange: Exchange[None]) -> Operation[None]:
+async def _pending(node: Node, table: Table, exchange: Exchange[None]) -> None:
     """A servo that acknowledges nothing still says whether a REG WRITE waits."""
-    if (yield from waits(node, table)) != WAITING:
+    if await waits(node, table) != WAITING:
         raise OutcomeUnknown(
             f"node {node.node} holds no REG WRITE after one was sent",
             sent=exchange.request,
@@ -300,15 +298,15 @@ def action(node: Node) -> Runnable[None]:
     return exchange if exchange.replies else _seen(node, node.table, exchange)
 
 
-def _met(node: Node) -> Operation[None]:
-    yield from writable(node)
-    yield from action(node)
+async def _met(node: Node) -> None:
+    await writable(node)
+    await action(node)
 
 
-def _seen(node: Node, table: Table, exchange: Exchange[None]) -> Operation[None]:
+async def _seen(node: Node, table: Table, exchange: Exchange[None]) -> None:
     """A servo that acknowledges nothing still says whether a REG WRITE waits."""
-    yield from exchange
-    if (yield from waits(node, table)) != IDLE:
+    await exchange
+    if await waits(node, table) != IDLE:
         raise OutcomeUnknown(
             f"node {node.node} still holds a REG WRITE after ACTION was sent",
             sent=exchange.request,

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from motorbus.core.family import Found
-from motorbus.core.operation import ASKED, Alone, Journal, Operation, Report, Tune
+from motorbus.core.operation import ASKED, Alone, Journal, Report, Tune
 from motorbus.errors import WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.changing import guarded
@@ -25,7 +25,7 @@ from motorbus.families.feetech.driver.placing import locked, refuse_taken, whoev
 from motorbus.families.feetech.driver.sharing import refuse_duplicates
 
 
-def set_id(node: Node, new: int, *, among: Sequence[int] = ()) -> Operation[Found]:
+async def set_id(node: Node, new: int, *, among: Sequence[int] = ()) -> Found:
     """Give this servo the id `new`, for good; gives where it is now. A `Servo` of the new id speaks to it from then on.
 
     The servo goes limp. `among` are the ids that other servos on this bus may have; () means every one, which takes
@@ -39,29 +39,29 @@ def set_id(node: Node, new: int, *, among: Sequence[int] = ()) -> Operation[Foun
     """
     checked_id(new)
     asked = [one.node for one in as_nodes(among or range(wire.MAX_ID + 1))]
-    yield from Report(Journal(SET_ID, ASKED, {}))
-    image = yield from met_alone(node)
+    await Report(Journal(SET_ID, ASKED, {}))
+    image = await met_alone(node)
     assert node.identity is not None
     found = replace(node.identity, node=new)
-    rate = yield from Tune(0)
+    rate = await Tune(0)
     job = Job(SET_ID, Place(node.node, rate), Place(new, rate), image)
     if new == node.node:
-        yield from Alone(locked(job, node))
+        await Alone(locked(job, node))
         return Found(new, rate, found)
-    yield from refuse_duplicates(node)
-    refuse_taken(Place(new, rate), (yield from whoever(new)))
-    others = yield from others_than(node, asked, (new, node.node, SHIPPED_ID))
+    await refuse_duplicates(node)
+    refuse_taken(Place(new, rate), await whoever(new))
+    others = await others_than(node, asked, (new, node.node, SHIPPED_ID))
     job = job._replace(others=tuple(others))
-    yield from guarded(job, node)
+    await guarded(job, node)
     return Found(new, rate, found)
 
 
-def met_alone(node: Node) -> Operation[bytes]:
+async def met_alone(node: Node) -> bytes:
     """Registers 0 to 39 of a servo that may be written to. Garbled answers are called a bad line only when it does not
     seem to be two servos that give them. Raises RequestError when it does, otherwise as `writable`."""
     try:
-        yield from writable(node)
-        return (yield from read_block(node, 0, IMAGE, bytes))
+        await writable(node)
+        return await read_block(node, 0, IMAGE, bytes)
     except WireError:
-        yield from refuse_duplicates(node)
+        await refuse_duplicates(node)
         raise

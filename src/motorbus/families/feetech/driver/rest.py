@@ -14,7 +14,7 @@ from typing import Final
 
 from motorbus.core.entry import Table, is_number, shown
 from motorbus.core.goal import Stays, torque_on
-from motorbus.core.operation import Effect, Goal, Operation, Refusal
+from motorbus.core.operation import Effect, Goal, Refusal
 from motorbus.errors import LimitExceeded, MotionError, RequestError
 from motorbus.families.feetech.driver.bound import ask_bound, raw_bound
 from motorbus.families.feetech.driver.exchanges import PRESENT, Block, confirmed, outdated, read_block
@@ -36,23 +36,23 @@ _HERE, _AWAY = "here", "away"
 # -- what is so now ------------------------------------------------------------------------------------------
 
 
-def asked_anew(node: Node) -> Operation[Table]:
+async def asked_anew(node: Node) -> Table:
     """The map of a servo whose mode, limits and units are read at this moment: another program may have set them.
 
     Costs one READ of registers 0 to 39. Raises DeviceError when the register map is not known.
     """
-    yield from prepare(node)
-    return (yield from writable(node))
+    await prepare(node)
+    return await writable(node)
 
 
-def is_limp(node: Node) -> Operation[bool]:
+async def is_limp(node: Node) -> bool:
     """Whether its torque switch says anything but 'on'."""
-    return (yield from read_block(node, TORQUE_ENABLE, 1, bytes)) != _ON
+    return await read_block(node, TORQUE_ENABLE, 1, bytes) != _ON
 
 
-def surely_on(node: Node) -> Operation[None]:
+async def surely_on(node: Node) -> None:
     """Raise MotionError when the torque switch of a servo that has acknowledged 'on' says something else."""
-    if (yield from is_limp(node)):
+    if await is_limp(node):
         raise MotionError(
             f"node {node.node} has taken the order to switch its torque on, and its torque is off",
             expected="register 40 at 1",
@@ -66,35 +66,35 @@ def surely_on(node: Node) -> Operation[None]:
 # -- torque on -----------------------------------------------------------------------------------------------
 
 
-def torque_on_unless(node: Node, refusal: Refusal | None, *, jump: float = 0.0) -> Operation[None]:
+async def torque_on_unless(node: Node, refusal: Refusal | None, *, jump: float = 0.0) -> None:
     """`enable_torque`, with a further reason not to send the packet that switches the torque on."""
     checked_jump(node, jump)
-    table = yield from asked_anew(node)
+    table = await asked_anew(node)
     mode = node.known_mode
     if mode is None:
         raise unknown_mode(node)
     if mode is Mode.STEP:
-        yield from confirmed(node, ON._replace(goals=(torque_on(node.node),), refusal=refusal))
+        await confirmed(node, ON._replace(goals=(torque_on(node.node),), refusal=refusal))
     else:
-        block = yield from beginning(node, table, mode, jump)
-        yield from ordered(node, table, block._replace(refusal=refusal))
+        block = await beginning(node, table, mode, jump)
+        await ordered(node, table, block._replace(refusal=refusal))
         if mode is Mode.POSITION:
-            yield from not_turns_away(node, table, block, jump)
-    yield from surely_on(node)
+            await not_turns_away(node, table, block, jump)
+    await surely_on(node)
 
 
-def beginning(node: Node, table: Table, mode: Mode, jump: float) -> Operation[Block]:
+async def beginning(node: Node, table: Table, mode: Mode, jump: float) -> Block:
     """The one packet with which torque comes on at rest, in any mode but step; errors as `held_within` and `at_rest`.
 
     What lies between the switch and the order keeps the value it has.
     """
     if mode is Mode.POSITION:
-        return (yield from held_within(node, table, jump))
+        return await held_within(node, table, jump)
     block = at_rest(node, table, mode)._replace(under=node.settings)
     if mode is Mode.VELOCITY:
-        yield from ask_bound(node, table)
+        await ask_bound(node, table)
         block = with_bound(node, table, block)
-    return switched_on(block, (yield from _commands(node)))
+    return switched_on(block, await _commands(node))
 
 
 def switched_on(block: Block, found: bytes = bytes(_COMMANDS)) -> Block:
@@ -109,11 +109,11 @@ def switched_on(block: Block, found: bytes = bytes(_COMMANDS)) -> Block:
     return block._replace(address=TORQUE_ENABLE, data=_ON + between + block.data, goals=goals)
 
 
-def _commands(node: Node) -> Operation[bytes]:
-    return (yield from read_block(node, TORQUE_ENABLE, _COMMANDS, bytes))
+async def _commands(node: Node) -> bytes:
+    return await read_block(node, TORQUE_ENABLE, _COMMANDS, bytes)
 
 
-def not_turns_away(node: Node, table: Table, block: Block, jump: float = 0.0) -> Operation[None]:
+async def not_turns_away(node: Node, table: Table, block: Block, jump: float = 0.0) -> None:
     """See that a servo which counts its turns still stands on the turn on which this order would have it stay.
 
     It forgets them with its supply: lost between being asked where it stands and the order, "here" is turns away, and
@@ -128,8 +128,8 @@ def not_turns_away(node: Node, table: Table, block: Block, jump: float = 0.0) ->
     def take(data: bytes) -> str:
         return _AWAY if abs(float(node.value(row, row.decode(data))) - goal) > far else _HERE
 
-    if (yield from read_block(node, PRESENT, row.size, take)) != _HERE:
-        yield from disable_torque(node)
+    if await read_block(node, PRESENT, row.size, take) != _HERE:
+        await disable_torque(node)
         raise MotionError(
             f"node {node.node} has forgotten its turns while it was told to stay at {goal:.4g} rad",
             cause="it has lost its supply for a moment",
@@ -149,13 +149,13 @@ def checked_jump(node: Node, jump: float) -> None:
         )
 
 
-def ordered(node: Node, table: Table, block: Block) -> Operation[None]:
+async def ordered(node: Node, table: Table, block: Block) -> None:
     """Write an order and be sure of it; what it says of the bound of the current is known from then on."""
     row = table[node.control.current] if node.control.current else None
     told = row is not None and block.address <= row.address < block.address + len(block.data)
     if row is not None and told:
         node.bound = None
-    yield from confirmed(node, block)
+    await confirmed(node, block)
     if row is not None and told:
         at = row.address - block.address
         node.bound = row.decode(block.data[at : at + row.size])
@@ -164,14 +164,14 @@ def ordered(node: Node, table: Table, block: Block) -> Operation[None]:
 # -- stay ----------------------------------------------------------------------------------------------------
 
 
-def held(node: Node, table: Table) -> Operation[Block]:
+async def held(node: Node, table: Table) -> Block:
     """Goal := the present position, wherever that is, for a servo that is under way or limp."""
-    raw = yield from _stands(node, table)
+    raw = await _stands(node, table)
     _know_the_turn(node, raw)
     return _hold(node, table, raw)
 
 
-def held_within(node: Node, table: Table, jump: float) -> Operation[Block]:
+async def held_within(node: Node, table: Table, jump: float) -> Block:
     """Torque on, and goal := the present position, or the limit it would go for when that is at most `jump` rad away.
 
     With a bound of the current that lets it hold, where the map has one, and with a velocity when it would not go to
@@ -180,10 +180,10 @@ def held_within(node: Node, table: Table, jump: float) -> Operation[Block]:
     if node.limits is None:
         raise no_limits(node)
     settings = node.settings
-    yield from ask_bound(node, table)
-    found = yield from _commands(node)
+    await ask_bound(node, table)
+    found = await _commands(node)
     _still(node, settings)
-    raw = yield from _stands(node, table)
+    raw = await _stands(node, table)
     _know_the_turn(node, raw, jump)
     there = _within(node, table, raw, jump)
     block = _hold(node, table, there)
@@ -209,12 +209,12 @@ def outside(node: Node, table: Table, block: Block) -> bool:
     return not node.limits[0] - slack <= here <= node.limits[1] + slack
 
 
-def _stands(node: Node, table: Table) -> Operation[int]:
+async def _stands(node: Node, table: Table) -> int:
     """Raw present position. Raises RequestError when no goal could be told to be within the limits."""
     if node.limits is None:
         raise no_limits(node)
     row, settings = table["present_position"], node.settings
-    raw = yield from read_block(node, PRESENT, row.size, row.decode)
+    raw = await read_block(node, PRESENT, row.size, row.decode)
     _still(node, settings)
     return raw
 

@@ -15,7 +15,7 @@ from typing import Final
 
 from motorbus.core.entry import Table
 from motorbus.core.family import Found
-from motorbus.core.operation import Alone, Effect, Operation, Pause, Rank, Timeout, Tune, afterwards
+from motorbus.core.operation import Alone, Effect, Pause, Rank, Timeout, Tune, afterwards
 from motorbus.errors import NoReply, OutcomeUnknown, WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, acknowledged
@@ -30,15 +30,15 @@ DEAF: Final = 1.1
 _SHIPPED_ID: Final = 1
 
 
-def factory_restore(node: Node) -> Operation[Found]:
+async def factory_restore(node: Node) -> Found:
     """Switch the torque off and set everything back as shipped, but as a rule not the id; gives where it is now.
 
     The bus keeps its rate, even where the servo is found at the factory's. Raises NoReply when it does not answer
     afterwards, OutcomeUnknown when it answers but has not acknowledged: its model may lack this.
     """
-    table = yield from writable(node)
+    table = await writable(node)
     try:
-        return (yield from Alone(_restored(node, factory_rates(table))))
+        return await Alone(_restored(node, factory_rates(table)))
     finally:
         node.forget_settings()
 
@@ -49,19 +49,19 @@ def factory_rates(table: Table) -> tuple[int, ...]:
     return (BAUD_CODES[0], BAUD_CODES[1]) if code is None else (BAUD_CODES[code],)
 
 
-def _restored(node: Node, factory: Sequence[int]) -> Operation[Found]:
-    present = yield from Tune(0)
+async def _restored(node: Node, factory: Sequence[int]) -> Found:
+    present = await Tune(0)
     ids = tuple(dict.fromkeys((node.node, _SHIPPED_ID)))
     places = dict.fromkeys(dict.fromkeys((present, *factory)), ids)
-    taken = yield from afterwards(_taken(node, present, places), lambda: iter(Tune(present)))
-    yield from disable_torque(node)
+    taken = await afterwards(_taken(node, present, places), lambda: Tune(present))
+    await disable_torque(node)
     doubt: BaseException | None = None
     try:
-        yield from _reset(node)
+        await _reset(node)
     except DOUBTS as error:
         doubt = error
-    yield from Pause(DEAF)
-    found = yield from _found(present, places, taken)
+    await Pause(DEAF)
+    found = await _found(present, places, taken)
     if found is None:
         raise _gone(node, taken) from doubt
     if doubt is not None and (found.node, found.rate) == (node.node, present):
@@ -69,40 +69,40 @@ def _restored(node: Node, factory: Sequence[int]) -> Operation[Found]:
     return found
 
 
-def _taken(node: Node, present: int, places: Mapping[int, Sequence[int]]) -> Operation[set[tuple[int, int]]]:
+async def _taken(node: Node, present: int, places: Mapping[int, Sequence[int]]) -> set[tuple[int, int]]:
     """Where, of all the places it may go to, another servo is already: (id, rate)."""
     taken = set()
     for rate, ids in places.items():
         if rate != present:
-            yield from Tune(rate)
+            await Tune(rate)
         for id in ids:
-            if (id, rate) != (node.node, present) and (yield from _there(id)):
+            if (id, rate) != (node.node, present) and await _there(id):
                 taken.add((id, rate))
     return taken
 
 
-def _there(id: int) -> Operation[bool]:
+async def _there(id: int) -> bool:
     try:
-        return (yield from ping(Node(id)))
+        return await ping(Node(id))
     except WireError:
         return True
 
 
-def _found(
+async def _found(
     present: int, places: Mapping[int, Sequence[int]], taken: set[tuple[int, int]]
-) -> Operation[Found | None]:
+) -> Found | None:
     for rate, ids in places.items():
         free = [id for id in ids if (id, rate) not in taken]
-        found = (yield from scan(free, () if rate == present else (rate,))) if free else []
+        found = await scan(free, () if rate == present else (rate,)) if free else []
         if found:
             return found[0]
     return None
 
 
-def _reset(node: Node) -> Operation[None]:
+async def _reset(node: Node) -> None:
     block = Block(0, b"", Effect.PERSISTENT, repeatable=False)
     request = wire.factory_restore(node.node)
-    yield from acknowledged(node, request, block, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
+    await acknowledged(node, request, block, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
 
 
 def _gone(node: Node, taken: set[tuple[int, int]]) -> NoReply:

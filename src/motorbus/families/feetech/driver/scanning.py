@@ -14,7 +14,6 @@ from typing import Final, NamedTuple
 from motorbus.core.family import Found, Identity
 from motorbus.core.operation import (
     Alone,
-    Operation,
     Pause,
     Progress,
     Report,
@@ -41,7 +40,7 @@ class Skipped(NamedTuple):
     why: str
 
 
-def scan(ids: Sequence[int] = (), rates: Sequence[int] = (), *, polls: int = 0) -> Operation[list[Found]]:
+async def scan(ids: Sequence[int] = (), rates: Sequence[int] = (), *, polls: int = 0) -> list[Found]:
     """Every servo that answers, with what it is; `ids` () means 0 to 253, `rates` () the present rate alone.
 
     The present rate of the bus is set again at the end, whatever happens. Reports `Found` as soon as one answers
@@ -50,52 +49,52 @@ def scan(ids: Sequence[int] = (), rates: Sequence[int] = (), *, polls: int = 0) 
     answers are garbled in any case, and it counts as found, without an identity, when they stay so. Writes nothing.
     """
     asked = [node.node for node in as_nodes(ids or range(wire.MAX_ID + 1))]
-    present = yield from Tune(0)
+    present = await Tune(0)
     if not rates:
-        return (yield from _at_one_rate(asked, present, 0, 1, polls))
-    return (yield from Alone(afterwards(_at_all_rates(asked, rates, polls), lambda: iter(Tune(present)))))
+        return await _at_one_rate(asked, present, 0, 1, polls)
+    return await Alone(afterwards(_at_all_rates(asked, rates, polls), lambda: Tune(present)))
 
 
-def _at_all_rates(ids: Sequence[int], rates: Sequence[int], polls: int) -> Operation[list[Found]]:
+async def _at_all_rates(ids: Sequence[int], rates: Sequence[int], polls: int) -> list[Found]:
     found: list[Found] = []
     for index, rate in enumerate(rates):
-        refusal = yield from outcome(iter(Tune(rate)))
+        refusal = await outcome(Tune(rate))
         if isinstance(refusal, LinkLost):
             raise refusal
         if isinstance(refusal, MotorbusError):
-            yield from Report(Skipped(rate, refusal.summary))
+            await Report(Skipped(rate, refusal.summary))
             continue
-        yield from Pause(DRAIN)
-        found += yield from _at_one_rate(ids, rate, index, len(rates), polls)
+        await Pause(DRAIN)
+        found += await _at_one_rate(ids, rate, index, len(rates), polls)
     return found
 
 
-def _at_one_rate(ids: Sequence[int], rate: int, index: int, of: int, polls: int) -> Operation[list[Found]]:
+async def _at_one_rate(ids: Sequence[int], rate: int, index: int, of: int, polls: int) -> list[Found]:
     """Two passes over the ids, the second over the silent ones, then ask those who are there what they are."""
     there: list[int] = []
     garbled: set[int] = set()
     for number in range(2):
         begun = (2 * index + number) * len(ids)
         for done, id in enumerate(ids):
-            if id not in there and (yield from _answers(id, garbled)):
+            if id not in there and await _answers(id, garbled):
                 there.append(id)
-                yield from Report(Found(id, rate, None))
-            yield from Report(Progress(begun + done + 1, 2 * of * len(ids), f"id {id} at {rate} bit/s"))
+                await Report(Found(id, rate, None))
+            await Report(Progress(begun + done + 1, 2 * of * len(ids), f"id {id} at {rate} bit/s"))
     found: list[Found] = []
     for id in sorted({*there, *garbled}):
-        identity = yield from outcome(identify(Node(id)))
+        identity = await outcome(identify(Node(id)))
         if isinstance(identity, WireError):
             garbled.add(id)
-        shared = yield from _shared(id, max(polls, GLANCE) if id in garbled else polls)
+        shared = await _shared(id, max(polls, GLANCE) if id in garbled else polls)
         if id in there or shared:
             found.append(Found(id, rate, identity if isinstance(identity, Identity) else None))
     return found
 
 
-def _answers(id: int, garbled: set[int]) -> Operation[bool]:
+async def _answers(id: int, garbled: set[int]) -> bool:
     """Is it there? Bytes that are no answer may be noise, so they do not count yet."""
     try:
-        yield from ping_exchange(Node(id), scanning=True)
+        await ping_exchange(Node(id), scanning=True)
     except NoReply:
         return False
     except WireError:
@@ -104,19 +103,19 @@ def _answers(id: int, garbled: set[int]) -> Operation[bool]:
     return True
 
 
-def _shared(id: int, polls: int) -> Operation[bool]:
+async def _shared(id: int, polls: int) -> bool:
     """Do two servos seem to have this id? Says so if they do."""
-    seen = yield from outcome(_asked(id, polls))
+    seen = await outcome(_asked(id, polls))
     if isinstance(seen, LinkLost):
         raise seen
     if not isinstance(seen, Suspicion) or not seen.suspected:
         return False
-    yield from Report(seen)
+    await Report(seen)
     return True
 
 
-def _asked(id: int, polls: int) -> Operation[Suspicion | None]:
+async def _asked(id: int, polls: int) -> Suspicion | None:
     """As `duplicates`, without its progress: that of the scan goes on."""
     if polls:
-        return (yield from duplicates(Node(id), polls, quiet=True))
+        return await duplicates(Node(id), polls, quiet=True)
     return None

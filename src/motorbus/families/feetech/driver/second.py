@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from motorbus.core.entry import Entry, Table
 from motorbus.core.family import Readdressed
-from motorbus.core.operation import Effect, Operation, Report, Tune
+from motorbus.core.operation import Effect, Report, Tune
 from motorbus.errors import RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver import eeprom
@@ -27,14 +27,14 @@ from motorbus.families.feetech.table import TABLES
 _ROW = "second_id"
 
 
-def second_id(node: Node) -> Operation[int]:
+async def second_id(node: Node) -> int:
     """The id whose writes this servo obeys besides those to its own. Raises RequestError where its map has none."""
-    table = yield from writable(node)
+    table = await writable(node)
     row = _row(node, table)
-    return (yield from read_block(node, row.address, row.size, row.decode))
+    return await read_block(node, row.address, row.size, row.decode)
 
 
-def set_second_id(node: Node, new: int, *, force: bool = False, among: Sequence[int] = ()) -> Operation[int]:
+async def set_second_id(node: Node, new: int, *, force: bool = False, among: Sequence[int] = ()) -> int:
     """Give this servo another second id, for good; its own id means that it has no other. Gives what it reads back.
 
     The servo goes limp. `among` are the ids that other servos on this bus may have; () means every one, which takes
@@ -48,17 +48,17 @@ def set_second_id(node: Node, new: int, *, force: bool = False, among: Sequence[
     """
     checked_id(new)
     asked = [one.node for one in as_nodes(among or range(wire.MAX_ID + 1))]
-    yield from met_alone(node)
-    table = yield from writable(node)
+    await met_alone(node)
+    table = await writable(node)
     row = _row(node, table)
-    if (yield from read_block(node, row.address, row.size, row.decode)) == new:
+    if await read_block(node, row.address, row.size, row.decode) == new:
         return new
-    yield from refuse_duplicates(node)
+    await refuse_duplicates(node)
     if new != node.node and not force:
-        refuse_taken(Place(new, (yield from Tune(0))), (yield from whoever(new)))
-    yield from others_than(node, asked, (node.node,) if force else (new, node.node))
-    yield from Report(Readdressed(node.node, new))
-    yield from eeprom.store(node, table, [Block(row.address, row.encode(new), Effect.PERSISTENT)])
+        refuse_taken(Place(new, await Tune(0)), await whoever(new))
+    await others_than(node, asked, (node.node,) if force else (new, node.node))
+    await Report(Readdressed(node.node, new))
+    await eeprom.store(node, table, [Block(row.address, row.encode(new), Effect.PERSISTENT)])
     return new
 
 

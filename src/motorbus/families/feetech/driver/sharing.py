@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Answer, Due, Exchange, Operation, Progress, Report, Timeout, Tune, outcome
+from motorbus.core.operation import Answer, Due, Exchange, Progress, Report, Timeout, Tune, outcome
 from motorbus.errors import MotorbusError, NoReply, RequestError, WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import PRESENT, read_block
@@ -76,7 +76,7 @@ class Suspicion(NamedTuple):
         return f"of {self.polls} answers {told or 'none was garbled, doubled or different'}"
 
 
-def duplicates(node: Node, polls: int = POLLS, *, quiet: bool = False) -> Operation[Suspicion]:
+async def duplicates(node: Node, polls: int = POLLS, *, quiet: bool = False) -> Suspicion:
     """Does more than one servo answer to this id? Asks at most `polls` times, fewer when it is plain; writes nothing.
 
     Reports `Progress` unless `quiet`. Raises NoReply when there was no answer at all, RequestError for fewer polls
@@ -86,23 +86,23 @@ def duplicates(node: Node, polls: int = POLLS, *, quiet: bool = False) -> Operat
         raise RequestError(
             f"{polls} polls", expected=f"1 to {MOST}", advice="nothing was sent", node=node.node
         )
-    seen = Suspicion(node.node, (yield from Tune(0)), 0)
+    seen = Suspicion(node.node, await Tune(0), 0)
     first = b""
     silence: MotorbusError | None = None
     for number in range(polls):
         block = BLOCKS[number // 2 % len(BLOCKS)]
-        answers = yield from outcome((_alone if number % 2 == 0 else read_twice)(node, *block))
+        answers = await outcome((_alone if number % 2 == 0 else read_twice)(node, *block))
         if isinstance(answers, NoReply):
             silence = silence or answers  # the first one says what may be the cause, too
         if block[0] == 0 and not first and not isinstance(answers, MotorbusError):
             first = answers[0]
         told = _told(answers, first if block[0] == 0 else None)
         if told:
-            told = (yield from _in_step(node)) or told
+            told = await _in_step(node) or told
             seen = seen._replace(**{told: getattr(seen, told) + 1})
         seen = seen._replace(polls=number + 1)
         if not quiet:
-            yield from Report(Progress(number + 1, polls, f"does one servo answer as {node.node}?"))
+            await Report(Progress(number + 1, polls, f"does one servo answer as {node.node}?"))
         if seen.signs >= ENOUGH:
             break
     if silence is not None and seen.silent == seen.polls:
@@ -123,15 +123,15 @@ def _told(answers: Sequence[bytes] | MotorbusError, first: bytes | None) -> str:
     return "changed" if first is not None and answers[0] != first else ""
 
 
-def _in_step(node: Node) -> Operation[str]:
+async def _in_step(node: Node) -> str:
     """Ask something that no late answer can be taken for, so that none is heard twice; "garbled" when that is."""
-    found = yield from outcome(read_block(node, _ID, 1, bytes))
+    found = await outcome(read_block(node, _ID, 1, bytes))
     return "garbled" if isinstance(found, WireError) else ""
 
 
-def refuse_duplicates(node: Node, polls: int = POLLS) -> Operation[None]:
+async def refuse_duplicates(node: Node, polls: int = POLLS) -> None:
     """Raise RequestError when two servos are suspected to have this id: a write to it would reach both."""
-    seen = yield from duplicates(node, polls)
+    seen = await duplicates(node, polls)
     if seen.suspected:
         raise RequestError(
             f"two servos seem to have the id {node.node}: {seen.evidence}",
@@ -147,7 +147,7 @@ def _alone(node: Node, address: int, count: int) -> Exchange[tuple[bytes, ...]]:
     return read_block(node, address, count, lambda data: (data,), timeout=Timeout.SCAN)
 
 
-def read_twice(node: Node, address: int, count: int) -> Operation[tuple[bytes, ...]]:
+async def read_twice(node: Node, address: int, count: int) -> tuple[bytes, ...]:
     """The same with the line kept open as long as a second answer could take."""
     due = Due(node.node, node.node, wire.OVERHEAD + count)
 
@@ -156,7 +156,7 @@ def read_twice(node: Node, address: int, count: int) -> Operation[tuple[bytes, .
             node.heard(reply.data[4], answer.at)
         return tuple(reply.data[5 : 5 + count] for reply in answer.replies)
 
-    answers = yield from Exchange(
+    answers = await Exchange(
         wire.read(node.node, address, count), (due, due), read, timeout=Timeout.SCAN, repeatable=True
     )
     if not answers:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 from motorbus.core.goal import torque_off
-from motorbus.core.operation import Effect, Exchange, Operation, Rank, afterwards, outcome
+from motorbus.core.operation import Effect, Exchange, Rank, afterwards, outcome
 from motorbus.errors import MotorbusError, VerificationFailed
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, unanswered, verified, write_block
@@ -26,7 +26,7 @@ def limp(node: int) -> Block:
     return LIMP._replace(goals=(torque_off(node),))
 
 
-def disable_torque(node: Node) -> Operation[None]:
+async def disable_torque(node: Node) -> None:
     """Torque off: the servo goes limp. Alarms do not matter; said up to three times until it is acknowledged.
 
     Without an acknowledgement the switch is read back: after the third time, or each time where none is due (status
@@ -36,15 +36,15 @@ def disable_torque(node: Node) -> Operation[None]:
     for _ in range(_TRIES):
         exchange = write_block(node, limp(node.node), rank=Rank.STOP)
         try:
-            yield from exchange
+            await exchange
             if not exchange.replies:
-                yield from verified(node, LIMP)
+                await verified(node, LIMP)
             return
         except (*DOUBTS, VerificationFailed) as error:
             doubt = error
     if isinstance(doubt, VerificationFailed):
         raise doubt
-    yield from verified(node, LIMP, doubt)
+    await verified(node, LIMP, doubt)
 
 
 def disable_torque_everyone() -> Exchange[None]:
@@ -52,7 +52,7 @@ def disable_torque_everyone() -> Exchange[None]:
     return unanswered(wire.write(wire.BROADCAST, LIMP.address, LIMP.data), LIMP.effect, rank=Rank.STOP)
 
 
-def disable_torque_all(ids: Iterable[int | Node]) -> Operation[dict[int, MotorbusError]]:
+async def disable_torque_all(ids: Iterable[int | Node]) -> dict[int, MotorbusError]:
     """Torque off for all of these: at once by SYNC WRITE, then one after the other until acknowledged.
 
     Visits everyone whatever happens. The value holds, by id, the error of each that did not acknowledge. An
@@ -61,19 +61,19 @@ def disable_torque_all(ids: Iterable[int | Node]) -> Operation[dict[int, Motorbu
     nodes = as_nodes(ids)
     errors: dict[int, MotorbusError] = {}
     waiting = list(nodes)
-    yield from afterwards(_at_once(nodes), lambda: _one_by_one(waiting, errors))
+    await afterwards(_at_once(nodes), lambda: _one_by_one(waiting, errors))
     return errors
 
 
-def _at_once(nodes: Sequence[Node]) -> Operation[None]:
+async def _at_once(nodes: Sequence[Node]) -> None:
     for exchange in all_limp(nodes):
-        yield from outcome(exchange)  # whoever did not hear is visited
+        await outcome(exchange)  # whoever did not hear is visited
 
 
-def _one_by_one(waiting: list[Node], errors: dict[int, MotorbusError]) -> Operation[None]:
+async def _one_by_one(waiting: list[Node], errors: dict[int, MotorbusError]) -> None:
     """Visit those who wait, and begin again where it was when interrupted."""
     while waiting:
-        failure = yield from outcome(disable_torque(waiting[0]))
+        failure = await outcome(disable_torque(waiting[0]))
         if failure is not None:
             errors[waiting[0].node] = failure
         del waiting[0]

@@ -13,7 +13,7 @@ from typing import Final
 
 from motorbus.core.entry import is_number, shown
 from motorbus.core.family import Positions
-from motorbus.core.operation import Effect, Exchange, Operation, outcome
+from motorbus.core.operation import Effect, Exchange, outcome
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import changed_since, confirmed, unanswered
@@ -29,7 +29,7 @@ from motorbus.families.feetech.driver.rest import asked_anew
 from motorbus.families.feetech.table import Mode
 
 
-def train(servos: Sequence[Node], *, rate: int, air: float = AIR) -> Operation[Train]:
+async def train(servos: Sequence[Node], *, rate: int, air: float = AIR) -> Train:
     """These servos, ready to be asked and told in a loop; those not known yet are read, and nothing is written.
 
     `rate` is that of the bus in bit/s: replies of one exchange take at most `air` s. Raises the first error of a servo
@@ -37,31 +37,31 @@ def train(servos: Sequence[Node], *, rate: int, air: float = AIR) -> Operation[T
     than position mode, and when both limits are 0 and nobody has published what that means.
     """
     nodes = distinct(servos)
-    errors = yield from prepare_all(nodes, rate=rate, air=air)
+    errors = await prepare_all(nodes, rate=rate, air=air)
     raise_first(errors.values())
     for node in nodes:
         _refuse_unless_led_by_position(node)
     return Train(nodes, position_reads(nodes, rate=rate, air=air))
 
 
-def limits(node: Node) -> Operation[tuple[float, float]]:
+async def limits(node: Node) -> tuple[float, float]:
     """Lowest and highest position it can be told, rad; read from the servo unless known.
 
     Raises DeviceError when its map is unknown, RequestError when both are 0 and nobody has published what that means.
     """
-    yield from writable(node)
+    await writable(node)
     if node.limits is None:
         raise no_limits(node)
     return node.limits
 
 
-def travel(node: Node) -> Operation[tuple[float, float] | None]:
+async def travel(node: Node) -> tuple[float, float] | None:
     """Lowest and highest position, rad, that its encoder and its registers can express, whatever its limits are.
 
     None in other than position mode, and when its map is not known.
     """
     met = node.settings is not None
-    table = yield from known(node)
+    table = await known(node)
     settings = node.settings
     if not met:
         node.forget_settings()  # they are read anew when the servo is used
@@ -103,7 +103,7 @@ class Train:
             self._ids = tuple(to)
         return [packet.exchange(to) for packet in self._packets]
 
-    def begin(self, speeds: Mapping[int, float]) -> Operation[None]:
+    async def begin(self, speeds: Mapping[int, float]) -> None:
         """Torque on without a jump, one after the other, and nothing set that would hold back who follows goals.
 
         A servo is bound by its speed (rad/s, above 0), rounded up to what its register can say; one without is as
@@ -115,7 +115,7 @@ class Train:
             _check_speed(self._servo(id), speed)
         errors = []
         for id, node in self._servos.items():
-            failure = yield from outcome(_begin(node, speeds.get(id)))
+            failure = await outcome(_begin(node, speeds.get(id)))
             if failure is not None:
                 errors.append(failure)
         raise_first(errors)
@@ -134,18 +134,18 @@ class Train:
 # -- begin ---------------------------------------------------------------------------------------------------
 
 
-def _begin(node: Node, speed: float | None) -> Operation[None]:
+async def _begin(node: Node, speed: float | None) -> None:
     """In any other than position mode the greatest velocity would be an order to turn: so that is looked at anew."""
-    table = yield from asked_anew(node)
+    table = await asked_anew(node)
     _refuse_unless_led_by_position(node)
-    yield from enable_torque(node)
+    await enable_torque(node)
     _refuse_unless_led_by_position(node)
     orders = [Order(table["goal_velocity"], speed_at_least(node, table, speed))]
     orders += [
         Order(table[name], 0) for name in (node.control.acceleration, node.control.time) if name
     ]  # 0: as quickly as it can, and not by time but by velocity
     for block in blocks(node, orders):
-        yield from confirmed(node, block)
+        await confirmed(node, block)
 
 
 def _refuse_unless_led_by_position(node: Node) -> None:

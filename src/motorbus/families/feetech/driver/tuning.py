@@ -14,7 +14,6 @@ from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from motorbus.core.entry import Entry, Storage, Table, Value, shown
-from motorbus.core.operation import Operation
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.exchanges import Block, verified
 from motorbus.families.feetech.driver.identity import writable
@@ -112,14 +111,14 @@ _MASKS: Final = ("unload", "led")
 # -- torque limit --------------------------------------------------------------------------------------------
 
 
-def torque_limit(node: Node) -> Operation[float]:
+async def torque_limit(node: Node) -> float:
     """What bounds its torque now, as a fraction of the stall torque (really of the duty)."""
-    table = yield from writable(node)
+    table = await writable(node)
     row = limiting(table)
-    return float((yield from read(node, row.name))[row.name])
+    return float((await read(node, row.name))[row.name])
 
 
-def set_torque_limit(node: Node, limit: float, *, persistent: bool = False) -> Operation[TorqueLimit]:
+async def set_torque_limit(node: Node, limit: float, *, persistent: bool = False) -> TorqueLimit:
     """Bound its torque, 0 to 1 of the stall torque: at once and until power-off, with `persistent` for good.
 
     Servos without such a register in RAM (SCS, old SMS) have max_torque in EEPROM alone: there it is always for good,
@@ -134,13 +133,13 @@ def set_torque_limit(node: Node, limit: float, *, persistent: bool = False) -> O
             advice="nothing was sent",
             node=node.node,
         )
-    table = yield from writable(node)
+    table = await writable(node)
     row = limiting(table)
     kept = persistent or row.storage is Storage.EEPROM
     names = tuple(dict.fromkeys((row.name, "max_torque"))) if kept else (row.name,)
-    if limit and not kept and not (yield from read_raw(node, row.name))[row.name]:
-        yield from calmed(node, (yield from asked_anew(node)))
-    yield from _put(node, table, dict.fromkeys(names, limit))
+    if limit and not kept and not (await read_raw(node, row.name))[row.name]:
+        await calmed(node, await asked_anew(node))
+    await _put(node, table, dict.fromkeys(names, limit))
     return TorqueLimit(limit, names, kept)
 
 
@@ -152,15 +151,15 @@ def limiting(table: Table) -> Entry:
 # -- gains ---------------------------------------------------------------------------------------------------
 
 
-def gains(node: Node) -> Operation[Gains]:
+async def gains(node: Node) -> Gains:
     """The gains of its loops."""
-    table = yield from writable(node)
+    table = await writable(node)
     rows = _rows(table, GAINS)
-    found = yield from read_raw(node, *(row.name for row in rows.values()))
+    found = await read_raw(node, *(row.name for row in rows.values()))
     return Gains(**{part: found[rows[part].name] if part in rows else None for part in GAINS})
 
 
-def set_gains(
+async def set_gains(
     node: Node,
     *,
     p: int | None = None,
@@ -173,7 +172,7 @@ def set_gains(
     live_p: int | None = None,
     live_i: int | None = None,
     live_d: int | None = None,
-) -> Operation[None]:
+) -> None:
     """Set gains by the names that `Gains` has, as set_gains(p=32, d=32); None leaves one as it is.
 
     What lies in EEPROM is written for good by the guarded sequence, after which the servo is limp, unless it has these
@@ -184,19 +183,19 @@ def set_gains(
     velocity = {"velocity_p": velocity_p, "velocity_i": velocity_i}
     currents = {"current_p": current_p, "current_i": current_i}
     given = _given(node, {**position, **velocity, **currents, **live}, "gain")
-    table = yield from writable(node)
+    table = await writable(node)
     rows = _rows(table, GAINS, given, node)
-    yield from _put(node, table, {rows[part].name: _number(part, value) for part, value in given.items()})
+    await _put(node, table, {rows[part].name: _number(part, value) for part, value in given.items()})
 
 
 # -- protection ----------------------------------------------------------------------------------------------
 
 
-def protection(node: Node) -> Operation[Protection]:
+async def protection(node: Node) -> Protection:
     """What it protects itself from, and when."""
-    table = yield from writable(node)
+    table = await writable(node)
     rows = _rows(table, PROTECTION)
-    found = yield from read(node, *(row.name for row in rows.values()))
+    found = await read(node, *(row.name for row in rows.values()))
     values: dict[str, object] = dict.fromkeys(PROTECTION)
     for part, row in rows.items():
         value = found[row.name]
@@ -204,7 +203,7 @@ def protection(node: Node) -> Operation[Protection]:
     return Protection(**values)  # type: ignore[arg-type]
 
 
-def set_protection(
+async def set_protection(
     node: Node,
     *,
     torque: float | None = None,
@@ -217,7 +216,7 @@ def set_protection(
     min_voltage: float | None = None,
     unload: Iterable[str] | None = None,
     led: Iterable[str] | None = None,
-) -> Operation[None]:
+) -> None:
     """Set parts of the protection by the names that `Protection` has; None leaves one as it is.
 
     set_protection(torque=0.2, threshold=0.8, time=2.0, unload=("temperature", "overload")). All of it lies in EEPROM:
@@ -229,13 +228,13 @@ def set_protection(
     too_much = {"current": current, "current_time": current_time, "max_temperature": max_temperature}
     rest = {"max_voltage": max_voltage, "min_voltage": min_voltage, "unload": unload, "led": led}
     given = _given(node, {**overload, **too_much, **rest}, "part of the protection")
-    table = yield from writable(node)
+    table = await writable(node)
     rows = _rows(table, PROTECTION, given, node)
     orders: dict[str, Value] = {}
     for part, value in given.items():
         orders[rows[part].name] = _mask(node, rows[part], value) if part in _MASKS else _number(part, value)
-    yield from _sane(node, orders)
-    yield from _put(node, table, orders)
+    await _sane(node, orders)
+    await _put(node, table, orders)
 
 
 def _names(row: Entry, mask: int) -> tuple[str, ...]:
@@ -262,12 +261,12 @@ def _number(part: str, value: object) -> float:
     return value
 
 
-def _sane(node: Node, orders: Mapping[str, Value]) -> Operation[None]:
+async def _sane(node: Node, orders: Mapping[str, Value]) -> None:
     """A highest voltage that is not above the lowest would be an alarm for ever."""
     names = ("max_voltage", "min_voltage")
     if not any(name in orders for name in names):
         return
-    held = yield from read(node, *names)
+    held = await read(node, *names)
     high, low = (orders.get(name, held[name]) for name in names)
     if high <= low:
         raise RequestError(
@@ -315,10 +314,10 @@ def _lacks(node: Node, table: Table, part: str, has: Iterable[str]) -> RequestEr
     )
 
 
-def _put(node: Node, table: Table, values: Mapping[str, Value]) -> Operation[None]:
+async def _put(node: Node, table: Table, values: Mapping[str, Value]) -> None:
     """Write by name; EEPROM is read back by the guarded sequence, RAM here."""
-    yield from write_limp(node, values)
+    await write_limp(node, values)
     for name, value in values.items():
         row = table[name]
         if row.storage is Storage.RAM:
-            yield from verified(node, Block(row.address, row.encode(node.raw(row, value))))
+            await verified(node, Block(row.address, row.encode(node.raw(row, value))))

@@ -10,7 +10,7 @@ measured on an STS3215 with firmware 3.10 (ignored).
 from __future__ import annotations
 
 from motorbus.core.entry import Entry
-from motorbus.core.operation import Alone, Effect, Operation, Rank, Timeout
+from motorbus.core.operation import Alone, Effect, Rank, Timeout
 from motorbus.errors import DeviceError, MotorbusError, RequestError, VerificationFailed
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import DOUBTS, PRESENT, Block, acknowledged, read_block
@@ -20,27 +20,27 @@ from motorbus.families.feetech.driver.torque import disable_torque
 from motorbus.families.feetech.table import CONTROL
 
 
-def clear_turns(node: Node) -> Operation[float]:
+async def clear_turns(node: Node) -> float:
     """Forget the turns it has counted; gives the position (rad) afterwards, which lies within one turn.
 
     It goes limp and stays so. Where it stands within its turn is as before, but how often it had turned is lost: home
     the machine again before it moves. Raises RequestError, with nothing sent, where no servo of its map is known to
     obey; DeviceError when it stays silent, VerificationFailed when it acknowledges and still counts turns.
     """
-    yield from prepare(node)
-    table = yield from writable(node)
+    await prepare(node)
+    table = await writable(node)
     if not CONTROL[table.name].clear_turns:
         raise _unknown(node, table.name)
-    return (yield from Alone(_cleared(node, table["present_position"], CONTROL[table.name].turn)))
+    return await Alone(_cleared(node, table["present_position"], CONTROL[table.name].turn))
 
 
-def _cleared(node: Node, position: Entry, turn: int) -> Operation[float]:
-    before = yield from read_block(node, PRESENT, position.size, position.decode)
-    yield from disable_torque(node)
+async def _cleared(node: Node, position: Entry, turn: int) -> float:
+    before = await read_block(node, PRESENT, position.size, position.decode)
+    await disable_torque(node)
     order = Block(0, b"", Effect.PERSISTENT)
     doubt: MotorbusError | None = None
     try:
-        yield from acknowledged(
+        await acknowledged(
             node, wire.clear_turns(node.node), order, rank=Rank.CONFIGURATION, timeout=Timeout.STORE
         )
     except DOUBTS as error:
@@ -55,7 +55,7 @@ def _cleared(node: Node, position: Entry, turn: int) -> Operation[float]:
             raise _still(node, here, turn)
         return float(node.value(position, here))
 
-    return (yield from read_block(node, PRESENT, position.size, told, timeout=Timeout.STORE))
+    return await read_block(node, PRESENT, position.size, told, timeout=Timeout.STORE)
 
 
 def _still(node: Node, here: int, turn: int) -> VerificationFailed:

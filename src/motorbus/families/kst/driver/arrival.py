@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Operation, Pause
+from motorbus.core.operation import Pause
 from motorbus.errors import MotionError, Stalled
 from motorbus.families.kst.driver.exchanges import decided, upload_row
 from motorbus.families.kst.driver.node import Node
@@ -34,12 +34,12 @@ class Move(NamedTuple):
         return self.timeout if self.timeout is not None else 1.0 + 2.0 * way / UNHURRIED
 
 
-def arrive(node: Node, move: Move) -> Operation[None]:
+async def arrive(node: Node, move: Move) -> None:
     """Poll until the move is over. Raises Stalled, or MotionError when the time is up."""
-    yield from decided(node)
+    await decided(node)
     row = node.table["present_position"]
     look = upload_row(node, row, lambda raw: float(row.to_value(raw)), tells_position=True)
-    here = mark = yield from look
+    here = mark = await look
     begun = progressed = node.at
     allowance = move.allowance(abs(here - move.goal))
     looks = _near(here, move)
@@ -50,8 +50,8 @@ def arrive(node: Node, move: Move) -> Operation[None]:
             raise _stalled(node, here, move)
         if node.at - begun > allowance:
             raise _late(node, here, move, allowance)
-        yield from Pause(POLL)
-        here = yield from look
+        await Pause(POLL)
+        here = await look
         looks = looks + 1 if _near(here, move) else 0
 
 

@@ -20,7 +20,6 @@ from motorbus.core.operation import (
     Effect,
     Exchange,
     Goal,
-    Operation,
     Rank,
     Report,
     Timeout,
@@ -35,7 +34,7 @@ from motorbus.families.kst.driver.node import Node, checked_id, checked_ids
 from motorbus.families.kst.table import SAVE
 
 
-def broadcast_read(name: str, dialect: Dialect = PLAIN) -> Operation[dict[int, Value]]:
+async def broadcast_read(name: str, dialect: Dialect = PLAIN) -> dict[int, Value]:
     """An object of everyone, in API units, by node.
 
     Who refuses it, is silent, says something longer, or says two different things (two servos with one id), is
@@ -44,15 +43,15 @@ def broadcast_read(name: str, dialect: Dialect = PLAIN) -> Operation[dict[int, V
     row = dialect.profile.table[name]
     if not row.readable:
         raise RequestError(f"{name} can only be written", advice="nothing was sent")
-    return (yield from Alone(_read(row, dialect)))
+    return await Alone(_read(row, dialect))
 
 
-def _read(row: Entry, dialect: Dialect) -> Operation[dict[int, Value]]:
+async def _read(row: Entry, dialect: Dialect) -> dict[int, Value]:
     """With the bus alone: what a node says to everyone's question looks just like what it says to its own."""
     found: dict[int, Value] = {}
     for extended in sorted(dialect.formats):
         frame = wire.encode_upload(wire.EVERYONE, row.address, row.subindex or 0, extended=extended)
-        answer = yield from Exchange[Answer](frame, ANY, lane=EVERY_LANE)
+        answer = await Exchange[Answer](frame, ANY, lane=EVERY_LANE)
         found |= _values(row, answer, dialect)
     return found
 
@@ -71,9 +70,7 @@ def _about(row: Entry, reply: wire.SdoReply) -> bool:
     return (reply.index, reply.subindex) == (row.address, row.subindex or 0)
 
 
-def broadcast_position(
-    to: float, nodes: Sequence[int], dialect: Dialect = PLAIN
-) -> Operation[tuple[int, ...]]:
+async def broadcast_position(to: float, nodes: Sequence[int], dialect: Dialect = PLAIN) -> tuple[int, ...]:
     """Send everyone on the bus to `to` rad; returns who acknowledged. Where the profile has a start rule, everyone is
     started first, and `Started` (node 0) tells so.
 
@@ -91,36 +88,34 @@ def broadcast_position(
     raw = counts(Node(there[0], dialect), to)
     value, low, high = (float(row.to_value(number)) for number in (raw, row.low, row.high))
     goals = tuple(Goal(node, "position", value, low, high) for node in there)
-    return (yield from Alone(_moved(dialect, row, raw, goals)))
+    return await Alone(_moved(dialect, row, raw, goals))
 
 
-def _moved(dialect: Dialect, row: Entry, raw: int, goals: tuple[Goal, ...]) -> Operation[tuple[int, ...]]:
+async def _moved(dialect: Dialect, row: Entry, raw: int, goals: tuple[Goal, ...]) -> tuple[int, ...]:
     if dialect.must_start:
         for extended in sorted(dialect.formats):
             frame = wire.encode_start(dialect.nmt, wire.EVERYONE, True, extended=extended)
-            yield from Exchange[Answer](
+            await Exchange[Answer](
                 frame, (), lane=EVERY_LANE, rank=Rank.CONTROL, effect=Effect.MOTION, goals=goals
             )
-            yield from Report(Started(wire.EVERYONE, frame))
-    return (yield from _written(dialect, row, raw, goals))
+            await Report(Started(wire.EVERYONE, frame))
+    return await _written(dialect, row, raw, goals)
 
 
-def broadcast_save(dialect: Dialect = PLAIN) -> Operation[tuple[int, ...]]:
+async def broadcast_save(dialect: Dialect = PLAIN) -> tuple[int, ...]:
     """Let everyone save; returns who acknowledged, which by the manual is nobody. The bus is then left alone until the
     flash of all has been written."""
     row = dialect.profile.table["store"]
-    return (yield from Alone(_written(dialect, row, SAVE, timeout=Timeout.STORE)))
+    return await Alone(_written(dialect, row, SAVE, timeout=Timeout.STORE))
 
 
-def broadcast_bit_rate(rate: int, dialect: Dialect = PLAIN) -> Operation[tuple[int, ...]]:
+async def broadcast_bit_rate(rate: int, dialect: Dialect = PLAIN) -> tuple[int, ...]:
     """Give everyone another bit rate (bit/s), in force after a save and a restart; returns who acknowledged."""
     row = dialect.profile.table["bit_rate_code"]
-    return (yield from Alone(_written(dialect, row, code_of(rate))))
+    return await Alone(_written(dialect, row, code_of(rate)))
 
 
-def broadcast_node_id(
-    new: int, dialect: Dialect = PLAIN, *, force: bool = False
-) -> Operation[tuple[int, ...]]:
+async def broadcast_node_id(new: int, dialect: Dialect = PLAIN, *, force: bool = False) -> tuple[int, ...]:
     """Give everyone on the bus this id. Raises RequestError without `force`: with more than one servo there, they could
     not be told apart any more."""
     checked_id(new)
@@ -130,25 +125,25 @@ def broadcast_node_id(
             cause="servos with one id answer together, and cannot be given different ids any more but one at a time",
             advice="connect one servo and use provision(); force=True does it all the same; nothing was sent",
         )
-    return (yield from Alone(_readdressed(dialect, new)))
+    return await Alone(_readdressed(dialect, new))
 
 
-def _readdressed(dialect: Dialect, new: int) -> Operation[tuple[int, ...]]:
-    yield from Report(Readdressed(None, new))
-    return (yield from _written(dialect, dialect.profile.table["node_id"], new))
+async def _readdressed(dialect: Dialect, new: int) -> tuple[int, ...]:
+    await Report(Readdressed(None, new))
+    return await _written(dialect, dialect.profile.table["node_id"], new)
 
 
-def _written(
+async def _written(
     dialect: Dialect,
     row: Entry,
     raw: int,
     goals: tuple[Goal, ...] = (),
     *,
     timeout: Timeout = Timeout.REPLY,
-) -> Operation[tuple[int, ...]]:
+) -> tuple[int, ...]:
     acknowledged: list[int] = []
     for extended in sorted(dialect.formats):
-        answer = yield from _write(dialect, row, row.encode(raw), goals, timeout, extended)
+        answer = await _write(dialect, row, row.encode(raw), goals, timeout, extended)
         for reply in answer.replies:
             one = wire.decode_reply(reply.data)
             if one is not None and one.kind == "download" and _about(row, one):

@@ -7,7 +7,7 @@ back, saved and read back again (`keeping.py`). Source of each object: its row i
 from __future__ import annotations
 
 from motorbus.core.entry import Entry
-from motorbus.core.operation import Alone, Operation, Rank
+from motorbus.core.operation import Alone, Rank
 from motorbus.errors import RequestError
 from motorbus.families.kst.driver.exchanges import decided, order, upload_row
 from motorbus.families.kst.driver.feedback import position_exchange
@@ -18,7 +18,7 @@ from motorbus.families.kst.driver.refusals import lacking
 from motorbus.families.kst.table import REVERSED
 
 
-def start_reports(node: Node, interval: float | None = None) -> Operation[None]:
+async def start_reports(node: Node, interval: float | None = None) -> None:
     """Let it report its position by itself, every `interval` seconds (None: as it is set); nobody answers that.
 
     Where the profile has a start rule, this is the start that lets it move, too. Raises RequestError where the profile
@@ -29,21 +29,21 @@ def start_reports(node: Node, interval: float | None = None) -> Operation[None]:
     raw = None if interval is None else node.raw(row, interval)
     if raw is not None:
         row.encode(raw)
-    yield from decided(node)
+    await decided(node)
     if raw is not None:
-        yield from order(node, row, raw)
-    yield from start_exchange(node, True)
+        await order(node, row, raw)
+    await start_exchange(node, True)
 
 
-def stop_reports(node: Node) -> Operation[None]:
+async def stop_reports(node: Node) -> None:
     """Let it report no more. Where the profile has a start rule, it then ignores positions until the next start."""
     _row(node, "report_interval", "reports")
     _startable(node)
-    yield from decided(node)
-    yield from start_exchange(node, False)
+    await decided(node)
+    await start_exchange(node, False)
 
 
-def set_mid_point(node: Node) -> Operation[float]:
+async def set_mid_point(node: Node) -> float:
     """Make the present position the zero, and save; returns the position (rad) that it tells afterwards, about 0.
 
     A servo that tells 0 already is left as it is, for flash wears, unless this node has set its mid point and not come
@@ -53,32 +53,32 @@ def set_mid_point(node: Node) -> Operation[float]:
     is refused while a stop is latched, and never repeated in silence: OutcomeUnknown says that it may have been heard.
     """
     row = _row(node, "mid_point", "mid point")
-    yield from decided(node)
-    return (yield from Alone(_mid_point(node, row)))
+    await decided(node)
+    return await Alone(_mid_point(node, row))
 
 
-def _mid_point(node: Node, row: Entry) -> Operation[float]:
+async def _mid_point(node: Node, row: Entry) -> float:
     present = node.table["present_position"]
-    if row.name not in node.unsaved and not (yield from upload_row(node, present, int, tells_position=True)):
+    if row.name not in node.unsaved and not await upload_row(node, present, int, tells_position=True):
         return 0.0
     node.limits = None
     node.unsaved.add(row.name)
-    yield from order(node, row, node.profile.mid_point_value, rank=Rank.CONFIGURATION)
-    yield from save(node)
-    yield from settled(node)
+    await order(node, row, node.profile.mid_point_value, rank=Rank.CONFIGURATION)
+    await save(node)
+    await settled(node)
     node.unsaved.discard(row.name)
-    return (yield from position_exchange(node))
+    return await position_exchange(node)
 
 
-def travel_limits(node: Node) -> Operation[tuple[float, float]]:
+async def travel_limits(node: Node) -> tuple[float, float]:
     """Lowest and highest position, rad, as the servo is set."""
     low, high = _limits(node)
-    yield from decided(node)
-    raws = (yield from upload_row(node, low, int)), (yield from upload_row(node, high, int))
+    await decided(node)
+    raws = await upload_row(node, low, int), await upload_row(node, high, int)
     return float(low.to_value(raws[0])), float(high.to_value(raws[1]))
 
 
-def set_travel_limits(node: Node, low: float, high: float) -> Operation[None]:
+async def set_travel_limits(node: Node, low: float, high: float) -> None:
     """Keep it between `low` (at most 0) and `high` (at least 0), rad; read back, saved, and read back again.
 
     Limits that it has already are neither written nor saved again (see `keep` for what that cannot know).
@@ -96,17 +96,17 @@ def set_travel_limits(node: Node, low: float, high: float) -> Operation[None]:
             advice="give a low limit below 0, or a high one above; nothing was sent",
             node=node.node,
         )
-    yield from keep(node, orders)
+    await keep(node, orders)
 
 
-def reversed_(node: Node) -> Operation[bool]:
+async def reversed_(node: Node) -> bool:
     """Whether its sense of rotation is reversed."""
     row = _row(node, "function_enable", "reverse bit")
-    yield from decided(node)
-    return bool((yield from upload_row(node, row, int)) >> REVERSED & 1)
+    await decided(node)
+    return bool(await upload_row(node, row, int) >> REVERSED & 1)
 
 
-def set_reversed(node: Node, on: bool) -> Operation[None]:
+async def set_reversed(node: Node, on: bool) -> None:
     """Reverse its sense of rotation, or not; the other bits of that object, which nobody knows, stay as they are.
 
     Read, changed, written, read back (three tries), saved and read back again. In the reversed state a change of one
@@ -114,14 +114,14 @@ def set_reversed(node: Node, on: bool) -> Operation[None]:
     tells what becomes of the old target, so keep clear; it is refused while a stop is latched.
     """
     row = _row(node, "function_enable", "reverse bit")
-    yield from decided(node)
-    yield from Alone(_turned(node, row, on))
+    await decided(node)
+    await Alone(_turned(node, row, on))
 
 
-def _turned(node: Node, row: Entry, on: bool) -> Operation[None]:
-    raw = yield from upload_row(node, row, int)
+async def _turned(node: Node, row: Entry, on: bool) -> None:
+    raw = await upload_row(node, row, int)
     bit = 1 << REVERSED
-    yield from keep(node, [(row, raw | bit if on else raw & ~bit)])
+    await keep(node, [(row, raw | bit if on else raw & ~bit)])
 
 
 def _limits(node: Node) -> tuple[Entry, Entry]:

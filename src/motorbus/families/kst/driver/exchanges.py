@@ -19,7 +19,6 @@ from motorbus.core.operation import (
     Effect,
     Exchange,
     Goal,
-    Operation,
     Rank,
     Refusal,
     Runnable,
@@ -180,19 +179,19 @@ def download(
     )
 
 
-def order(
+async def order(
     node: Node, row: Entry, raw: int, goals: tuple[Goal, ...] = (), *, rank: Rank = Rank.CONTROL
-) -> Operation[None]:
+) -> None:
     """Write a row. Raises DeviceError when the node refuses it, OutcomeUnknown when it never acknowledges."""
-    yield from decided(node)
+    await decided(node)
     data = row.encode(raw)
     states_length = node.dialect.states_length(node.node)
     try:
-        yield from download(node, row, data, states_length=states_length, goals=goals, rank=rank)
+        await download(node, row, data, states_length=states_length, goals=goals, rank=rank)
     except DeviceError as refusal:
         if states_length or node.dialect.sized != "auto" or meant(refusal.code) not in UNSIZED_REFUSED:
             raise
-        yield from download(node, row, data, states_length=True, goals=goals, rank=rank)
+        await download(node, row, data, states_length=True, goals=goals, rank=rank)
         node.dialect.learn_sized(node.node)
 
 
@@ -251,12 +250,12 @@ def ready(node: Node, say: Callable[[Node], Runnable[T]]) -> Runnable[T]:
     return _after(node, say) if node.dialect.undecided(node.node) else say(node)
 
 
-def _after(node: Node, say: Callable[[Node], Runnable[T]]) -> Operation[T]:
-    yield from decided(node)
-    return (yield from say(node))
+async def _after(node: Node, say: Callable[[Node], Runnable[T]]) -> T:
+    await decided(node)
+    return await say(node)
 
 
-def decided(node: Node) -> Operation[None]:
+async def decided(node: Node) -> None:
     """Find out, once, which id format this node answers: 11 bits are tried first. Raises NoReply for neither.
 
     Silence is expected of one of the two, so it must not make the node doubtful.
@@ -265,7 +264,7 @@ def decided(node: Node) -> Operation[None]:
         return
     for extended in (False, True) * 2:
         frame = wire.encode_upload(node.node, NODE_ID, extended=extended)
-        if (yield from listening(node, frame, _somebody, timeout=Timeout.REPLY, rank=Rank.POLL)):
+        if await listening(node, frame, _somebody, timeout=Timeout.REPLY, rank=Rank.POLL):
             node.dialect.learn_format(node.node, extended)
             return
     raise NoReply(
@@ -299,34 +298,34 @@ def answers(node: Node) -> Exchange[None]:
 # --- values longer than four bytes --------------------------------------------------------------------------
 
 
-def whole(node: Node, row: Entry) -> Operation[bytes]:
+async def whole(node: Node, row: Entry) -> bytes:
     """All bytes of a value: four at most in the one reply that KST servos give, else segment by segment.
 
     A transfer in segments is carried out with the bus to itself, for a second request would end it. Raises
     DeviceError for a refusal, UnexpectedReply for segments out of order or without end.
     """
-    yield from decided(node)
-    first = yield from _begin(node, row)
+    await decided(node)
+    first = await _begin(node, row)
     if first.kind == "upload":
         return first.data
-    return (yield from Alone(_segments(node, row)))
+    return await Alone(_segments(node, row))
 
 
 def _begin(node: Node, row: Entry) -> Exchange[SdoReply]:
     return upload(node, row.address, row.subindex or 0, lambda reply: reply)
 
 
-def _segments(node: Node, row: Entry) -> Operation[bytes]:
-    first = yield from _begin(node, row)  # once more, for something else may have come in between
+async def _segments(node: Node, row: Entry) -> bytes:
+    first = await _begin(node, row)  # once more, for something else may have come in between
     if first.kind == "upload":
         return first.data
     data, toggle, last = b"", 0, False
     while not last:
-        segment = yield from _segment(node, toggle)
+        segment = await _segment(node, toggle)
         data += segment.data
         toggle, last = 1 - toggle, segment.last
         if len(data) > LONGEST or not (segment.data or last):
-            yield from _give_up(node, row)
+            await _give_up(node, row)
             raise UnexpectedReply(
                 f"node {node.node} tells {row.name} and does not end: {len(data)} bytes so far",
                 expected=f"{LONGEST} bytes at most, and some in each segment",

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple, TypeVar
 
 from motorbus.core.entry import Entry
 from motorbus.core.family import State
-from motorbus.core.operation import Exchange, Operation, Runnable
+from motorbus.core.operation import Exchange, Runnable
 from motorbus.families.kst import table
 from motorbus.families.kst.driver.exchanges import decided, ready, upload, upload_row
 from motorbus.families.kst.driver.node import Node
@@ -96,17 +96,17 @@ def temperature(node: Node) -> Runnable[float]:
     return ready(node, lambda same: kept(same, "temperature", _temperature))
 
 
-def telemetry(node: Node) -> Operation[State]:
+async def telemetry(node: Node) -> State:
     """One sample: position (rad); current (A) and temperature (°C) where the profile has them; alarms heard lately.
 
     Whether it moves, how fast, at what voltage and under what load is None: these servos do not tell.
     """
-    yield from decided(node)
-    here = yield from position_exchange(node)
+    await decided(node)
+    here = await position_exchange(node)
     at = node.at
     if node.profile.status_row is None:
         return State(at=at, position=here, alarm=node.alarm)
-    felt = yield from _felt(node)
+    felt = await _felt(node)
     return State(at=at, position=here, current=felt.current, temperature=felt.temperature, alarm=node.alarm)
 
 

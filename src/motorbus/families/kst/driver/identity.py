@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from motorbus.core.entry import Entry
 from motorbus.core.family import Identity, Readdressed
-from motorbus.core.operation import Alone, Operation, Rank, Report, outcome
+from motorbus.core.operation import Alone, Rank, Report, outcome
 from motorbus.errors import DeviceError, MotorbusError, NoReply, RequestError, VerificationFailed
 from motorbus.families.kst import table
 from motorbus.families.kst.driver.exchanges import (
@@ -29,21 +29,21 @@ from motorbus.families.kst.table import BIT_RATES
 UNKNOWN = "unknown"
 
 
-def ping(node: Node) -> Operation[bool]:
+async def ping(node: Node) -> bool:
     """Is it there? A refusal is an answer; silence is the answer False."""
     try:
-        yield from decided(node)
-        yield from answers(node)
+        await decided(node)
+        await answers(node)
     except NoReply:
         return False
     return True
 
 
-def identify(node: Node) -> Operation[Identity]:
+async def identify(node: Node) -> Identity:
     """The profile it is taken for, the version it tells ("unknown" when it refuses), and the id it reads back."""
-    reads_back = yield from _if_told(node, node.table["node_id"])
+    reads_back = await _if_told(node, node.table["node_id"])
     try:
-        firmware = yield from version(node)
+        firmware = await version(node)
     except DeviceError:
         firmware = UNKNOWN
     extended = node.dialect.extended(node.node)
@@ -55,7 +55,7 @@ def identify(node: Node) -> Operation[Identity]:
     return Identity(node.node, node.profile.title, firmware, node.profile.name, details)
 
 
-def version(node: Node) -> Operation[str]:
+async def version(node: Node) -> str:
     """The firmware version as text, from 0x100A or where newer firmware has it; as hex when it is no text.
 
     Text of more than four letters is taken in segments. Raises DeviceError when the servo has none of these objects.
@@ -63,7 +63,7 @@ def version(node: Node) -> Operation[str]:
     refusal: DeviceError | None = None
     for row in node.profile.version_rows:
         try:
-            return table.version((yield from whole(node, row)))
+            return table.version(await whole(node, row))
         except DeviceError as error:
             if meant(error.code) not in ABSENT:
                 raise
@@ -72,12 +72,12 @@ def version(node: Node) -> Operation[str]:
     raise refusal
 
 
-def node_id(node: Node) -> Operation[int]:
+async def node_id(node: Node) -> int:
     """The id it reads back: its own, or after set_node_id() the one it will have after a save and a restart."""
-    return (yield from ready(node, lambda same: upload_row(same, same.table["node_id"], int)))
+    return await ready(node, lambda same: upload_row(same, same.table["node_id"], int))
 
 
-def set_node_id(node: Node, new: int) -> Operation[None]:
+async def set_node_id(node: Node, new: int) -> None:
     """Give it another id, 1 to 127; in force after save() and a restart, lost at a restart without.
 
     Looks first whether it is alone with its id. Raises RequestError for any other new id (nothing is sent), for two
@@ -85,17 +85,17 @@ def set_node_id(node: Node, new: int) -> Operation[None]:
     VerificationFailed when it reads back neither. To swap two ids, give one of them a third one first.
     """
     checked_id(new)
-    if not (yield from Alone(single(node))):
-        yield from answers(node)  # which tells best that nobody is there
-    yield from _free(Node(new, node.dialect), node)
-    yield from write_node_id(node, new)
+    if not await Alone(single(node)):
+        await answers(node)  # which tells best that nobody is there
+    await _free(Node(new, node.dialect), node)
+    await write_node_id(node, new)
 
 
-def _free(new: Node, old: Node) -> Operation[None]:
+async def _free(new: Node, old: Node) -> None:
     """Raises RequestError when a servo answers as `new` already, unless that is the old id."""
     if new.node == old.node:
         return
-    look = yield from glance(new)
+    look = await glance(new)
     if look.there:
         raise RequestError(
             f"the id {hexadecimal(new.node)} is taken: a servo answers as it beside {hexadecimal(old.node)}",
@@ -105,12 +105,12 @@ def _free(new: Node, old: Node) -> Operation[None]:
         )
 
 
-def write_node_id(node: Node, new: int) -> Operation[None]:
+async def write_node_id(node: Node, new: int) -> None:
     """As `set_node_id`, for who has looked already whether the servo is alone with its id."""
     row = node.table["node_id"]
-    yield from Report(Readdressed(node.node, new))
-    yield from order(node, row, new, rank=Rank.CONFIGURATION)
-    found = yield from _if_told(node, row)
+    await Report(Readdressed(node.node, new))
+    await order(node, row, new, rank=Rank.CONFIGURATION)
+    found = await _if_told(node, row)
     if found not in (
         None,
         new,
@@ -126,16 +126,16 @@ def write_node_id(node: Node, new: int) -> Operation[None]:
         )
 
 
-def bit_rate(node: Node) -> Operation[int | None]:
+async def bit_rate(node: Node) -> int | None:
     """The rate (bit/s) it will have after a restart; None where that cannot be read: the manual has the write only.
 
     Raises NoReply when nobody is there.
     """
-    yield from decided(node)
+    await decided(node)
     try:
-        code = yield from upload_row(node, node.table["bit_rate_code"], int)
+        code = await upload_row(node, node.table["bit_rate_code"], int)
     except NoReply:
-        yield from answers(node)  # or is nobody there at all?
+        await answers(node)  # or is nobody there at all?
         return None
     except DeviceError as refusal:
         if meant(refusal.code) not in ABSENT:
@@ -144,12 +144,12 @@ def bit_rate(node: Node) -> Operation[int | None]:
     return BIT_RATES.get(code)
 
 
-def set_bit_rate(node: Node, rate: int) -> Operation[None]:
+async def set_bit_rate(node: Node, rate: int) -> None:
     """Give it another bit rate (bit/s); in force after save() and a restart, lost at a restart without.
 
     Raises RequestError for a rate it cannot have (nothing is sent).
     """
-    yield from order(node, node.table["bit_rate_code"], code_of(rate), rank=Rank.CONFIGURATION)
+    await order(node, node.table["bit_rate_code"], code_of(rate), rank=Rank.CONFIGURATION)
 
 
 def code_of(rate: int) -> int:
@@ -164,10 +164,10 @@ def code_of(rate: int) -> int:
     )
 
 
-def _if_told(node: Node, row: Entry) -> Operation[int | None]:
+async def _if_told(node: Node, row: Entry) -> int | None:
     """The raw value, or None when the servo refuses to tell."""
-    yield from decided(node)
-    found = yield from outcome(upload_row(node, row, int))
+    await decided(node)
+    found = await outcome(upload_row(node, row, int))
     if isinstance(found, DeviceError):
         return None
     if isinstance(found, MotorbusError):

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from motorbus.core.entry import Entry
-from motorbus.core.operation import Alone, Effect, Exchange, Operation, Pause, Rank, Timeout
+from motorbus.core.operation import Alone, Effect, Exchange, Pause, Rank, Timeout
 from motorbus.errors import NoReply, VerificationFailed, WireError, unread
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.exchanges import STORE, decided, listening, order, refused, upload_row
@@ -27,14 +27,14 @@ LISTEN: Final = 0.020
 """s after a save in which an acknowledgement or a refusal may come; the manual says that none does."""
 
 
-def save(node: Node) -> Operation[None]:
+async def save(node: Node) -> None:
     """Keep node id, bit rate, travel limits and function bits over power-off; never the goal position.
 
     No answer is expected; one that comes is taken, and a refusal raises DeviceError. The servo is left alone until its
     flash has been written. That it has saved shows only after a restart.
     """
-    yield from decided(node)
-    yield from save_exchange(node)
+    await decided(node)
+    await save_exchange(node)
 
 
 def save_exchange(node: Node) -> Exchange[None]:
@@ -59,7 +59,7 @@ def save_exchange(node: Node) -> Exchange[None]:
     return listening(node, frame, take, timeout=Timeout.STORE, effect=Effect.PERSISTENT)
 
 
-def keep(node: Node, orders: Sequence[tuple[Entry, int]]) -> Operation[None]:
+async def keep(node: Node, orders: Sequence[tuple[Entry, int]]) -> None:
     """Write these rows, read back, save, read back again; nobody else is on the bus meanwhile.
 
     They are read first. When all of them hold this already, nothing is written and nothing saved, for flash wears;
@@ -70,48 +70,48 @@ def keep(node: Node, orders: Sequence[tuple[Entry, int]]) -> Operation[None]:
     """
     node.limits = None
     try:
-        yield from Alone(_kept(node, orders))
+        await Alone(_kept(node, orders))
     finally:
         node.limits = None
 
 
-def _kept(node: Node, orders: Sequence[tuple[Entry, int]]) -> Operation[None]:
+async def _kept(node: Node, orders: Sequence[tuple[Entry, int]]) -> None:
     names = {row.name for row, _ in orders}
-    if names.isdisjoint(node.unsaved) and (yield from _alike(node, orders)):
+    if names.isdisjoint(node.unsaved) and await _alike(node, orders):
         return
     node.unsaved |= names
     for row, raw in orders:
-        yield from verified(node, row, raw)
-    yield from checked(node, orders)  # together, for one may have changed another
-    yield from save(node)
-    yield from settled(node)
-    yield from checked(node, orders)
+        await verified(node, row, raw)
+    await checked(node, orders)  # together, for one may have changed another
+    await save(node)
+    await settled(node)
+    await checked(node, orders)
     node.unsaved -= names
 
 
-def _alike(node: Node, orders: Sequence[tuple[Entry, int]]) -> Operation[bool]:
+async def _alike(node: Node, orders: Sequence[tuple[Entry, int]]) -> bool:
     """Whether all of these rows can be read, and hold this."""
     for row, raw in orders:
-        if not row.readable or (yield from upload_row(node, row, int)) != raw:
+        if not row.readable or await upload_row(node, row, int) != raw:
             return False
     return True
 
 
-def settled(node: Node) -> Operation[None]:
+async def settled(node: Node) -> None:
     """Wait on where this servo's make needs longer than the bus waits after a save anyway."""
     rest = node.profile.mid_point_wait - node.profile.flash_wait
     if rest > 0:
-        yield from Pause(rest)
+        await Pause(rest)
 
 
-def verified(node: Node, row: Entry, raw: int) -> Operation[None]:
+async def verified(node: Node, row: Entry, raw: int) -> None:
     """Write a row and read it back, three times at most; what cannot be read is written once."""
     for attempt in range(TRIES):
-        yield from order(node, row, raw, rank=Rank.CONFIGURATION)
+        await order(node, row, raw, rank=Rank.CONFIGURATION)
         if not row.readable:
             return
         try:
-            yield from checked(node, [(row, raw)])
+            await checked(node, [(row, raw)])
         except VerificationFailed:
             if attempt == TRIES - 1:
                 raise
@@ -119,12 +119,12 @@ def verified(node: Node, row: Entry, raw: int) -> Operation[None]:
             return
 
 
-def checked(node: Node, orders: Sequence[tuple[Entry, int]]) -> Operation[None]:
+async def checked(node: Node, orders: Sequence[tuple[Entry, int]]) -> None:
     """Read these rows back. Raises VerificationFailed when one differs, OutcomeUnknown when it cannot be read."""
     for row, raw in orders:
         if row.readable:
             try:
-                found = yield from upload_row(node, row, int)
+                found = await upload_row(node, row, int)
             except (NoReply, WireError) as error:
                 raise unread(error, node=node.node, what=f"the write of {row.name}") from error
             if found != raw:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import Final
 
-from motorbus.core.operation import Listen, Notice, Operation, Together, Tune
+from motorbus.core.operation import Listen, Notice, Together, Tune
 from motorbus.families.kst.driver.dialect import Dialect
 
 GLANCE: Final = 0.25
@@ -25,15 +25,15 @@ class Heard(Enum):
     SILENCE = "silence: nobody spoke, or this adapter reports no errors"
 
 
-def heard(dialect: Dialect, rate: int, seconds: float) -> Operation[Heard]:
+async def heard(dialect: Dialect, rate: int, seconds: float) -> Heard:
     """Listen at this rate without sending anything. Raises LinkError when the adapter cannot.
 
     The link stays at that rate, listening, for the caller to tune again whatever happens.
     """
-    yield from Tune(rate, listen_only=True)
+    await Tune(rate, listen_only=True)
     memory = dialect.memory
     before = (memory.frames, memory.errors) if memory else (0, 0)
-    whole, broken = yield from Together([iter(Listen(_is_frame, seconds)), iter(Listen(_is_error, seconds))])
+    whole, broken = await Together([Listen(_is_frame, seconds), Listen(_is_error, seconds)])
     after = (memory.frames, memory.errors) if memory else (0, 0)
     if whole is not None or after[0] > before[0]:
         return Heard.TRAFFIC

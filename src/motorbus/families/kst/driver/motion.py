@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 from motorbus.core.entry import Entry, changed
 from motorbus.core.goal import Goal, Stays, torque_on
 from motorbus.core.interrupted import Moving, stopped_if_interrupted
-from motorbus.core.operation import CanFrame, Effect, Exchange, Operation, Rank, Report
+from motorbus.core.operation import CanFrame, Effect, Exchange, Rank, Report
 from motorbus.errors import DeviceError, LimitExceeded, RequestError
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.arrival import Move, arrive
@@ -46,14 +46,14 @@ class Started(NamedTuple):
     frame: CanFrame
 
 
-def move(
+async def move(
     node: Node,
     to: float,
     *,
     wait: bool = True,
     tolerance: float = TOLERANCE,
     timeout: float | None = None,
-) -> Operation[None]:
+) -> None:
     """Move to `to` rad, at the servo's own speed; returns when it is in position, at once with `wait=False`.
 
     In position is: two looks in a row within `tolerance` rad. Raises LimitExceeded when `to` is not a finite number,
@@ -64,56 +64,55 @@ def move(
     """
     raw = counts(node, to)
     _checked_waiting(node, tolerance, timeout)
-    goal = yield from goal_of(node, raw)
+    goal = await goal_of(node, raw)
     if not wait:
         node.last_move = None
-        yield from send_goal(node, goal)
+        await send_goal(node, goal)
         return
     order = Move(goal.value, tolerance, timeout)
     device = Moving(node, partial(stop, node), partial(position, node))
-    yield from stopped_if_interrupted(_gone(node, goal, order), device)
+    await stopped_if_interrupted(_gone(node, goal, order), device)
 
 
-def _gone(node: Node, goal: Goal, order: Move) -> Operation[None]:
-    yield from send_goal(node, goal)
-    yield from arrive(node, order)
+async def _gone(node: Node, goal: Goal, order: Move) -> None:
+    await send_goal(node, goal)
+    await arrive(node, order)
 
 
-def goal_of(node: Node, raw: int) -> Operation[Goal]:
+async def goal_of(node: Node, raw: int) -> Goal:
     """What this raw target orders, with the limits for the gate: those of the servo, else those of the profile."""
-    known = yield from limits(node)
+    known = await limits(node)
     return Goal(node.node, "position", float(node.table["goal_position"].to_value(raw)), *known)
 
 
-def limits(node: Node) -> Operation[tuple[float, float]]:
+async def limits(node: Node) -> tuple[float, float]:
     """Lowest and highest position it goes to, rad: its travel limits inside the range of its profile; read once."""
     if node.limits is None:
-        node.limits = yield from _limits(node)
+        node.limits = await _limits(node)
     return node.limits
 
 
-def travel(node: Node) -> Operation[tuple[float, float]]:
+async def travel(node: Node) -> tuple[float, float]:
     """Lowest and highest position of its profile, rad; nothing is sent."""
-    yield from ()
     row = node.table["goal_position"]
     return float(row.to_value(row.low)), float(row.to_value(row.high))
 
 
-def send_goal(node: Node, goal: Goal) -> Operation[None]:
+async def send_goal(node: Node, goal: Goal) -> None:
     """Order a target, with the start first where the profile has that rule; it is sent each time, for a servo that
     lost its supply has forgotten it, and it costs a short frame."""
     row = node.table["goal_position"]
     if node.dialect.must_start:
-        yield from started(node, goal)
-    yield from order(node, row, node.raw(row, goal.value), (goal,))
+        await started(node, goal)
+    await order(node, row, node.raw(row, goal.value), (goal,))
 
 
-def started(node: Node, goal: Goal | None = None) -> Operation[None]:
+async def started(node: Node, goal: Goal | None = None) -> None:
     """Start this servo and say so; where that is for a goal, the start is refused if the goal would be."""
     exchange = start_exchange(node, True, goal)
     assert isinstance(exchange.request, CanFrame)
-    yield from exchange
-    yield from Report(Started(node.node, exchange.request))
+    await exchange
+    await Report(Started(node.node, exchange.request))
 
 
 def start_exchange(node: Node, on: bool, goal: Goal | None = None) -> Exchange[None]:
@@ -126,28 +125,28 @@ def start_exchange(node: Node, on: bool, goal: Goal | None = None) -> Exchange[N
     return Exchange(frame, (), lambda _: None, lane=node.node, rank=Rank.CONTROL, effect=effect, goals=goals)
 
 
-def stop(node: Node) -> Operation[Promise]:
+async def stop(node: Node) -> Promise:
     """Stay: the target becomes the position of this moment. Returns what was promised.
 
     The servo comes back to where it was when it was asked. Its torque stays on: these servos have no switch for it.
     """
-    yield from decided(node)
-    here = yield from upload_row(node, node.table["present_position"], int, tells_position=True)
+    await decided(node)
+    here = await upload_row(node, node.table["present_position"], int, tells_position=True)
     row = node.table["goal_position"]
     try:
-        yield from _hold(node, row, here)
+        await _hold(node, row, here)
     except DeviceError as refusal:
         if meant(refusal.code) not in TOO_FAR or abs(here) <= node.profile.limit:
             raise
-        yield from _hold(node, row, max(-node.profile.limit, min(here, node.profile.limit)))
+        await _hold(node, row, max(-node.profile.limit, min(here, node.profile.limit)))
     return Promise.HOLD_REQUESTED
 
 
-def _hold(node: Node, row: Entry, raw: int) -> Operation[None]:
+async def _hold(node: Node, row: Entry, raw: int) -> None:
     """Target := this place, also when it lies beyond the range, for there it stands; the goal brings its own limits."""
     value = float(row.to_value(raw))
     goal = Goal(node.node, "position", value, value, value, Stays.STILL)
-    yield from order(node, beyond(row), raw, (goal,))
+    await order(node, beyond(row), raw, (goal,))
 
 
 def beyond(row: Entry) -> Entry:
@@ -156,22 +155,22 @@ def beyond(row: Entry) -> Entry:
     return changed(row, low=-reach, high=reach - 1)
 
 
-def _limits(node: Node) -> Operation[tuple[float, float]]:
+async def _limits(node: Node) -> tuple[float, float]:
     """The servo's travel limits where it has and tells them, inside the range of its profile."""
     goal = node.table["goal_position"]
     low, high = goal.low, goal.high
-    yield from decided(node)
+    await decided(node)
     for name in ("negative_limit", "positive_limit"):
         if name in node.table:
-            raw = yield from _if_there(node, node.table[name])
+            raw = await _if_there(node, node.table[name])
             low, high = (max(low, raw), high) if name == "negative_limit" else (low, min(high, raw))
     return float(goal.to_value(low)), float(goal.to_value(high))
 
 
-def _if_there(node: Node, row: Entry) -> Operation[int]:
+async def _if_there(node: Node, row: Entry) -> int:
     """Its raw value; where the servo lacks it, the row's own outer bound."""
     try:
-        return (yield from upload_row(node, row, int))
+        return await upload_row(node, row, int)
     except DeviceError as refusal:
         if meant(refusal.code) not in ABSENT:
             raise

@@ -14,7 +14,6 @@ from motorbus.core.operation import (
     Exchange,
     Listen,
     Notice,
-    Operation,
     Rank,
     Timeout,
     Together,
@@ -71,20 +70,18 @@ def glance(node: Node, index: int = NODE_ID) -> Exchange[Presence]:
     return listening(node, frame, take, timeout=Timeout.REPLY, rank=Rank.POLL)
 
 
-def survey(node: Node) -> Operation[Presence]:
+async def survey(node: Node) -> Presence:
     """Ask several times and watch for bus errors meanwhile; nobody else must be addressed at the same time."""
-    asked, error = yield from Together[Presence | Notice | None](
-        [_asked(node), iter(Listen(_is_error, WATCH))]
-    )
+    asked, error = await Together[Presence | Notice | None]([_asked(node), Listen(_is_error, WATCH)])
     assert isinstance(asked, Presence)
     return asked._replace(errors=error is not None)
 
 
-def _asked(node: Node) -> Operation[Presence]:
+async def _asked(node: Node) -> Presence:
     most, reads_back = 0, None
     answered = dict.fromkeys(QUESTIONS, 0)
     for index in QUESTIONS * ROUNDS:
-        look = yield from glance(node, index)
+        look = await glance(node, index)
         most = max(most, look.most)
         answered[index] += look.there
         reads_back = look.reads_back or reads_back
@@ -92,21 +89,21 @@ def _asked(node: Node) -> Operation[Presence]:
     return Presence(look.at, most, reads_back, torn=torn)
 
 
-def settle_format(node: Node) -> Operation[None]:
+async def settle_format(node: Node) -> None:
     """Find out the id format where it may be either; where that is not to be had, 11 bits are used."""
     try:
-        yield from decided(node)
+        await decided(node)
     except (NoReply, WireError):
         return
 
 
-def glance_at(dialect: Dialect, rate: int) -> Operation[None]:
+async def glance_at(dialect: Dialect, rate: int) -> None:
     """Tune to a rate that the caller has named, after listening where the adapter can.
 
     Raises RequestError when errors show that the bus is in use at another rate.
     """
     try:
-        said = yield from heard(dialect, rate, GLANCE)
+        said = await heard(dialect, rate, GLANCE)
     except LinkLost:
         raise
     except LinkError:
@@ -117,13 +114,13 @@ def glance_at(dialect: Dialect, rate: int) -> Operation[None]:
             cause="other devices speak on this bus, and a frame at a wrong rate breaks theirs",
             advice="connect this servo alone, and call again; nothing was written",
         )
-    yield from Tune(rate)
+    await Tune(rate)
 
 
-def single(node: Node) -> Operation[bool]:
+async def single(node: Node) -> bool:
     """Is one servo there under this id? To be asked with the bus alone. Raises RequestError when there are two."""
-    yield from settle_format(node)
-    found = yield from survey(node)
+    await settle_format(node)
+    found = await survey(node)
     if found.several:
         raise _two(node, found)
     return found.there

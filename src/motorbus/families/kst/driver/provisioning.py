@@ -13,7 +13,6 @@ from typing import Final, NamedTuple
 
 from motorbus.core.operation import (
     Alone,
-    Operation,
     Pause,
     Progress,
     Rank,
@@ -77,9 +76,9 @@ class Place(NamedTuple):
     reads_back: int | None = None
 
 
-def provision(
+async def provision(
     node: Node, *, new_id: int | None = None, new_rate: int | None = None, patience: float = PATIENCE
-) -> Operation[Provisioned]:
+) -> Provisioned:
     """Give this servo another id, another bit rate (bit/s), or both, and see it come back with them.
 
     Checks that one servo alone answers and that the new id is free, writes, reads back, saves, reports
@@ -99,58 +98,58 @@ def provision(
     new = node if new_id is None else Node(checked_id(new_id), node.dialect)
     if new_rate is not None:
         code_of(new_rate)
-    rate = yield from Tune(0)
+    rate = await Tune(0)
     job = Job(node, new, rate, rate if new_rate is None else new_rate)
-    place = yield from Alone(afterwards(_changed(job), lambda: iter(Tune(rate))))
+    place = await Alone(afterwards(_changed(job), lambda: Tune(rate)))
     if place is not None:
-        yield from Report(PowerCycleNeeded(node.node, new.node, job.new_rate))
-        yield from _waited(job, place, patience)
-    yield from Report(Progress(STEPS - 1, STEPS, "it is back: verifying"))
-    return (yield from Alone(afterwards(_verified(job, place), lambda: iter(Tune(rate)))))
+        await Report(PowerCycleNeeded(node.node, new.node, job.new_rate))
+        await _waited(job, place, patience)
+    await Report(Progress(STEPS - 1, STEPS, "it is back: verifying"))
+    return await Alone(afterwards(_verified(job, place), lambda: Tune(rate)))
 
 
-def set_id(node: Node, new: int, *, patience: float = PATIENCE) -> Operation[Provisioned]:
+async def set_id(node: Node, new: int, *, patience: float = PATIENCE) -> Provisioned:
     """Give this servo the id `new`; as `provision`, which see. It is in force after the power cycle this waits for."""
-    return (yield from provision(node, new_id=new, patience=patience))
+    return await provision(node, new_id=new, patience=patience)
 
 
-def set_baud(node: Node, rate: int, *, patience: float = PATIENCE) -> Operation[Provisioned]:
+async def set_baud(node: Node, rate: int, *, patience: float = PATIENCE) -> Provisioned:
     """Let this servo speak at `rate` bit/s; as `provision`, which see. The bus keeps its own rate."""
-    return (yield from provision(node, new_rate=rate, patience=patience))
+    return await provision(node, new_rate=rate, patience=patience)
 
 
 # --- find out where things stand, and write what is missing -------------------------------------------------
 
 
-def _changed(job: Job) -> Operation[Place | None]:
+async def _changed(job: Job) -> Place | None:
     """Write and save; returns where it was found. None when it has everything already, and nothing was written."""
-    yield from Report(Progress(0, STEPS, "looking who is there"))
-    where = yield from _found(job)
-    before = yield from glance(where.node)
+    await Report(Progress(0, STEPS, "looking who is there"))
+    where = await _found(job)
+    before = await glance(where.node)
     if (where.node.node, where.rate) == (job.new.node, job.new_rate):
         return None
     if where.rate != job.new_rate:
-        yield from _alone_here(job, where)
+        await _alone_here(job, where)
     dialect = job.new.dialect
     dialect.learn_format(job.new.node, dialect.extended(where.node.node))  # it is the same servo
-    yield from Report(Progress(1, STEPS, f"writing to {hexadecimal(where.node.node)}"))
+    await Report(Progress(1, STEPS, f"writing to {hexadecimal(where.node.node)}"))
     if where.node.node != job.new.node or before.reads_back not in (None, job.new.node):
-        yield from write_node_id(where.node, job.new.node)
+        await write_node_id(where.node, job.new.node)
     if where.rate != job.new_rate:
         row = where.node.table["bit_rate_code"]
-        yield from order(where.node, row, code_of(job.new_rate), rank=Rank.CONFIGURATION)
-    seen = yield from glance(where.node)
-    yield from Report(Progress(2, STEPS, "saving"))
-    yield from save(where.node)
+        await order(where.node, row, code_of(job.new_rate), rank=Rank.CONFIGURATION)
+    seen = await glance(where.node)
+    await Report(Progress(2, STEPS, "saving"))
+    await save(where.node)
     return where._replace(reads_back=seen.reads_back)
 
 
-def _found(job: Job) -> Operation[Place]:
+async def _found(job: Job) -> Place:
     """Under which of both ids, and at which of both rates, does it answer now?"""
     for rate in dict.fromkeys((job.rate, job.new_rate)):
         if rate != job.rate:
-            yield from glance_at(job.old.dialect, rate)
-        there = yield from _at_this_rate(job, rate)
+            await glance_at(job.old.dialect, rate)
+        there = await _at_this_rate(job, rate)
         if there is not None:
             return there
     raise NoReply(
@@ -162,11 +161,11 @@ def _found(job: Job) -> Operation[Place]:
     )
 
 
-def _at_this_rate(job: Job, rate: int) -> Operation[Place | None]:
-    old = yield from single(job.old)
+async def _at_this_rate(job: Job, rate: int) -> Place | None:
+    old = await single(job.old)
     if job.new.node == job.old.node:
         return Place(job.old, rate) if old else None
-    new = yield from single(job.new)
+    new = await single(job.new)
     if old and new:
         raise RequestError(
             f"the id {hexadecimal(job.new.node)} is taken: a servo answers as it beside {hexadecimal(job.old.node)}",
@@ -178,11 +177,11 @@ def _at_this_rate(job: Job, rate: int) -> Operation[Place | None]:
     return Place(job.old, rate) if old else None
 
 
-def _alone_here(job: Job, where: Place) -> Operation[None]:
+async def _alone_here(job: Job, where: Place) -> None:
     """A servo that comes back at another rate breaks the frames of those that stay at this one."""
     there: set[int] = set()
     for extended in sorted(job.old.dialect.formats):
-        there |= {reply.lane for reply in (yield from called(extended, Rank.POLL)).replies}
+        there |= {reply.lane for reply in (await called(extended, Rank.POLL)).replies}
     others = ", ".join(map(hexadecimal, sorted(there - {job.old.node, job.new.node})))
     if others:
         raise RequestError(
@@ -203,46 +202,46 @@ def _ids(job: Job) -> str:
 # --- wait for the power cycle, and prove it -----------------------------------------------------------------
 
 
-def _waited(job: Job, place: Place, patience: float) -> Operation[None]:
+async def _waited(job: Job, place: Place, patience: float) -> None:
     """Look at the old place and the new one in turn until it shows up at the new one."""
     begun: float | None = None
     silent = 0
     while True:
-        now = yield from _seen(job, place.node, place.rate)
+        now = await _seen(job, place.node, place.rate)
         begun = now.at if begun is None else begun
         came_back = silent >= GONE and now.there and not _pending(job, place, now)
         silent = 0 if now.there else silent + 1
-        arrived = yield from _arrived(job, place, now)
+        arrived = await _arrived(job, place, now)
         if arrived and not now.there:
             return
         if now.there and (came_back or _forgot(job, place, now)):
             raise _both(job, place) if arrived else _as_it_was(job, place)
         if now.at - begun > patience:
             raise _never_came(job, patience)
-        yield from Pause(POLL)
+        await Pause(POLL)
 
 
-def _arrived(job: Job, place: Place, now: Presence) -> Operation[bool]:
+async def _arrived(job: Job, place: Place, now: Presence) -> bool:
     """Does it answer as it should by now? At another rate it is looked for only when it is silent at the old one, and
     only while nobody else is heard there."""
     if now.there and place.rate != job.new_rate:
         return False
     try:
-        return (yield from _seen(job, job.new, job.new_rate)).there
+        return (await _seen(job, job.new, job.new_rate)).there
     except RequestError:
         return False
 
 
-def _seen(job: Job, node: Node, rate: int) -> Operation[Presence]:
+async def _seen(job: Job, node: Node, rate: int) -> Presence:
     """One look at this id and rate; at another rate than the bus has, with the bus alone and its rate set again."""
     if rate == job.rate:
-        return (yield from glance(node))
-    return (yield from Alone(afterwards(_tuned(node, rate), lambda: iter(Tune(job.rate)))))
+        return await glance(node)
+    return await Alone(afterwards(_tuned(node, rate), lambda: Tune(job.rate)))
 
 
-def _tuned(node: Node, rate: int) -> Operation[Presence]:
-    yield from glance_at(node.dialect, rate)
-    return (yield from glance(node))
+async def _tuned(node: Node, rate: int) -> Presence:
+    await glance_at(node.dialect, rate)
+    return await glance(node)
 
 
 def _pending(job: Job, place: Place, now: Presence) -> bool:
@@ -255,14 +254,14 @@ def _forgot(job: Job, place: Place, now: Presence) -> bool:
     return place.reads_back == job.new.node != place.node.node and now.reads_back == place.node.node
 
 
-def _verified(job: Job, place: Place | None) -> Operation[Provisioned]:
+async def _verified(job: Job, place: Place | None) -> Provisioned:
     if job.moves_rate:
-        yield from Tune(job.new_rate)
-    if place is not None and (yield from _still_there(job, place)):
+        await Tune(job.new_rate)
+    if place is not None and await _still_there(job, place):
         raise _both(job, place)
-    if (yield from survey(job.new)).several:
+    if (await survey(job.new)).several:
         raise _shared(job)
-    identity = yield from identify(job.new)
+    identity = await identify(job.new)
     found = identity.details["reads_back_id"]
     if found not in (None, job.new.node):
         raise VerificationFailed(
@@ -272,15 +271,15 @@ def _verified(job: Job, place: Place | None) -> Operation[Provisioned]:
             advice=f"set_node_id({job.new.node}) and save() put that right; then power-cycle it, and call this again",
             node=job.new.node,
         )
-    yield from Report(Progress(STEPS, STEPS, "verified after the restart"))
+    await Report(Progress(STEPS, STEPS, "verified after the restart"))
     return Provisioned(job.new.node, job.new_rate, identity.firmware, resumed=place is None)
 
 
-def _still_there(job: Job, place: Place) -> Operation[bool]:
+async def _still_there(job: Job, place: Place) -> bool:
     """Does somebody answer under the id that it is to have no more? A single look before may have been lost."""
     if place.rate != job.new_rate or place.node.node == job.new.node:
         return False
-    return (yield from glance(place.node)).there
+    return (await glance(place.node)).there
 
 
 def _both(job: Job, place: Place) -> OutcomeUnknown:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from motorbus.core.family import Found
-from motorbus.core.operation import Alone, Operation, Progress, Report, Tune, afterwards
+from motorbus.core.operation import Alone, Progress, Report, Tune, afterwards
 from motorbus.errors import LinkError, LinkLost, RequestError
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.dialect import PLAIN, Dialect
@@ -36,13 +36,13 @@ class BitRates(NamedTuple):
     found: tuple[Found, ...] = ()
 
 
-def scan_bit_rates(
+async def scan_bit_rates(
     dialect: Dialect = PLAIN,
     *,
     rates: Sequence[int] = RATES,
     isolated: bool = False,
     seconds: float = LISTEN,
-) -> Operation[BitRates]:
+) -> BitRates:
     """Find the bit rate of a bus: `seconds` of listening at each rate, then, only with `isolated`, asking.
 
     A frame that comes whole proves a rate, and the search ends. Errors rule one out. Where all are silent nothing is
@@ -53,45 +53,45 @@ def scan_bit_rates(
     for rate in rates:
         code_of(rate)
     above_zero("seconds", seconds, "s")
-    present = yield from Tune(0)
+    present = await Tune(0)
     search = _searched(dialect, tuple(rates), isolated, seconds)
-    return (yield from Alone(afterwards(search, lambda: iter(Tune(present)))))
+    return await Alone(afterwards(search, lambda: Tune(present)))
 
 
-def _searched(dialect: Dialect, rates: Sequence[int], isolated: bool, seconds: float) -> Operation[BitRates]:
+async def _searched(dialect: Dialect, rates: Sequence[int], isolated: bool, seconds: float) -> BitRates:
     verdicts: dict[int, Heard] = {}
     unable: LinkError | None = None
     for number, rate in enumerate(rates):
         try:
-            verdicts[rate] = yield from heard(dialect, rate, seconds)
+            verdicts[rate] = await heard(dialect, rate, seconds)
         except LinkLost:
             raise
         except (
             LinkError
         ) as error:  # it cannot listen, or does not have this rate, as slcan does not have 800k
             unable = error
-            yield from Report(Skipped(rate, error.summary))
+            await Report(Skipped(rate, error.summary))
             continue
         if verdicts[rate] is Heard.TRAFFIC:
             return BitRates(rate, verdicts)
-        yield from Report(Progress(number + 1, len(rates), f"{rate} bit/s: {verdicts[rate].value}"))
+        await Report(Progress(number + 1, len(rates), f"{rate} bit/s: {verdicts[rate].value}"))
     if unable is not None and not verdicts:
         if not isolated:
             raise _cannot_listen(unable) from unable
         verdicts = dict.fromkeys(rates, Heard.SILENCE)
-    return (yield from _asked(dialect, verdicts)) if isolated else BitRates(None, verdicts)
+    return await _asked(dialect, verdicts) if isolated else BitRates(None, verdicts)
 
 
-def _asked(dialect: Dialect, verdicts: dict[int, Heard]) -> Operation[BitRates]:
+async def _asked(dialect: Dialect, verdicts: dict[int, Heard]) -> BitRates:
     """The first rate at which somebody answers, of those at which no errors were heard."""
     for rate in [rate for rate, verdict in verdicts.items() if verdict is Heard.SILENCE]:
         try:
-            yield from Tune(rate)
+            await Tune(rate)
         except LinkLost:
             raise
         except LinkError:  # an adapter need not have every rate
             continue
-        found = yield from at_one_rate(dialect, wire.NODES, rate, broadcast=True, careful=True)
+        found = await at_one_rate(dialect, wire.NODES, rate, broadcast=True, careful=True)
         if found:
             return BitRates(rate, verdicts, tuple(found))
     return BitRates(None, verdicts)

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from motorbus.core.entry import Entry, Storage, Value
-from motorbus.core.operation import Effect, Operation
+from motorbus.core.operation import Effect
 from motorbus.errors import DeviceError, RequestError
 from motorbus.families.kst.driver.exchanges import ABSENT, OtherSize, meant, order, ready, upload_row
 from motorbus.families.kst.driver.keeping import keep
@@ -27,17 +27,17 @@ VERBS: Final[Mapping[str, str]] = {
 """What writes a protected row."""
 
 
-def read(node: Node, /, *names: str) -> Operation[dict[str, Value]]:
+async def read(node: Node, /, *names: str) -> dict[str, Value]:
     """Objects in API units by name; all that this servo tells when none is named.
 
     Raises RequestError for an unknown name or one that can only be written (nothing is sent then), DeviceError for a
     named object that the servo refuses; unnamed ones that it lacks are left out.
     """
-    raws = yield from read_raw(node, *names)
+    raws = await read_raw(node, *names)
     return {name: node.value(node.table[name], raw) for name, raw in raws.items()}
 
 
-def read_raw(node: Node, /, *names: str) -> Operation[dict[str, int]]:
+async def read_raw(node: Node, /, *names: str) -> dict[str, int]:
     """Objects as raw values by name; all that this servo tells when none is named. Raises as `read`."""
     rows = [_readable(node.table[name]) for name in names] or [
         row for row in node.table.values() if row.readable
@@ -45,16 +45,16 @@ def read_raw(node: Node, /, *names: str) -> Operation[dict[str, int]]:
     found: dict[str, int] = {}
     for row in rows:
         try:
-            found[row.name] = yield from raw_of(node, row)
+            found[row.name] = await raw_of(node, row)
         except (DeviceError, OtherSize) as error:
             if names or (isinstance(error, DeviceError) and meant(error.code) not in ABSENT):
                 raise
     return found
 
 
-def raw_of(node: Node, row: Entry) -> Operation[int]:
+async def raw_of(node: Node, row: Entry) -> int:
     """The raw value of one object."""
-    return (yield from ready(node, lambda same: upload_row(same, row, int, tells_position=_tells(row))))
+    return await ready(node, lambda same: upload_row(same, row, int, tells_position=_tells(row)))
 
 
 def _tells(row: Entry) -> bool:
@@ -67,7 +67,7 @@ def _readable(row: Entry) -> Entry:
     raise RequestError(f"{row.name} can only be written", advice="nothing was sent")
 
 
-def write(node: Node, /, **values: Value) -> Operation[None]:
+async def write(node: Node, /, **values: Value) -> None:
     """Write objects by name, in API units; all are checked before the first is sent.
 
     What survives power-off is read back, saved and read back again. Raises RequestError for what cannot or must not be
@@ -76,12 +76,12 @@ def write(node: Node, /, **values: Value) -> Operation[None]:
     orders = [(row, _checked(node, row, values[row.name])) for row in map(node.table.__getitem__, values)]
     kept = [(row, raw) for row, raw in orders if row.storage is Storage.EEPROM]
     if kept:
-        yield from keep(node, kept)
+        await keep(node, kept)
     for row, raw in orders:
         if row.effect is Effect.MOTION:
-            yield from send_goal(node, (yield from goal_of(node, raw)))
+            await send_goal(node, await goal_of(node, raw))
         elif row.storage is not Storage.EEPROM:
-            yield from order(node, row, raw)
+            await order(node, row, raw)
 
 
 def _checked(node: Node, row: Entry, value: Value) -> int:

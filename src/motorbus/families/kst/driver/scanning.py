@@ -19,7 +19,6 @@ from motorbus.core.operation import (
     Alone,
     Answer,
     Exchange,
-    Operation,
     Progress,
     Rank,
     Report,
@@ -66,9 +65,7 @@ class Skipped(NamedTuple):
     why: str
 
 
-def scan(
-    ids: Sequence[int] = (), rates: Sequence[int] = (), dialect: Dialect = PLAIN
-) -> Operation[list[Found]]:
+async def scan(ids: Sequence[int] = (), rates: Sequence[int] = (), dialect: Dialect = PLAIN) -> list[Found]:
     """Every servo that answers, with what it is; `ids` () means all, by a broadcast first; `rates` () the present one.
 
     Who names other rates says that the bus may be spoken to at them. Even so each is listened to first, where the
@@ -78,47 +75,47 @@ def scan(
     `Suspicion`. Writes nothing.
     """
     asked = checked_ids(ids or wire.NODES)
-    present = yield from Tune(0)
+    present = await Tune(0)
     if not rates or tuple(rates) == (present,):
-        return (yield from at_one_rate(dialect, asked, present, broadcast=not ids))
+        return await at_one_rate(dialect, asked, present, broadcast=not ids)
     everywhere = _at_all_rates(dialect, asked, tuple(rates), present, broadcast=not ids)
-    return (yield from Alone(afterwards(everywhere, lambda: iter(Tune(present)))))
+    return await Alone(afterwards(everywhere, lambda: Tune(present)))
 
 
-def _at_all_rates(
+async def _at_all_rates(
     dialect: Dialect, asked: Sequence[int], rates: Sequence[int], present: int, *, broadcast: bool
-) -> Operation[list[Found]]:
+) -> list[Found]:
     found: list[Found] = []
     for index, rate in enumerate(rates):
-        if rate != present and (yield from _in_use(dialect, rate)):
-            yield from Report(Skipped(rate, Heard.ERRORS.value))
+        if rate != present and await _in_use(dialect, rate):
+            await Report(Skipped(rate, Heard.ERRORS.value))
             continue
         try:
-            yield from Tune(rate)
+            await Tune(rate)
         except LinkLost:
             raise
         except LinkError as unable:  # an adapter need not have every rate
-            yield from Report(Skipped(rate, unable.summary))
+            await Report(Skipped(rate, unable.summary))
             continue
         careful = rate != present
         part = (index, len(rates))
-        found += yield from at_one_rate(
+        found += await at_one_rate(
             dialect, asked, rate, broadcast=broadcast or careful, careful=careful, part=part
         )
     return found
 
 
-def _in_use(dialect: Dialect, rate: int) -> Operation[bool]:
+async def _in_use(dialect: Dialect, rate: int) -> bool:
     """Do errors show that the bus is in use at another rate? Nobody knows, with an adapter that cannot just listen."""
     try:
-        return (yield from heard(dialect, rate, GLANCE)) is Heard.ERRORS
+        return await heard(dialect, rate, GLANCE) is Heard.ERRORS
     except LinkLost:
         raise
     except LinkError:
         return False
 
 
-def at_one_rate(
+async def at_one_rate(
     dialect: Dialect,
     asked: Sequence[int],
     rate: int,
@@ -126,36 +123,34 @@ def at_one_rate(
     broadcast: bool,
     careful: bool = False,
     part: tuple[int, int] = (0, 1),
-) -> Operation[list[Found]]:
+) -> list[Found]:
     """Who of these answers at the present rate, which is `rate`; the first of `part` is the share of the whole.
 
     With `careful` the broadcast, one frame, is the last when nobody answers it and bus errors come instead.
     """
     errors = dialect.memory.errors if dialect.memory else 0
-    there = (yield from _called(dialect, asked, rate)) if broadcast else []
+    there = await _called(dialect, asked, rate) if broadcast else []
     if careful and not there and dialect.memory and dialect.memory.errors > errors:
-        yield from Report(Suspicion(0, rate, BROKEN))
+        await Report(Suspicion(0, rate, BROKEN))
         return []
     total = PASSES * part[1] * len(asked)
     for number in range(PASSES):
         done = (PASSES * part[0] + number) * len(asked)
         for batch in _batches([node for node in asked if node not in there]):
             looks = [_looked(Node(node, dialect), rate) for node in batch]
-            there += [node for node in (yield from Together(looks)) if node is not None]
+            there += [node for node in await Together(looks) if node is not None]
             done += len(batch)
-            yield from Report(Progress(done, total, f"ids up to {batch[-1]} at {rate} bit/s"))
+            await Report(Progress(done, total, f"ids up to {batch[-1]} at {rate} bit/s"))
     if dialect.memory and dialect.memory.errors > errors:
-        yield from Report(Suspicion(0, rate, _errors(dialect.memory.errors - errors)))
+        await Report(Suspicion(0, rate, _errors(dialect.memory.errors - errors)))
     if not there and not careful:
-        return (yield from _strangers(dialect, asked, rate, broadcast=broadcast))
+        return await _strangers(dialect, asked, rate, broadcast=broadcast)
     if not broadcast:
-        yield from _counted(dialect, sorted(there), rate)
-    return (yield from _identified(dialect, sorted(there), rate))
+        await _counted(dialect, sorted(there), rate)
+    return await _identified(dialect, sorted(there), rate)
 
 
-def _strangers(
-    dialect: Dialect, asked: Sequence[int], rate: int, *, broadcast: bool
-) -> Operation[list[Found]]:
+async def _strangers(dialect: Dialect, asked: Sequence[int], rate: int, *, broadcast: bool) -> list[Found]:
     """Who of these answers in the id format that is not spoken here. Told, and not asked more: that takes a new bus."""
     if dialect.memory is None or len(dialect.formats) > 1:
         return []
@@ -163,19 +158,19 @@ def _strangers(
     heard_of = dialect.memory.strangers
     heard_of.clear()
     if broadcast:
-        yield from called(extended)
+        await called(extended)
     for batch in _batches([] if heard_of else asked):
-        yield from Together([outcome(_in_vain(Node(node, dialect), extended)) for node in batch])
+        await Together([outcome(_in_vain(Node(node, dialect), extended)) for node in batch])
     found = [Found(node, rate, None) for node in asked if node in heard_of]
     for one in found:
-        yield from Report(one)
-        yield from Report(Suspicion(one.node, rate, OTHER_FORMAT[extended]))
+        await Report(one)
+        await Report(Suspicion(one.node, rate, OTHER_FORMAT[extended]))
     return found
 
 
-def _in_vain(node: Node, extended: bool) -> Operation[object]:
+async def _in_vain(node: Node, extended: bool) -> object:
     """Its answer does not count as one here, and is noted on its way."""
-    return (yield from _present(node, extended))
+    return await _present(node, extended)
 
 
 def _errors(count: int) -> str:
@@ -189,44 +184,44 @@ def _batches(nodes: Sequence[int]) -> Iterator[Sequence[int]]:
     return (nodes[start : start + WINDOW] for start in range(0, len(nodes), WINDOW))
 
 
-def _counted(dialect: Dialect, nodes: Sequence[int], rate: int) -> Operation[None]:
+async def _counted(dialect: Dialect, nodes: Sequence[int], rate: int) -> None:
     """Ask each once more, and wait whether a second answer comes; a broadcast has shown that already."""
     for batch in _batches(nodes):
-        looks = yield from Together([glance(Node(node, dialect)) for node in batch])
+        looks = await Together([glance(Node(node, dialect)) for node in batch])
         for node, look in zip(batch, looks, strict=True):
             if look.several:
-                yield from Report(Suspicion(node, rate, TWICE))
+                await Report(Suspicion(node, rate, TWICE))
 
 
-def _identified(dialect: Dialect, nodes: Sequence[int], rate: int) -> Operation[list[Found]]:
+async def _identified(dialect: Dialect, nodes: Sequence[int], rate: int) -> list[Found]:
     found: list[Found] = []
     for batch in _batches(nodes):
-        told = yield from Together([outcome(identify(Node(node, dialect))) for node in batch])
-        places = yield from Together([outcome(position(Node(node, dialect))) for node in batch])
+        told = await Together([outcome(identify(Node(node, dialect))) for node in batch])
+        places = await Together([outcome(position(Node(node, dialect))) for node in batch])
         for node, one, place in zip(batch, told, places, strict=True):
             found.append(Found(node, rate, one if isinstance(one, Identity) else None))
             if isinstance(one, Identity) and isinstance(place, NoReply):
-                yield from Report(Suspicion(node, rate, TORN))
+                await Report(Suspicion(node, rate, TORN))
     return found
 
 
 # --- everyone at once ---------------------------------------------------------------------------------------
 
 
-def _called(dialect: Dialect, asked: Sequence[int], rate: int) -> Operation[list[int]]:
+async def _called(dialect: Dialect, asked: Sequence[int], rate: int) -> list[int]:
     """Who of these answers a read of the node id by everyone, in each id format that is expected."""
     there: list[int] = []
     for extended in sorted(dialect.formats):
-        answer = yield from called(extended)
+        answer = await called(extended)
         for node in dict.fromkeys(reply.lane for reply in answer.replies if reply.lane in asked):
             replies = [wire.decode_reply(reply.data) for reply in answer.replies if reply.lane == node]
             if node not in there:
                 there.append(node)
                 dialect.learn_format(node, extended)
-                yield from Report(Found(node, rate, None))
+                await Report(Found(node, rate, None))
             if len(replies) > 1:
-                yield from Report(Suspicion(node, rate, TWICE))
-            yield from _compared(node, rate, replies[0])
+                await Report(Suspicion(node, rate, TWICE))
+            await _compared(node, rate, replies[0])
     return there
 
 
@@ -254,30 +249,30 @@ TWICE: Final = (
 TORN: Final = "its id comes, its position never: two servos with one id, whose answers break each other"
 
 
-def _compared(node: int, rate: int, reply: SdoReply | None) -> Operation[None]:
+async def _compared(node: int, rate: int, reply: SdoReply | None) -> None:
     """Tell when the id that was read is not the one that answered."""
     if reply is not None and reply.kind == "upload" and reply.data[:1] != bytes((node,)):
         what = f"answers as {node} and reads back the id {reply.data[0]}: written, and not in force before a restart"
-        yield from Report(Suspicion(node, rate, what))
+        await Report(Suspicion(node, rate, what))
 
 
 # --- one by one ---------------------------------------------------------------------------------------------
 
 
-def _looked(node: Node, rate: int) -> Operation[int | None]:
+async def _looked(node: Node, rate: int) -> int | None:
     """Its id when it answers. What answers wrongly, or twice, is there as well."""
     formats = (False, True) if node.dialect.undecided(node.node) else (node.dialect.extended(node.node),)
     for extended in formats:
         try:
-            reply = yield from _present(node, extended)
+            reply = await _present(node, extended)
         except NoReply:
             continue
         except WireError as error:
-            yield from Report(Suspicion(node.node, rate, f"{TWICE} ({error.summary})"))
+            await Report(Suspicion(node.node, rate, f"{TWICE} ({error.summary})"))
             reply = None
         node.dialect.learn_format(node.node, extended)
-        yield from Report(Found(node.node, rate, None))
-        yield from _compared(node.node, rate, reply)
+        await Report(Found(node.node, rate, None))
+        await _compared(node.node, rate, reply)
         return node.node
     return None
 

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from motorbus.core.entry import is_number, shown
 from motorbus.core.family import Positions
-from motorbus.core.operation import Exchange, Goal, Operation, Refusal, Stops, Together
+from motorbus.core.operation import Exchange, Goal, Refusal, Stops, Together
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.kst.driver.exchanges import answers, decided, download
 from motorbus.families.kst.driver.feedback import position_exchange
@@ -22,7 +22,7 @@ from motorbus.families.kst.driver.motion import counts, limits, started, stop
 from motorbus.families.kst.driver.node import Node
 
 
-def train(servos: Sequence[Node], *, rate: int) -> Operation[Train]:
+async def train(servos: Sequence[Node], *, rate: int) -> Train:
     """These servos, ready to be asked and told in a loop; id format and limits are read, and nothing is written.
 
     `rate` (bit/s) is that of the bus; it changes nothing here. Raises RequestError when one is named twice or there is
@@ -33,16 +33,16 @@ def train(servos: Sequence[Node], *, rate: int) -> Operation[Train]:
             "an id is named twice" if servos else "no servo is named",
             advice="name each servo once; nothing was sent",
         )
-    found = yield from Together([_known(node) for node in servos])
+    found = await Together([_known(node) for node in servos])
     return Train(dict(zip(servos, found, strict=True)))
 
 
-def _known(node: Node) -> Operation[tuple[float, float]]:
+async def _known(node: Node) -> tuple[float, float]:
     """Its limits; one that was never heard and has none to tell is asked all the same, whether it is there."""
-    yield from decided(node)
-    known = yield from limits(node)
+    await decided(node)
+    known = await limits(node)
     if node.at == -inf:
-        yield from answers(node)
+        await answers(node)
     return known
 
 
@@ -62,7 +62,7 @@ class Train:
         """
         return [self._lead(id).goal(value) for id, value in to.items()]
 
-    def begin(self, speeds: Mapping[int, float]) -> Operation[None]:
+    async def begin(self, speeds: Mapping[int, float]) -> None:
         """Target := where it stands, of each, at the same time; with the start first where the profile has that rule.
 
         So it is known in which form each takes a target, before the first goal. No speed can be told; `speeds` are only
@@ -70,7 +70,7 @@ class Train:
         """
         for id, speed in speeds.items():
             _check_speed(self._lead(id).node, speed)
-        yield from Together([_begin(lead.node) for lead in self._leads.values()])
+        await Together([_begin(lead.node) for lead in self._leads.values()])
 
     def _lead(self, id: int) -> _Lead:
         try:
@@ -126,10 +126,10 @@ def _position(node: Node) -> Exchange[Positions]:
     return one.reading(lambda answer: Positions({node.node: read(answer)}, (), answer.at))
 
 
-def _begin(node: Node) -> Operation[Any]:
+async def _begin(node: Node) -> Any:
     if node.dialect.must_start:
-        yield from started(node)
-    yield from stop(node)
+        await started(node)
+    await stop(node)
 
 
 def _check_speed(node: Node, speed: float) -> None:

@@ -165,7 +165,7 @@ def _whole(values: Mapping[str, object]) -> dict[str, int]:
     return found
 
 
-def borrowed(
+async def borrowed(
     node: Node,
     verb: str,
     wanted: Callable[[Project], Operation[Project]],
@@ -173,7 +173,7 @@ def borrowed(
     *,
     leave: bool = False,
     accord: Accord | None = None,
-) -> Operation[T]:
+) -> T:
     """Make a motion with project 1 as `wanted` makes it of what it is, then stop, then give it back, come what may.
 
     Where it is so already nothing is edited. With `leave` it is not stopped once its order was acknowledged, and it
@@ -186,28 +186,28 @@ def borrowed(
     after the stop, or when the stop is not accepted: the motor may be turning then, and a note says that project 1 is
     still borrowed.
     """
-    return (yield from Alone(_borrowing(node, verb, wanted, motion, leave, accord)))
+    return await Alone(_borrowing(node, verb, wanted, motion, leave, accord))
 
 
-def _borrowing(
+async def _borrowing(
     node: Node,
     verb: str,
     wanted: Callable[[Project], Operation[Project]],
     motion: Callable[[Project], Operation[T]],
     leave: bool,
     accord: Accord | None,
-) -> Operation[T]:
-    yield from refuse_unless_idle(node, f"{verb}()")
-    yield from Report(Journal(verb, ASKED, {"node": node.node}))
-    image = yield from reading.image(node, PROJECT)
-    loan = Loan(verb, image, node.order, (yield from wanted(decode_image(image, node.order))))
+) -> T:
+    await refuse_unless_idle(node, f"{verb}()")
+    await Report(Journal(verb, ASKED, {"node": node.node}))
+    image = await reading.image(node, PROJECT)
+    loan = Loan(verb, image, node.order, await wanted(decode_image(image, node.order)))
     if loan.needed:
         _refuse(node, loan, leave)
     if accord is not None:
-        loan = Loan(verb, image, node.order, (yield from accord.settled(loan.wanted)))
+        loan = Loan(verb, image, node.order, await accord.settled(loan.wanted))
         _refuse(node, loan, leave)
     try:
-        value = yield from afterwards(_lent(node, loan, motion, leave, accord), lambda: _ended(node, loan))
+        value = await afterwards(_lent(node, loan, motion, leave, accord), lambda: _ended(node, loan))
     except BaseException as error:
         _annotate(error, loan)
         raise
@@ -226,57 +226,57 @@ def _annotate(error: BaseException, loan: Loan) -> None:
         error.add_note(NOTE)
 
 
-def _lent(
+async def _lent(
     node: Node,
     loan: Loan,
     motion: Callable[[Project], Operation[T]],
     leave: bool,
     accord: Accord | None,
-) -> Operation[T]:
+) -> T:
     if loan.needed:
-        yield from _recorded(node, loan)
-        found = yield from brought(node, loan.image, loan.wanted)
+        await _recorded(node, loan)
+        found = await brought(node, loan.image, loan.wanted)
         loan.seen = found.view == "working"
         if not loan.seen:
             raise _unseen(node)
-        yield from Report(Journal(loan.verb, BORROWED, loan.name(node)))
+        await Report(Journal(loan.verb, BORROWED, loan.name(node)))
     if accord is not None:
-        yield from accord.ready(loan.wanted)
+        await accord.ready(loan.wanted)
     loan.restless = loan.cut = True
     node.memory.turning = inf  # until a stop is accepted
-    value = yield from motion(loan.wanted)
+    value = await motion(loan.wanted)
     loan.restless, loan.cut = not leave, False
     return value
 
 
-def _recorded(node: Node, loan: Loan) -> Operation[None]:
+async def _recorded(node: Node, loan: Loan) -> None:
     """Record the intent. What cannot be recorded does not begin, and nothing need be given back."""
     loan.open = True
     try:
-        yield from Report(Journal(loan.verb, INTENT, loan.facts(node)))
+        await Report(Journal(loan.verb, INTENT, loan.facts(node)))
     except MotorbusError:
-        told = yield from outcome(_closed(node, loan))  # the record may be on the disk all the same
+        told = await outcome(_closed(node, loan))  # the record may be on the disk all the same
         if isinstance(told, RequestError):  # that of another change says so itself
             loan.open = False
         raise
 
 
-def _ended(node: Node, loan: Loan) -> Operation[None]:
+async def _ended(node: Node, loan: Loan) -> None:
     """Whatever has happened: the motor is told to stop, then project 1 is given back, then the journal is closed."""
     if loan.restless:
-        yield from ended(node, BY_HAND)
+        await ended(node, BY_HAND)
         loan.restless = loan.heard = False
     if loan.open:
-        yield from given_back(node, loan)
+        await given_back(node, loan)
     elif not loan.heard:
-        yield from _still_there(node)
+        await _still_there(node)
         loan.heard = True
 
 
-def _still_there(node: Node) -> Operation[None]:
+async def _still_there(node: Node) -> None:
     """Read something: an acknowledgement of 11 bytes may be an echo of what was said, and nobody has heard it."""
     for left in reversed(range(TRIES)):
-        told = yield from outcome(reading.dump_once(node, PROJECT))
+        told = await outcome(reading.dump_once(node, PROJECT))
         if not isinstance(told, MotorbusError):
             return
         if isinstance(told, LinkError):
@@ -297,7 +297,7 @@ def _unheard(node: Node, told: MotorbusError) -> OutcomeUnknown:
     )
 
 
-def given_back(node: Node, loan: Loan) -> Operation[None]:
+async def given_back(node: Node, loan: Loan) -> None:
     """Bring project 1 back to what it was, see that it is, and close the journal. May be repeated at any point.
 
     A motor that was cut off slows down before. Raises what the last of several tries has raised.
@@ -305,34 +305,35 @@ def given_back(node: Node, loan: Loan) -> Operation[None]:
     if loan.cut:
         rest = slowing(replace(loan.wanted, total_steps=1))
         with suppress(Exception):  # whatever the listener says to that, the project is given back
-            yield from Report(Slowing(rest)) if rest >= LONG else ()
-        yield from Pause(rest)
+            if rest >= LONG:
+                await Report(Slowing(rest))
+        await Pause(rest)
         loan.cut = False
     if not loan.restored:
         unsaved = node.memory.unsaved
-        told = yield from _insisted(node, loan)
+        told = await _insisted(node, loan)
         if told is not None:
             raise told
         node.memory.unsaved = unsaved
         loan.restored = True
-    yield from _closed(node, loan)
+    await _closed(node, loan)
 
 
-def _insisted(node: Node, loan: Loan) -> Operation[MotorbusError | None]:
+async def _insisted(node: Node, loan: Loan) -> MotorbusError | None:
     told: MotorbusError | None = None
     for _ in range(TRIES):
-        told = yield from outcome(_restored(node, loan))
+        told = await outcome(_restored(node, loan))
         if told is None or isinstance(told, LinkError):
             break
     return told
 
 
-def _closed(node: Node, loan: Loan) -> Operation[None]:
-    yield from Report(Journal(loan.verb, OUTCOME, {"outcome": GIVEN_BACK, **loan.name(node)}))
+async def _closed(node: Node, loan: Loan) -> None:
+    await Report(Journal(loan.verb, OUTCOME, {"outcome": GIVEN_BACK, **loan.name(node)}))
     loan.open = False
 
 
-def _restored(node: Node, loan: Loan) -> Operation[None]:
+async def _restored(node: Node, loan: Loan) -> None:
     """What is being edited may be anything by now: as wanted, half of it, or as it was, after a power cycle.
 
     A reading tells which, and only what differs is written; where no reading can be believed, all that was edited is
@@ -340,15 +341,15 @@ def _restored(node: Node, loan: Loan) -> Operation[None]:
     """
     image = encode_image(loan.wanted, loan.order, over=loan.image)
     if loan.seen:
-        image = yield from reading.image(node, PROJECT)
+        image = await reading.image(node, PROJECT)
         loan.heard = True
         shown = replace(decode_image(image, loan.order), number=PROJECT)
         loan.lost = loan.lost or (shown == loan.before and not loan.touched)
     loan.touched = True
     if not loan.before.is_cleared:
-        yield from brought(node, image, loan.before)
+        await brought(node, image, loan.before)
     elif any(image):
-        yield from cleared(node, PROJECT)  # no command writes such a one, and what is stored was clear too
+        await cleared(node, PROJECT)  # no command writes such a one, and what is stored was clear too
 
 
 def _refuse(node: Node, loan: Loan, leave: bool) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Final
 
-from motorbus.core.operation import Alone, Operation, Pause, Progress, Report
+from motorbus.core.operation import Alone, Pause, Progress, Report
 from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.costs import Taken, taken
@@ -31,7 +31,7 @@ from motorbus.families.stepper.table import PROJECTS, Project, checked_project, 
 ALL: Final = tuple(range(1, PROJECTS + 1))
 
 
-def backup(node: Node, projects: Iterable[int] = ALL) -> Operation[Backup]:
+async def backup(node: Node, projects: Iterable[int] = ALL) -> Backup:
     """Read these projects, each until two dumps agree; about 0.5 s for each. Only reads.
 
     Edits of the selected project that were not saved are read in place of what is stored of it, or so it is assumed.
@@ -39,22 +39,20 @@ def backup(node: Node, projects: Iterable[int] = ALL) -> Operation[Backup]:
     cut off, for then it would keep what was lent; as `dump` else.
     """
     numbers = _numbers(projects)
-    return (yield from Alone(_read(node, numbers)))
+    return await Alone(_read(node, numbers))
 
 
-def _read(node: Node, numbers: tuple[int, ...]) -> Operation[Backup]:
-    yield from refuse_while_lent(node, "backup", reads=True)
+async def _read(node: Node, numbers: tuple[int, ...]) -> Backup:
+    await refuse_while_lent(node, "backup", reads=True)
     dumps = {}
     for done, number in enumerate(numbers):
-        yield from Report(Progress(done, len(numbers), f"reading project {number}"))
-        dumps[number] = wire.encode_dump(number, (yield from taken(node, number)).image)
-    yield from Report(Progress(len(numbers), len(numbers), "reading projects"))
+        await Report(Progress(done, len(numbers), f"reading project {number}"))
+        dumps[number] = wire.encode_dump(number, (await taken(node, number)).image)
+    await Report(Progress(len(numbers), len(numbers), "reading projects"))
     return Backup(dumps=dumps, order=node.order)
 
 
-def restore(
-    node: Node, backup: Backup, projects: Iterable[int] | None = None
-) -> Operation[tuple[Written, ...]]:
+async def restore(node: Node, backup: Backup, projects: Iterable[int] | None = None) -> tuple[Written, ...]:
     """Put projects of a backup back, all that are in it when none are said: written, saved and read back, each in turn.
 
     As `write_project`, but rows behind the last step are put back too, and nothing is asked of lint: it was there
@@ -72,22 +70,22 @@ def restore(
                 expected=error.expected,
                 advice="restore the others; nothing was sent",
             )
-    return (yield from Alone(_restored(node, backup, meant)))
+    return await Alone(_restored(node, backup, meant))
 
 
-def _restored(node: Node, backup: Backup, meant: dict[int, Project]) -> Operation[tuple[Written, ...]]:
-    yield from refuse_while_lent(node, "restore")
+async def _restored(node: Node, backup: Backup, meant: dict[int, Project]) -> tuple[Written, ...]:
+    await refuse_while_lent(node, "restore")
     done: list[Written] = []
     try:
         for number, project in meant.items():
-            began = yield from Pause(0)
-            found = yield from taken(node, number)
+            began = await Pause(0)
+            found = await taken(node, number)
             image = backup.image(number)
             if project.is_cleared:
-                done.append((yield from _emptied(node, found, number, image, began)))
+                done.append(await _emptied(node, found, number, image, began))
             else:
-                done.append((yield from written(node, found, project, image, save=True, began=began)))
-        yield from _still_so(node, meant)
+                done.append(await written(node, found, project, image, save=True, began=began))
+        await _still_so(node, meant)
     except BaseException as error:
         told = ", ".join(str(one.project) for one in done) or "none"
         error.add_note(f"of the projects {', '.join(map(str, meant))} these were restored: {told}")
@@ -95,26 +93,26 @@ def _restored(node: Node, backup: Backup, meant: dict[int, Project]) -> Operatio
     return tuple(done)
 
 
-def _emptied(node: Node, found: Taken, number: int, image: bytes, began: float) -> Operation[Written]:
+async def _emptied(node: Node, found: Taken, number: int, image: bytes, began: float) -> Written:
     before = decode_image(found.image, node.order)
     commands, dumps, proof = 0, 0, Proof.UNCHANGED
     if not is_blank(before):
-        commands, dumps = yield from cleared(node, number)
+        commands, dumps = await cleared(node, number)
         proof = Proof.CLEARED
-    ended = yield from Pause(0)
+    ended = await Pause(0)
     return Written(
         number, tuple(changes(before, Project())) if commands else (), commands, found.dumps + dumps, ended - began,
         bool(commands), proof, unwritable(found.image, image),
     )  # fmt: skip
 
 
-def _still_so(node: Node, meant: dict[int, Project]) -> Operation[None]:
+async def _still_so(node: Node, meant: dict[int, Project]) -> None:
     """Flags that belong to the device are those of the project that was written last."""
     written_ones = [project for project in meant.values() if not project.is_cleared]
     if len({tuple(getattr(project, name) for name in FLAGS) for project in written_ones}) < 2:
         return
     for project in written_ones:
-        image, _ = yield from read_back(node, project)
+        image, _ = await read_back(node, project)
         if held(node, image, project.number) != project:
             raise differs(
                 node, image, project, f"project {project.number} was restored and has changed with the others",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Operation, Tune
+from motorbus.core.operation import Tune
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.line import BITS
 from motorbus.families.stepper.driver.node import Node
@@ -64,11 +64,11 @@ class Taken(NamedTuple):
     tempo: Tempo
 
 
-def taken(node: Node, project: int) -> Operation[Taken]:
+async def taken(node: Node, project: int) -> Taken:
     """Read a project until two dumps agree, with a clock. Call it inside `Alone`. Raises as `dump`."""
-    rate = yield from Tune(0)
+    rate = await Tune(0)
     lasted: list[float] = []
-    seen = yield from readings(node, project, lasted)
+    seen = await readings(node, project, lasted)
     image = agreed(node, project, seen)[wire.REPLY_LENGTH :]
     # the quickest, for whatever held one of them up would be reckoned for every command to come
     return Taken(image, len(seen), Tempo(rate, min(lasted)))

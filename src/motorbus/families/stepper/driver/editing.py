@@ -21,7 +21,6 @@ from motorbus.core.operation import (
     READABLE,
     Exchange,
     Journal,
-    Operation,
     Progress,
     Rank,
     Report,
@@ -102,7 +101,7 @@ def changes(before: Project, after: Project) -> Iterator[Change]:
         yield Change(step_row(step, name) if step else TABLE[name], step, old, new)
 
 
-def brought(node: Node, before_image: bytes, after: Project, *, every: bool = False) -> Operation[Readback]:
+async def brought(node: Node, before_image: bytes, after: Project, *, every: bool = False) -> Readback:
     """Bring what is being edited to `after` in every named field, all ten rows, and read it back. Nothing is saved.
 
     `before_image` are the 220 bytes that were read before, and `after.number` says of which project. Only what differs
@@ -126,9 +125,9 @@ def brought(node: Node, before_image: bytes, after: Project, *, every: bool = Fa
     commands, dumps, unmoved = 0, 0, True
     more: tuple[Change, ...] = ()
     for orders in rounds:
-        yield from _told(node, after.number, orders)
+        await _told(node, after.number, orders)
         reading = read_until(node, after.number, lambda it: it == after or _is_alike(it, before))
-        image, count = yield from noted(reading, _unsaved(after.number))
+        image, count = await noted(reading, _unsaved(after.number))
         commands, dumps = commands + len(orders), dumps + count
         shown = held(node, image, after.number)
         if shown == after:
@@ -152,15 +151,15 @@ def _beyond(planned: Iterable[Change], found: Iterable[Change]) -> Iterator[Chan
     return (change for change in found if change.name not in known)
 
 
-def refuse_while_lent(node: Node, verb: str, *, reads: bool = False) -> Operation[None]:
+async def refuse_while_lent(node: Node, verb: str, *, reads: bool = False) -> None:
     """Raise RequestError while project 1 is lent to a motion that was cut off: what was lent would be kept.
 
     Unless it only `reads`, also while something may still turn: what editing does then nobody knows. Call it inside
     `Alone`: a motion that is not cut off has the bus for itself until it has given project 1 back.
     """
     if not reads:
-        yield from refuse_unless_idle(node, f"{verb}()")
-    yield from Report(Journal(verb, ASKED, {"node": node.node, READABLE: reads}))
+        await refuse_unless_idle(node, f"{verb}()")
+    await Report(Journal(verb, ASKED, {"node": node.node, READABLE: reads}))
 
 
 def held(node: Node, image: bytes, number: int) -> Project:
@@ -181,26 +180,26 @@ def all_edits(after: Project) -> list[Edit]:
     return edits(after, rows=STEPS)
 
 
-def selected(node: Node, project: Project) -> Operation[None]:
+async def selected(node: Node, project: Project) -> None:
     """Select a project with the number of steps it has. Raises RequestError when it has none."""
-    yield from _told(node, project.number, _orders(node, edits(project, rows=0)[:1]))
+    await _told(node, project.number, _orders(node, edits(project, rows=0)[:1]))
 
 
-def read_back(node: Node, meant: Project) -> Operation[tuple[bytes, int]]:
+async def read_back(node: Node, meant: Project) -> tuple[bytes, int]:
     """The 220 bytes of a project as they are now, and how many dumps that took.
 
     One reading is enough when it is as `meant` in every named field, for no line changes bytes into that; any other is
     believed when two agree. Raises as `dump`.
     """
-    return (yield from read_until(node, meant.number, lambda shown: shown == meant))
+    return await read_until(node, meant.number, lambda shown: shown == meant)
 
 
-def read_until(node: Node, project: int, right: Callable[[Project], bool]) -> Operation[tuple[bytes, int]]:
+async def read_until(node: Node, project: int, right: Callable[[Project], bool]) -> tuple[bytes, int]:
     """As `read_back`, where more than one project would be right."""
-    image = (yield from dump_once(node, project))[wire.REPLY_LENGTH :]
+    image = (await dump_once(node, project))[wire.REPLY_LENGTH :]
     if right(held(node, image, project)):
         return image, 1
-    seen = yield from readings(node, project)
+    seen = await readings(node, project)
     return agreed(node, project, seen)[wire.REPLY_LENGTH :], 1 + len(seen)
 
 
@@ -246,18 +245,18 @@ def _order(node: Node, edit: Edit) -> Exchange[None]:
     return command(node, edit.command, nothing, rank=Rank.CONFIGURATION, expert=True, **values)
 
 
-def _told(node: Node, project: int, orders: Sequence[Exchange[None]]) -> Operation[None]:
+async def _told(node: Node, project: int, orders: Sequence[Exchange[None]]) -> None:
     if node.memory.unsaved is not None and node.memory.unsaved.number != project:
         node.memory.unsaved = None  # those edits are lost with the selection of this one
     number = 0
     try:
         for number, order in enumerate(orders):
-            yield from Report(Progress(number, len(orders), f"writing project {project}"))
-            yield from order
+            await Report(Progress(number, len(orders), f"writing project {project}"))
+            await order
     except BaseException as error:
         error.add_note(f"{number} of {len(orders)} commands were acknowledged; {_unsaved(project)}")
         raise
-    yield from Report(Progress(len(orders), len(orders), f"writing project {project}"))
+    await Report(Progress(len(orders), len(orders), f"writing project {project}"))
 
 
 def _unsaved(project: int) -> str:
@@ -267,10 +266,10 @@ def _unsaved(project: int) -> str:
     )
 
 
-def noted(runnable: Runnable[T], note: str) -> Operation[T]:
+async def noted(runnable: Runnable[T], note: str) -> T:
     """Carry it out; an error or an interruption of it gets this note."""
     try:
-        return (yield from runnable)
+        return await runnable
     except BaseException as error:
         error.add_note(note)
         raise

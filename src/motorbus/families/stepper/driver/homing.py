@@ -12,7 +12,7 @@ from __future__ import annotations
 from math import floor, inf, tau
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Operation, Pause, Progress, Report
+from motorbus.core.operation import Pause, Progress, Report
 from motorbus.errors import NotHomed
 from motorbus.families.stepper.driver import commands, goals
 from motorbus.families.stepper.driver.borrowing import borrowed
@@ -49,9 +49,9 @@ class Homed(NamedTuple):
         return f"{found}; {self.promise.value}"
 
 
-def home(
+async def home(
     node: Node, *, deadline: float = DEADLINE, velocity: float | None = None, at_most: float | None = None
-) -> Operation[Homed]:
+) -> Homed:
     """Turn in reverse until input 5 is active, at most for so long (s, up to 600), then stop: always.
 
     The speed is that of step 1 of project 1; with a `velocity` (rad/s, above 0, in whole RPM) project 1 is borrowed for
@@ -71,20 +71,20 @@ def home(
     most = inf if at_most is None else finite(at_most, "at_most")
     watch = Watch(node)
 
-    def wanted(project: Project) -> Operation[Project]:
-        yield from _refuse_active(node)
+    async def wanted(project: Project) -> Project:
+        await _refuse_active(node)
         rpm = said
         if rpm is None:
             refuse_unless_turning(node, project, "home")
             if project.step(1).speed * tau / 60 <= most:
                 return project
             rpm = _not_above(most)
-        return paced((yield from grounded(node, project, "home", rpm)), rpm, None)
+        return paced(await grounded(node, project, "home", rpm), rpm, None)
 
-    def motion(project: Project) -> Operation[Homed]:
-        return (yield from _until_active(node, project, deadline, watch))
+    async def motion(project: Project) -> Homed:
+        return await _until_active(node, project, deadline, watch)
 
-    return (yield from honest(watch, borrowed(node, "home", wanted, motion)))
+    return await honest(watch, borrowed(node, "home", wanted, motion))
 
 
 def _not_above(most: float) -> int:
@@ -93,10 +93,10 @@ def _not_above(most: float) -> int:
     return rpm if rpm > 0 else whole_rpm(most)
 
 
-def _refuse_active(node: Node) -> Operation[None]:
+async def _refuse_active(node: Node) -> None:
     """Raise NotHomed unless input 5 reads inactive each time."""
     for _ in range(READS):
-        if (yield from read_input(node, HOME_INPUT)):
+        if await read_input(node, HOME_INPUT):
             raise NotHomed(
                 f"input {HOME_INPUT} is active already, so homing is refused",
                 expected="not active",
@@ -107,20 +107,20 @@ def _refuse_active(node: Node) -> Operation[None]:
             )
 
 
-def _until_active(node: Node, project: Project, deadline: float, watch: Watch) -> Operation[Homed]:
-    yield from commands.motion(node, "home", goals.of_jog(node, project, -1), watch.refusal)
-    began = now = told = yield from Pause(0)
+async def _until_active(node: Node, project: Project, deadline: float, watch: Watch) -> Homed:
+    await commands.motion(node, "home", goals.of_jog(node, project, -1), watch.refusal)
+    began = now = told = await Pause(0)
     row = 0
     while now - began < deadline:
-        row = row + 1 if (yield from read_input(node, HOME_INPUT)) else 0
+        row = row + 1 if await read_input(node, HOME_INPUT) else 0
         watch.check()
-        now = yield from Pause(0)
+        now = await Pause(0)
         if row >= READS:
             velocity = project.step(1).speed * tau / 60
             return Homed(node.node, now - began, velocity, Promise.STOP_ACCEPTED)
         if now - told >= TOLD:
             told = now
-            yield from Report(Progress(round(1000 * (now - began)), round(1000 * deadline), "homing"))
+            await Report(Progress(round(1000 * (now - began)), round(1000 * deadline), "homing"))
     raise NotHomed(
         f"input {HOME_INPUT} was not active within {deadline:g} s, so homing was stopped",
         expected=f"input {HOME_INPUT} active",

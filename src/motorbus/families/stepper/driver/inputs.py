@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from math import inf
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Operation, Pause, Report
+from motorbus.core.operation import Pause, Report
 from motorbus.errors import FramingError, RequestError
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.reading import READINGS, read_input
@@ -66,21 +66,21 @@ class Levels:
         return InputChanged(port, active, self._since.pop(port))
 
 
-def inputs(node: Node, ports: Iterable[int] = PORTS) -> Operation[dict[int, bool]]:
+async def inputs(node: Node, ports: Iterable[int] = PORTS) -> dict[int, bool]:
     """Whether these inputs, 1 to 5, are active: each read until two readings in a row agree, in 0.04 s or so.
 
     Raises RequestError for an input that there is not, FramingError for one that is another each time.
     """
     found = {}
     for port in checked(ports):
-        found[port] = yield from _level(node, port)
+        found[port] = await _level(node, port)
     return found
 
 
-def _level(node: Node, port: int) -> Operation[bool]:
-    seen = yield from read_input(node, port)
+async def _level(node: Node, port: int) -> bool:
+    seen = await read_input(node, port)
     for _ in range(READINGS - 1):
-        before, seen = seen, (yield from read_input(node, port))
+        before, seen = seen, await read_input(node, port)
         if before is seen:
             return seen
     raise FramingError(
@@ -92,7 +92,7 @@ def _level(node: Node, port: int) -> Operation[bool]:
     )
 
 
-def watch_inputs(node: Node, ports: Iterable[int] = PORTS, seconds: float = 10.0) -> Operation[Watched]:
+async def watch_inputs(node: Node, ports: Iterable[int] = PORTS, seconds: float = 10.0) -> Watched:
     """Read these inputs, 1 to 5, in turn for so many seconds, and report an `InputChanged` for each change.
 
     A change is believed at the second reading that shows it, so it is reported a round late; one that is over within
@@ -105,17 +105,17 @@ def watch_inputs(node: Node, ports: Iterable[int] = PORTS, seconds: float = 10.0
     if not chosen:
         raise RequestError("no input is named", expected="some of 1 to 5", advice="nothing was sent")
     within(seconds, inf, "seconds")
-    levels = Levels((yield from inputs(node, chosen)))
+    levels = Levels(await inputs(node, chosen))
     changes: list[InputChanged] = []
-    rounds, began = 0, (yield from Pause(0))
+    rounds, began = 0, await Pause(0)
     now = began
     while now - began < seconds:
         for port in chosen:
-            active = yield from read_input(node, port)
-            now = yield from Pause(0)
+            active = await read_input(node, port)
+            now = await Pause(0)
             if (change := levels.take(port, active, now)) is not None:
                 changes.append(change)
-                yield from Report(change)
+                await Report(change)
         rounds += 1
     return Watched(dict(levels.believed), tuple(changes), rounds, now - began)
 

@@ -18,7 +18,7 @@ from fractions import Fraction
 from math import copysign, tau
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Operation, Pause
+from motorbus.core.operation import Pause
 from motorbus.errors import RequestError
 from motorbus.families.stepper import execution, wire
 from motorbus.families.stepper.driver import commands, goals
@@ -73,14 +73,14 @@ class Moved(NamedTuple):
         )
 
 
-def move_by(
+async def move_by(
     node: Node,
     angle: float,
     *,
     velocity: float | None = None,
     acceleration: int | None = None,
     wait: bool = True,
-) -> Operation[Moved]:
+) -> Moved:
     """Turn the motor by an angle (rad, forward positive), with a journalled borrow of project 1; then stop.
 
     `velocity` in rad/s, above 0, is rounded to whole RPM; None is that of step 1. `acceleration` is the number that the
@@ -102,10 +102,10 @@ def move_by(
     """
     finite(angle, "angle")
     rpm = None if velocity is None else whole_rpm(finite(velocity, "velocity"))
-    return (yield from _turned(node, "move_by", angle, rpm, acceleration, wait))
+    return await _turned(node, "move_by", angle, rpm, acceleration, wait)
 
 
-def jog(node: Node, velocity: float, seconds: float, *, acceleration: int | None = None) -> Operation[Moved]:
+async def jog(node: Node, velocity: float, seconds: float, *, acceleration: int | None = None) -> Moved:
     """Turn at a velocity (rad/s, forward positive) for a while (s, at most 60), then stop.
 
     It is one single move of exactly velocity times seconds, see `move_by`: the motor ends by itself when this host
@@ -113,23 +113,23 @@ def jog(node: Node, velocity: float, seconds: float, *, acceleration: int | None
     """
     rpm = whole_rpm(abs(finite(velocity, "velocity")))
     angle = velocity * within(seconds, LONGEST, "seconds")
-    return (yield from _turned(node, "jog", angle, rpm, acceleration, True))
+    return await _turned(node, "jog", angle, rpm, acceleration, True)
 
 
-def _turned(
+async def _turned(
     node: Node, verb: str, angle: float, rpm: int | None, acceleration: int | None, wait: bool
-) -> Operation[Moved]:
+) -> Moved:
     ramp = None if acceleration is None else _checked_acceleration(acceleration)
     watch = Watch(node)
 
-    def wanted(project: Project) -> Operation[Project]:
-        project = yield from grounded(node, project, verb, rpm)
+    async def wanted(project: Project) -> Project:
+        project = await grounded(node, project, verb, rpm)
         return shaped(paced(project, rpm, ramp), angle)
 
-    def motion(project: Project) -> Operation[Moved]:
-        return (yield from single(node, project, watch, wait=wait))
+    async def motion(project: Project) -> Moved:
+        return await single(node, project, watch, wait=wait)
 
-    return (yield from honest(watch, borrowed(node, verb, wanted, motion, leave=not wait)))
+    return await honest(watch, borrowed(node, verb, wanted, motion, leave=not wait))
 
 
 def _checked_acceleration(number: int) -> int:
@@ -142,70 +142,68 @@ def _checked_acceleration(number: int) -> int:
     )
 
 
-def run_once(node: Node) -> Operation[Moved]:
+async def run_once(node: Node) -> Moved:
     """Make the single move that project 1 has in its step 1, wait for as long as it may take, then stop.
 
     Nothing is edited. Raises RequestError when it has none, and as `move_by`.
     """
     watch = Watch(node)
 
-    def wanted(project: Project) -> Operation[Project]:
-        yield from ()
+    async def wanted(project: Project) -> Project:
         refuse_unless_turning(node, project, "run_once")
         _pulses(project)
         return project
 
-    def motion(project: Project) -> Operation[Moved]:
-        return (yield from single(node, project, watch))
+    async def motion(project: Project) -> Moved:
+        return await single(node, project, watch)
 
-    return (yield from honest(watch, borrowed(node, "run_once", wanted, motion)))
+    return await honest(watch, borrowed(node, "run_once", wanted, motion))
 
 
-def jog_forward(node: Node, seconds: float) -> Operation[Moved]:
+async def jog_forward(node: Node, seconds: float) -> Moved:
     """Turn forward for a while (s, at most 60), then stop; a host that dies meanwhile leaves the motor turning.
 
     It is the manual's jog, which has the speed of step 1 of project 1 and no end of its own; `jog` has both. Raises
     RequestError when project 1 has no speed, and as `move_by`.
     """
-    return (yield from _endless(node, "jog_forward", 1, seconds))
+    return await _endless(node, "jog_forward", 1, seconds)
 
 
-def jog_reverse(node: Node, seconds: float) -> Operation[Moved]:
+async def jog_reverse(node: Node, seconds: float) -> Moved:
     """The same in reverse; a host that dies meanwhile leaves the motor turning."""
-    return (yield from _endless(node, "jog_reverse", -1, seconds))
+    return await _endless(node, "jog_reverse", -1, seconds)
 
 
-def _endless(node: Node, verb: str, sign: int, seconds: float) -> Operation[Moved]:
+async def _endless(node: Node, verb: str, sign: int, seconds: float) -> Moved:
     within(seconds, LONGEST, "seconds")
     watch = Watch(node)
 
-    def wanted(project: Project) -> Operation[Project]:
-        yield from ()
+    async def wanted(project: Project) -> Project:
         refuse_unless_turning(node, project, verb)
         return project
 
-    def motion(project: Project) -> Operation[Moved]:
-        yield from commands.motion(node, verb, goals.of_jog(node, project, sign), watch.refusal)
-        yield from waited(watch, seconds, verb.replace("_", " "))
+    async def motion(project: Project) -> Moved:
+        await commands.motion(node, verb, goals.of_jog(node, project, sign), watch.refusal)
+        await waited(watch, seconds, verb.replace("_", " "))
         pulses = execution.move(project, project.step(1), None).done(seconds)
         angle = sign * pulses * tau / float(project.pulses_per_turn or 1)
         return Moved(node.node, angle, sign * _velocity(project), seconds, Promise.STOP_ACCEPTED)
 
-    return (yield from honest(watch, borrowed(node, verb, wanted, motion)))
+    return await honest(watch, borrowed(node, verb, wanted, motion))
 
 
-def single(node: Node, project: Project, watch: Watch, *, wait: bool = True) -> Operation[Moved]:
+async def single(node: Node, project: Project, watch: Watch, *, wait: bool = True) -> Moved:
     """The single move of step 1 as project 1 has it, and the wait for it; who calls it says stop.
 
     Raises RequestError for a move of less than a pulse: a controller may take a distance of 0 for one without an end.
     """
     step, count = project.step(1), _pulses(project)
-    yield from commands.motion(node, "run_once", goals.of_move(node, project), watch.refusal)
+    await commands.motion(node, "run_once", goals.of_move(node, project), watch.refusal)
     seconds = longest(project, count)
     if wait:
-        yield from waited(watch, seconds, "moving")
+        await waited(watch, seconds, "moving")
     else:
-        node.memory.turning = (yield from Pause(0)) + seconds
+        node.memory.turning = await Pause(0) + seconds
     angle = step.sign * count * tau / float(project.pulses_per_turn or 1)
     promise = Promise.STOP_ACCEPTED if wait else None
     return Moved(node.node, angle, step.sign * _velocity(project), seconds, promise)
@@ -248,7 +246,7 @@ def whole_rpm(velocity: float) -> int:
     )
 
 
-def grounded(node: Node, project: Project, verb: str, rpm: int | None) -> Operation[Project]:
+async def grounded(node: Node, project: Project, verb: str, rpm: int | None) -> Project:
     """Project 1 with something to turn by; one that was cleared takes its geometry from another project.
 
     Raises RequestError when there is neither, or no speed was said and it has none.
@@ -259,7 +257,7 @@ def grounded(node: Node, project: Project, verb: str, rpm: int | None) -> Operat
         return project
     if project.is_cleared:
         for number in range(PROJECT + 1, PROJECTS + 1):
-            image = (yield from dump(node, number))[wire.REPLY_LENGTH :]
+            image = (await dump(node, number))[wire.REPLY_LENGTH :]
             other = decode_image(image, node.order)
             if other.pulses_per_unit is not None and not other.is_cleared:
                 return _with_geometry(other)

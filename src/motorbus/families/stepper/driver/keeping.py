@@ -50,9 +50,9 @@ _INPUT: Final = 1
 """Which input is read for that; what it says is no matter."""
 
 
-def keep_time(
+async def keep_time(
     node: Node, angle: float, timing: Timing, *, velocity: float, acceleration: float | None = None
-) -> Operation[Turned]:
+) -> Turned:
     """Turn the motor by an angle (rad, forward positive) as long as others take, and begin with them.
 
     At most at `velocity` (rad/s, in whole RPM, not above it), and at most as steep as `acceleration` (rad/s²) in every
@@ -80,50 +80,50 @@ def keep_time(
     check(angle, velocity, acceleration)
     watch = Watch(node)
     try:
-        return (yield from honest(watch, _kept(node, angle, timing, watch, velocity, acceleration)))
+        return await honest(watch, _kept(node, angle, timing, watch, velocity, acceleration))
     except _There:
-        return (yield from _told(timing, _stayed(node, timing)))
+        return await _told(timing, _stayed(node, timing))
 
 
-def _kept(
+async def _kept(
     node: Node, angle: float, timing: Timing, watch: Watch, velocity: float, acceleration: float | None
-) -> Operation[Turned]:
+) -> Turned:
     tempo, true = Tempo(0.0, 0.0), Project()
 
-    def wanted(project: Project) -> Operation[Project]:
-        found = yield from grounded(node, project, VERB, 1)
+    async def wanted(project: Project) -> Project:
+        found = await grounded(node, project, VERB, 1)
         if not round(Fraction(abs(angle) / tau) * (found.pulses_per_turn or 0)):
             raise _There
         return quickest(found, angle, velocity, acceleration)
 
-    def settled(quick: Project) -> Operation[Project]:
+    async def settled(quick: Project) -> Project:
         nonlocal true
         true = quick
-        yield from _on_guard(node, quick, watch)
-        seconds = yield from timing.agreed(lasts(quick), lambda others: lasts(fitted(quick, others)))
+        await _on_guard(node, quick, watch)
+        seconds = await timing.agreed(lasts(quick), lambda others: lasts(fitted(quick, others)))
         watch.check_before()
         return nearest(quick, seconds)
 
-    def ready(project: Project) -> Operation[None]:
+    async def ready(project: Project) -> None:
         nonlocal tempo
-        tempo = yield from _tempo(node)
+        tempo = await _tempo(node)
         watch.check_before()
-        yield from timing.start(tempo.hears + first_pulse(project))
+        await timing.start(tempo.hears + first_pulse(project))
 
-    def motion(project: Project) -> Operation[Turned]:
-        return (yield from _turned(node, project, true, watch, tempo))
+    async def motion(project: Project) -> Turned:
+        return await _turned(node, project, true, watch, tempo)
 
     def told(work: Operation[T]) -> Operation[T]:
         return _told(timing, honest(watch, work))
 
     accord = Accord(lambda quick: told(settled(quick)), lambda project: told(ready(project)))
-    return (yield from borrowed(node, VERB, wanted, lambda project: told(motion(project)), accord=accord))
+    return await borrowed(node, VERB, wanted, lambda project: told(motion(project)), accord=accord)
 
 
-def _told(timing: Timing, work: Operation[T]) -> Operation[T]:
+async def _told(timing: Timing, work: Operation[T]) -> T:
     """Let the others know at once when it fails: giving project 1 back takes seconds, and they would move on."""
     try:
-        return (yield from work)
+        return await work
     except BaseException as error:
         timing.fails(error)
         raise
@@ -136,30 +136,28 @@ class _There(RequestError):
         super().__init__("this is no way to go")
 
 
-def _stayed(node: Node, timing: Timing) -> Operation[Turned]:
+async def _stayed(node: Node, timing: Timing) -> Turned:
     """It takes part and does not move."""
-    yield from timing.agreed(0.0, lambda others: others)
-    return Turned(node.node, 0.0, (yield from timing.start(0.0)), 0.0, lambda _: 0.0)
+    await timing.agreed(0.0, lambda others: others)
+    return Turned(node.node, 0.0, await timing.start(0.0), 0.0, lambda _: 0.0)
 
 
-def shortest(
-    node: Node, angle: float, *, velocity: float, acceleration: float | None = None
-) -> Operation[float]:
+async def shortest(node: Node, angle: float, *, velocity: float, acceleration: float | None = None) -> float:
     """s that `keep_time` would take at least for this, *estimated*: project 1 is read, and nothing is written.
 
     Raises RequestError for what `keep_time` refuses of these numbers and of project 1; and as `dump`.
     """
     check(angle, velocity, acceleration)
-    project = decode_image((yield from image(node, PROJECT)), node.order)
-    return lasts(quickest((yield from grounded(node, project, VERB, 1)), angle, velocity, acceleration))
+    project = decode_image(await image(node, PROJECT), node.order)
+    return lasts(quickest(await grounded(node, project, VERB, 1), angle, velocity, acceleration))
 
 
-def _on_guard(node: Node, project: Project, watch: Watch) -> Operation[None]:
+async def _on_guard(node: Node, project: Project, watch: Watch) -> None:
     """From here on every stop that leaves counts, also one of an emergency that is over when the order would leave.
 
     Only what moves may ask how many stops have left; so this is an order that never leaves.
     """
-    told = yield from outcome(commands.motion(node, "run_once", goals.of_move(node, project), watch.look))
+    told = await outcome(commands.motion(node, "run_once", goals.of_move(node, project), watch.look))
     if isinstance(told, MotorbusError) and told is not watch.looked:
         raise told
 
@@ -181,17 +179,17 @@ class Tempo(NamedTuple):
         return left + self.hears
 
 
-def _tempo(node: Node) -> Operation[Tempo]:
+async def _tempo(node: Node) -> Tempo:
     """As it is now. Where an answer is there before it can be, bytes take no time: a socket, or no line at all.
 
     That a motion begins when the last byte of its order was heard is an assumption; an answer takes as much longer as
     the controller thinks, which on a line where the bus is quiet before each question nobody can tell.
     """
-    rate = yield from Tune(0)
+    rate = await Tune(0)
     answers: list[float] = []
     while len(answers) < READS or (min(answers) > quiet_time(rate) and len(answers) < DOUBTS):
-        left = yield from Pause(0)
-        answers.append((yield from timed(read_input(node, _INPUT))) - left)
+        left = await Pause(0)
+        answers.append(await timed(read_input(node, _INPUT)) - left)
     byte, quickest = BITS / rate, min(answers)
     air = byte * (wire.REQUEST_LENGTH + wire.REPLY_LENGTH)
     if quickest < air:
@@ -199,16 +197,16 @@ def _tempo(node: Node) -> Operation[Tempo]:
     return Tempo(byte * wire.REQUEST_LENGTH, quickest if quickest <= quiet_time(rate) else air)
 
 
-def _turned(node: Node, project: Project, true: Project, watch: Watch, tempo: Tempo) -> Operation[Turned]:
+async def _turned(node: Node, project: Project, true: Project, watch: Watch, tempo: Tempo) -> Turned:
     """The order, and the wait until the motion is over by the slowest reading; who calls it says stop.
 
     What `project` says of angles may be of another motor, see `pacing`; the `true` one has as many pulses.
     """
     move, sign = moved(project), project.step(1).sign
     pulse = tau / float(true.pulses_per_turn or 1)
-    left = yield from Pause(0)
-    answered = yield from timed(commands.motion(node, "run_once", goals.of_move(node, true), watch.refusal))
-    yield from waited(watch, longest(project, move.pulses), "moving")
+    left = await Pause(0)
+    answered = await timed(commands.motion(node, "run_once", goals.of_move(node, true), watch.refusal))
+    await waited(watch, longest(project, move.pulses), "moving")
     first = move.moment(1)
 
     def way(seconds: float) -> float:

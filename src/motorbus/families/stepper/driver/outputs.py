@@ -6,7 +6,6 @@ have switched them: a project that runs, or a command of which it is not known w
 
 from __future__ import annotations
 
-from motorbus.core.operation import Operation
 from motorbus.errors import RequestError
 from motorbus.families.stepper.driver import commands
 from motorbus.families.stepper.driver.memory import ports_of
@@ -14,7 +13,7 @@ from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.table import OutputPort
 
 
-def set_output(node: Node, port: int, active: bool) -> Operation[None]:
+async def set_output(node: Node, port: int, active: bool) -> None:
     """Switch outputs: 1 to 3, 4 for all three, 5 for both LEDs; active is pulled low (item 23).
 
     `last_commanded` remembers it. Raises RequestError for another port or level, OutcomeUnknown when the
@@ -27,7 +26,7 @@ def set_output(node: Node, port: int, active: bool) -> Operation[None]:
     said = commands.set_output(node, port, int(active))
     ports = ports_of(port)
     node.memory.commanded(ports, None)
-    yield from said
+    await said
     node.memory.commanded(ports, bool(active))
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import INTENT, OUTCOME, READABLE, Journal, Operation, Report, outcome
+from motorbus.core.operation import INTENT, OUTCOME, READABLE, Journal, Report, outcome
 from motorbus.errors import LinkError
 from motorbus.families.stepper.driver.node import Node
 
@@ -24,7 +24,7 @@ class Unrecorded(NamedTuple):
     why: str
 
 
-def owed(node: Node, project: int) -> Operation[None]:
+async def owed(node: Node, project: int) -> None:
     """It is about to be started. Raises RequestError while something else is unfinished on this bus."""
     facts = {
         "node": node.node,
@@ -36,18 +36,18 @@ def owed(node: Node, project: int) -> Operation[None]:
     }
     node.memory.owed = True  # before it is written down: another run that ends now does not settle this one
     try:
-        yield from Report(Journal(RUN, INTENT, facts))
+        await Report(Journal(RUN, INTENT, facts))
     except BaseException:
         node.memory.owed = False
         raise
 
 
-def settled(node: Node, how: str) -> Operation[None]:
+async def settled(node: Node, how: str) -> None:
     """It runs no longer, or never did. Reports `Unrecorded` where the journal cannot be written.
 
     Where there is no journal, or that has another change open, there is nothing to do.
     """
     node.memory.owed = False
-    told = yield from outcome(iter(Report(Journal(RUN, OUTCOME, {"outcome": how}))))
+    told = await outcome(Report(Journal(RUN, OUTCOME, {"outcome": how})))
     if isinstance(told, LinkError):
-        yield from outcome(iter(Report(Unrecorded(how, told.summary))))
+        await outcome(Report(Unrecorded(how, told.summary)))

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from motorbus.core.family import Identity
-from motorbus.core.operation import Exchange, Operation
+from motorbus.core.operation import Exchange
 from motorbus.errors import NoReply
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.node import Node
@@ -22,18 +22,18 @@ MODEL: Final = "stepper controller"
 UNKNOWN: Final = "not told"
 
 
-def ping(node: Node) -> Operation[bool]:
+async def ping(node: Node) -> bool:
     """Is it there? Silence is the answer False."""
     try:
-        yield from dump_once(node, 1)
+        await dump_once(node, 1)
     except NoReply:
         return False
     return True
 
 
-def identify(node: Node) -> Operation[Identity]:
+async def identify(node: Node) -> Identity:
     """What is known: that it answers as such a controller does. It tells no model, no version and no number."""
-    yield from dump_once(node, 1)
+    await dump_once(node, 1)
     return Identity(node.node, MODEL, UNKNOWN, node.table.name, _details(node))
 
 

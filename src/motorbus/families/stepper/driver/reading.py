@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from motorbus.core.entry import Entry, Value
-from motorbus.core.operation import Exchange, Operation, Pause, Timeout
+from motorbus.core.operation import Exchange, Pause, Timeout
 from motorbus.errors import FramingError, RequestError, UnexpectedReply
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.exchanges import command
@@ -32,31 +32,31 @@ def dump_once(node: Node, project: int, timeout: Timeout | None = None) -> Excha
     return command(node, "read_project", bytes, project=project, timeout=timeout)
 
 
-def dump(node: Node, project: int = 1) -> Operation[bytes]:
+async def dump(node: Node, project: int = 1) -> bytes:
     """The 226 bytes of a project, 1 to 4, as two readings agree on them; about 0.5 s.
 
     Raises FramingError when the line is too bad for that, UnexpectedReply when what came twice is the image of another
     project. Reading changes nothing; with unsaved edits it shows those, or so it is assumed.
     """
-    return agreed(node, project, (yield from readings(node, project)))
+    return agreed(node, project, await readings(node, project))
 
 
-def image(node: Node, project: int) -> Operation[bytes]:
+async def image(node: Node, project: int) -> bytes:
     """The 220 bytes of a project, 1 to 4, without the six before them. Raises as `dump`."""
-    return (yield from dump(node, project))[wire.REPLY_LENGTH :]
+    return (await dump(node, project))[wire.REPLY_LENGTH :]
 
 
-def readings(node: Node, project: int, lasted: list[float] | None = None) -> Operation[list[bytes]]:
+async def readings(node: Node, project: int, lasted: list[float] | None = None) -> list[bytes]:
     """As many dumps of a project as it takes until they agree, at most five: `agreed` says what holds of them.
 
     How long each has `lasted` (s) is added to that list.
     """
     seen: list[bytes] = []
     while len(seen) < READINGS and not vote(seen):
-        began = yield from Pause(0)
-        seen.append((yield from dump_once(node, project)))
+        began = await Pause(0)
+        seen.append(await dump_once(node, project))
         if lasted is not None:
-            lasted.append((yield from Pause(0)) - began)
+            lasted.append(await Pause(0) - began)
     return seen
 
 
@@ -102,27 +102,27 @@ def _plausible(node: Node, data: bytes, project: int) -> None:
         )
 
 
-def read_project(node: Node, project: int = 1) -> Operation[Program]:
+async def read_project(node: Node, project: int = 1) -> Program:
     """A stored project, 1 to 4, as a program: checked, timed, drawn and kept as a file like any other.
 
     Raises RequestError when it holds what no project can, FramingError and UnexpectedReply as `dump`.
     """
-    return Program.from_dump((yield from dump(node, project)), name=f"project {project}", order=node.order)
+    return Program.from_dump(await dump(node, project), name=f"project {project}", order=node.order)
 
 
-def read(node: Node, /, *names: str, project: int = 1) -> Operation[dict[str, Value]]:
+async def read(node: Node, /, *names: str, project: int = 1) -> dict[str, Value]:
     """Parameters of a project in API units by name, all when none is named.
 
     Raises as `dump`, and RequestError for an unknown name.
     """
-    raws = yield from read_raw(node, *names, project=project)
+    raws = await read_raw(node, *names, project=project)
     return {name: node.value(node.table[name], raw) for name, raw in raws.items()}
 
 
-def read_raw(node: Node, /, *names: str, project: int = 1) -> Operation[dict[str, int]]:
+async def read_raw(node: Node, /, *names: str, project: int = 1) -> dict[str, int]:
     """The same as raw values."""
     rows: list[Entry] = [node.table[name] for name in names or node.table]
-    held = yield from image(node, project)
+    held = await image(node, project)
     return {row.name: row_value(held, row, node.order) for row in rows}
 
 

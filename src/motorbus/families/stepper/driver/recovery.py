@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final
 
-from motorbus.core.operation import REACHED, Alone, Journal, Operation, Report
+from motorbus.core.operation import REACHED, Alone, Journal, Report
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.stepper.driver import characterising, reading
 from motorbus.families.stepper.driver.borrowing import GIVEN_BACK, NOTE, PROJECT, Loan, given_back, loan_of
@@ -23,7 +23,7 @@ from motorbus.families.stepper.table import PROJECTS, Project, decode_image, dif
 RESUMED: Final = "recovering"
 
 
-def recover(node: Node, change: str, facts: Mapping[str, Any], *, alone: bool = False) -> Operation[str]:
+async def recover(node: Node, change: str, facts: Mapping[str, Any], *, alone: bool = False) -> str:
     """Give project 1 back that was borrowed when the host was cut off: `change` its verb, `facts` as the journal says.
 
     Stops the motor first. Gives "old" when project 1 reads as it was. May be called again at any point. `alone` makes
@@ -36,11 +36,11 @@ def recover(node: Node, change: str, facts: Mapping[str, Any], *, alone: bool = 
     reading raise. The journal stays open then.
     """
     if change == RUN:
-        yield from ended(node)
-        yield from settled(node, "stopped")
+        await ended(node)
+        await settled(node, "stopped")
         return "stopped"
     if change == characterising.VERB:
-        return (yield from characterising.recovered(node, facts))
+        return await characterising.recovered(node, facts)
     loan = loan_of(change, facts)
     for name, then, now in (
         ("dump_order", loan.order, node.order),
@@ -53,33 +53,33 @@ def recover(node: Node, change: str, facts: Mapping[str, Any], *, alone: bool = 
                 node=node.node,
             )
     try:
-        return (yield from Alone(_recovered(node, loan, facts)))
+        return await Alone(_recovered(node, loan, facts))
     except BaseException as error:
         if not isinstance(error, MotorbusError):  # one of ours says itself what is wrong
             error.add_note(NOTE)
         raise
 
 
-def _recovered(node: Node, loan: Loan, facts: Mapping[str, Any]) -> Operation[str]:
+async def _recovered(node: Node, loan: Loan, facts: Mapping[str, Any]) -> str:
     told = {**loan.facts(node), REACHED: list(facts.get(REACHED, ()))}
-    yield from Report(Journal(loan.verb, RESUMED, told))
-    yield from ended(node, BY_HAND)
-    yield from _refuse_written(node, loan)
+    await Report(Journal(loan.verb, RESUMED, told))
+    await ended(node, BY_HAND)
+    await _refuse_written(node, loan)
     loan.cut = True  # it may have turned until now
-    yield from given_back(node, loan)
+    await given_back(node, loan)
     return GIVEN_BACK
 
 
-def _refuse_written(node: Node, loan: Loan) -> Operation[None]:
+async def _refuse_written(node: Node, loan: Loan) -> None:
     """Raise RequestError where project 1 reads neither as it was nor as it was lent: that is somebody's work.
 
     A borrow that was cut off before it was read back may have left another project's numbers under this number.
     """
-    shown = yield from _project(node, PROJECT)
+    shown = await _project(node, PROJECT)
     strange = _unlike(shown, loan.before) & _unlike(shown, loan.wanted)
     if strange and not loan.seen:
         for number in range(PROJECT + 1, PROJECTS + 1):
-            if not strange & _unlike(shown, (yield from _project(node, number))):
+            if not strange & _unlike(shown, await _project(node, number)):
                 return
     if strange:
         raise RequestError(
@@ -91,8 +91,8 @@ def _refuse_written(node: Node, loan: Loan) -> Operation[None]:
         )
 
 
-def _project(node: Node, number: int) -> Operation[Project]:
-    return decode_image((yield from reading.image(node, number)), node.order)
+async def _project(node: Node, number: int) -> Project:
+    return decode_image(await reading.image(node, number), node.order)
 
 
 def _unlike(shown: Project, other: Project) -> set[str]:

@@ -22,6 +22,7 @@ from motorbus.core.operation import (
     Report,
     Stops,
     Together,
+    afterwards,
     outcome,
 )
 from motorbus.errors import (
@@ -56,7 +57,7 @@ _UNHEARD: Final = (OutcomeUnknown, NoReply, WireError)
 """What leaves it open whether a start was carried out."""
 
 
-def start_project(
+async def start_project(
     node: Node,
     project: int,
     *,
@@ -64,7 +65,7 @@ def start_project(
     endless: bool = False,
     stop_first: bool = False,
     expert: bool = False,
-) -> Operation[Plan]:
+) -> Plan:
     """Start a stored project, 1 to 4, without waiting for it; what it will do as `how` has it.
 
     It is read until two readings agree. Refused, with nothing started: a project without steps, one with lint errors
@@ -78,10 +79,10 @@ def start_project(
     """
     asked = _Asked(checked_project(project), _checked(how), endless, stop_first, expert)
     watch = Watch(node)
-    return (yield from honest(watch, iter(Alone(_started(node, asked, watch)))))
+    return await honest(watch, Alone(_started(node, asked, watch)))
 
 
-def run(
+async def run(
     node: Node,
     project: int,
     *,
@@ -91,7 +92,7 @@ def run(
     stop_first: bool = False,
     endless: bool = False,
     expert: bool = False,
-) -> Operation[Ran]:
+) -> Ran:
     """Start a stored project, 1 to 4, and wait for its end: `completed`, `stopped`, `timeout` or `unknown`.
 
     completed  its notice came, and could be true: after the acknowledgement, not before the project can be through in
@@ -122,27 +123,29 @@ def run(
     course = _Course(timeout, checked(watch))
     guard = Watch(node)
     branches = (_launched(node, asked, course, guard), _listening(course), _following(node, course))
-    yield from honest(guard, _waited(node, project, course, guard, branches))
+    await honest(guard, _waited(node, project, course, guard, branches))
     assert course.wait is not None, "a start that fails raises"
     assert course.wait.ran is not None, "a wait ends with an outcome"
     return course.wait.ran
 
 
-def _waited(
+async def _waited(
     node: Node, project: int, course: _Course, watch: Watch, branches: Iterable[Operation[None]]
-) -> Operation[None]:
-    """Carry the branches out; the journal is told of an end that is known, whatever else goes wrong."""
+) -> None:
+    """Run the branches; the journal gets an end that is known, whatever else goes wrong."""
+
+    async def settle() -> None:
+        if course.wait is not None and course.wait.ran is not None and not node.memory.owed:
+            await settled(node, course.wait.ran.outcome.value)
+
     try:
-        yield from Together([_failing(course, branch) for branch in branches])
+        await afterwards(Together([_failing(course, branch) for branch in branches]), settle)
     except MotorbusError:
         raise
     except BaseException as interruption:
         if watch.ordered:
             interruption.add_note(f"project {project} was started and goes on: nothing was sent to stop it")
         raise
-    finally:
-        if course.wait is not None and course.wait.ran is not None and not node.memory.owed:
-            yield from settled(node, course.wait.ran.outcome.value)
 
 
 # -- before it starts --------------------------------------------------------------------------------------------------
@@ -175,20 +178,20 @@ def _check_timeout(timeout: float | None, endless: bool) -> None:
     within(timeout, inf, "timeout")
 
 
-def _ready(node: Node, asked: _Asked, watch: Watch) -> Operation[Plan]:
+async def _ready(node: Node, asked: _Asked, watch: Watch) -> Plan:
     """Whether it may be started: its plan."""
     if asked.stop_first:
         watch.ended = True
-        yield from stopping.ended(node)
-        yield from settled(node, "stopped")
+        await stopping.ended(node)
+        await settled(node, "stopped")
     else:
-        yield from refuse_unless_idle(node, f"starting project {asked.project}")
-    yield from Report(Journal(RUN, ASKED, {"node": node.node}))
-    program = yield from reading.read_project(node, asked.project)
+        await refuse_unless_idle(node, f"starting project {asked.project}")
+    await Report(Journal(RUN, ASKED, {"node": node.node}))
+    program = await reading.read_project(node, asked.project)
     plan = program.plan(asked.how)
     _judge(program, plan, asked.endless, asked.expert)
     if asked.stop_first:
-        yield from Pause(slowing(program.project, asked.how))  # of this one, for the other is not known
+        await Pause(slowing(program.project, asked.how))  # of this one, for the other is not known
     return plan
 
 
@@ -217,13 +220,13 @@ def _judge(program: Program, plan: Plan, endless: bool, expert: bool) -> None:
 # -- the start: all of it alone, so that nothing of this bus moves or edits between the reading and the order ----------
 
 
-def _started(node: Node, asked: _Asked, watch: Watch) -> Operation[Plan]:
-    plan = yield from _ready(node, asked, watch)
-    yield from _begin(node, plan, watch)
+async def _started(node: Node, asked: _Asked, watch: Watch) -> Plan:
+    plan = await _ready(node, asked, watch)
+    await _begin(node, plan, watch)
     return plan
 
 
-def _begin(node: Node, plan: Plan, watch: Watch) -> Operation[float]:
+async def _begin(node: Node, plan: Plan, watch: Watch) -> float:
     """Send it; when it was acknowledged (s). It may run from the moment it leaves."""
     number, left = plan.project.number, False
 
@@ -234,13 +237,13 @@ def _begin(node: Node, plan: Plan, watch: Watch) -> Operation[float]:
 
     where = goals.of_project(node, plan.project, plan.how)
     said = motion(node, "start_project", where, overtaken, project=number)
-    yield from owed(node, number)
+    await owed(node, number)
     outputs.forget(node)
     try:
-        return (yield from timed(said))
+        return await timed(said)
     except (Refused, RequestError, Interrupted) as error:
         if not (isinstance(error, Interrupted) and left):
-            yield from settled(node, "not started")
+            await settled(node, "not started")
         raise
 
 
@@ -273,56 +276,56 @@ class _Course:
         return self.wait is not None and self.wait.heard(notice)
 
 
-def _failing(course: _Course, branch: Operation[None]) -> Operation[None]:
+async def _failing(course: _Course, branch: Operation[None]) -> None:
     try:
-        yield from branch
+        await branch
     except BaseException:
         course.failed = True
         raise
 
 
-def _launched(node: Node, asked: _Asked, course: _Course, watch: Watch) -> Operation[None]:
-    yield from Alone(_launching(node, asked, course, watch))
+async def _launched(node: Node, asked: _Asked, course: _Course, watch: Watch) -> None:
+    await Alone(_launching(node, asked, course, watch))
 
 
-def _launching(node: Node, asked: _Asked, course: _Course, watch: Watch) -> Operation[None]:
-    plan = yield from _ready(node, asked, watch)
-    course.levels = Levels((yield from inputs(node, course.ports)))
-    course.wait = wait = Wait(node.memory, plan, (yield from Pause(0)), course.timeout)
+async def _launching(node: Node, asked: _Asked, course: _Course, watch: Watch) -> None:
+    plan = await _ready(node, asked, watch)
+    course.levels = Levels(await inputs(node, course.ports))
+    course.wait = wait = Wait(node.memory, plan, await Pause(0), course.timeout)
     try:
-        wait.begun((yield from _begin(node, plan, watch)))
+        wait.begun(await _begin(node, plan, watch))
     except _UNHEARD as error:
         wait.unacknowledged(error)
 
 
-def _listening(course: _Course) -> Operation[None]:
+async def _listening(course: _Course) -> None:
     """Nothing but listen: there is a listener also while the other branch reads inputs."""
     while not course.over:
-        yield from Listen(course.heard, AGAIN)
+        await Listen(course.heard, AGAIN)
 
 
-def _following(node: Node, course: _Course) -> Operation[None]:
+async def _following(node: Node, course: _Course) -> None:
     """Look at the clock, tell where it should be, and read the inputs that are watched."""
     while course.wait is None and not course.failed:
-        yield from Pause(SOON / 10)  # less than a start takes on the line: its beginning is not missed
+        await Pause(SOON / 10)  # less than a start takes on the line: its beginning is not missed
     if course.wait is not None:
-        yield from _followed(node, course, course.wait, course.levels)
+        await _followed(node, course, course.wait, course.levels)
 
 
-def _followed(node: Node, course: _Course, wait: Wait, levels: Levels) -> Operation[None]:
+async def _followed(node: Node, course: _Course, wait: Wait, levels: Levels) -> None:
     twin: Twin | None = None
     told = -inf
     while not course.over:
-        now = yield from Pause(0)
+        now = await Pause(0)
         if not wait.pending and twin is None:
             active = frozenset(port for port, level in levels.believed.items() if level)
             twin = Twin(wait.plan, wait.start, active)
         if twin is not None and now - told >= TICK:
             told = now
-            yield from Report(twin.told(now))
-        yield from _reading(node, wait, levels, twin)
-        yield from Listen(wait.heard, _patience(wait, levels, now))
-        wait.look((yield from Pause(0)))
+            await Report(twin.told(now))
+        await _reading(node, wait, levels, twin)
+        await Listen(wait.heard, _patience(wait, levels, now))
+        wait.look(await Pause(0))
 
 
 def _patience(wait: Wait, levels: Levels, now: float) -> float:
@@ -333,23 +336,23 @@ def _patience(wait: Wait, levels: Levels, now: float) -> float:
     return min(pause, left) if left > 0 else pause
 
 
-def _reading(node: Node, wait: Wait, levels: Levels, twin: Twin | None) -> Operation[None]:
+async def _reading(node: Node, wait: Wait, levels: Levels, twin: Twin | None) -> None:
     """Read each watched input once; a reading that fails tells nothing."""
     if wait.pending or twin is None:
         return
     for port in levels.believed:
-        active = yield from outcome(reading.read_input(node, port))
+        active = await outcome(reading.read_input(node, port))
         if isinstance(active, NoReply | WireError):
             continue
         if isinstance(active, MotorbusError):
             raise active
-        change = levels.take(port, active, (yield from Pause(0)))
+        change = levels.take(port, active, await Pause(0))
         if change is None:
             continue
         twin.press(port, change.active, max(change.at, wait.start))
         if port == STOP_INPUT and change.active:
             wait.button()
-        yield from Report(change)
+        await Report(change)
 
 
 __all__ = ["TICK", "Outcome", "Ran", "run", "start_project"]

@@ -12,7 +12,6 @@ from motorbus.core.family import Found
 from motorbus.core.operation import (
     Alone,
     Data,
-    Operation,
     Progress,
     Report,
     Timeout,
@@ -35,9 +34,7 @@ class Sends(NamedTuple):
     rate: int
 
 
-def scan(
-    ids: Sequence[int] = (), rates: Sequence[int] = (), motor: int = wire.MOTOR
-) -> Operation[list[Found]]:
+async def scan(ids: Sequence[int] = (), rates: Sequence[int] = (), motor: int = wire.MOTOR) -> list[Found]:
     """The controller of this line, if it answers; `rates` () is the present one, which is set again in the end.
 
     Reports `Sends`, `Progress` and `Found`. Raises RequestError for an id that no
@@ -45,31 +42,31 @@ def scan(
     """
     for node in ids:
         checked_id(node)
-    present = yield from Tune(0)
+    present = await Tune(0)
     if not rates or tuple(rates) == (present,):
-        return (yield from _at(present, motor))
-    return (yield from Alone(afterwards(_everywhere(rates, motor), lambda: iter(Tune(present)))))
+        return await _at(present, motor)
+    return await Alone(afterwards(_everywhere(rates, motor), lambda: Tune(present)))
 
 
-def _everywhere(rates: Sequence[int], motor: int) -> Operation[list[Found]]:
+async def _everywhere(rates: Sequence[int], motor: int) -> list[Found]:
     found: list[Found] = []
     for rate in rates:
-        yield from Tune(rate)
-        found += yield from _at(rate, motor)
+        await Tune(rate)
+        found += await _at(rate, motor)
     return found
 
 
-def _at(rate: int, motor: int) -> Operation[list[Found]]:
+async def _at(rate: int, motor: int) -> list[Found]:
     node = Node(motor=motor)
     for number in range(PASSES):
         asked = dump_once(node, 1, timeout=Timeout.SCAN)
-        yield from Report(Sends(asked.request, rate))
-        yield from Report(Progress(number, PASSES, f"reading project 1 at {rate} bit/s"))
+        await Report(Sends(asked.request, rate))
+        await Report(Progress(number, PASSES, f"reading project 1 at {rate} bit/s"))
         try:
-            yield from asked
+            await asked
         except (NoReply, WireError):
             continue
-        yield from Report(Found(node.node, rate, None))
-        return [Found(node.node, rate, (yield from identify(node)))]
-    yield from Report(Progress(PASSES, PASSES, f"nobody at {rate} bit/s"))
+        await Report(Found(node.node, rate, None))
+        return [Found(node.node, rate, await identify(node))]
+    await Report(Progress(PASSES, PASSES, f"nobody at {rate} bit/s"))
     return []

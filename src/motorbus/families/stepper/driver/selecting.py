@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Alone, Operation, Pause, Report, outcome
+from motorbus.core.operation import Alone, Pause, Report, outcome
 from motorbus.errors import OutcomeUnknown, RequestError, WireError
 from motorbus.families.stepper.driver import commands
 from motorbus.families.stepper.driver.costs import taken
@@ -41,7 +41,7 @@ class EditsLost(NamedTuple):
     changes: tuple[Change, ...]
 
 
-def select(node: Node, project: int) -> Operation[int]:
+async def select(node: Node, project: int) -> int:
     """Select a project, 1 to 4, without changing what is stored of it; gives how many steps it has.
 
     It is read before, for the command says how many steps there are, and read after. Edits that were not saved are
@@ -50,12 +50,12 @@ def select(node: Node, project: int) -> Operation[int]:
     under this number.
     """
     checked_project(project)
-    return (yield from Alone(_selected(node, project)))
+    return await Alone(_selected(node, project))
 
 
-def _selected(node: Node, project: int) -> Operation[int]:
-    yield from refuse_while_lent(node, "select")
-    before = held(node, (yield from taken(node, project)).image, project)
+async def _selected(node: Node, project: int) -> int:
+    await refuse_while_lent(node, "select")
+    before = held(node, (await taken(node, project)).image, project)
     if before.is_cleared:
         raise RequestError(
             f"project {project} has been cleared: selecting it would give it a step",
@@ -63,18 +63,18 @@ def _selected(node: Node, project: int) -> Operation[int]:
             advice="write it; nothing was changed",
             node=node.node,
         )
-    yield from selected(node, before)
-    shown = held(node, (yield from read_back(node, before))[0], project)
+    await selected(node, before)
+    shown = held(node, (await read_back(node, before))[0], project)
     if shown != before:
-        yield from _told_apart(node, before, shown)
+        await _told_apart(node, before, shown)
     return before.total_steps
 
 
-def _told_apart(node: Node, before: Project, shown: Project) -> Operation[None]:
+async def _told_apart(node: Node, before: Project, shown: Project) -> None:
     """It reads otherwise once it is selected: its own edits were lost, or what is edited is another project's."""
     others = [number for number in range(1, PROJECTS + 1) if number != before.number]
     for number in others:
-        theirs = decode_image((yield from image(node, number)), node.order)
+        theirs = decode_image(await image(node, number), node.order)
         if replace(theirs, number=before.number, total_steps=before.total_steps) == shown:
             raise differs(
                 node, encode_image(shown, node.order), before,
@@ -83,10 +83,10 @@ def _told_apart(node: Node, before: Project, shown: Project) -> Operation[None]:
                 "back what is stored",
             )  # fmt: skip
     node.memory.unsaved = None
-    yield from Report(EditsLost(before.number, tuple(changes(before, shown))))
+    await Report(EditsLost(before.number, tuple(changes(before, shown))))
 
 
-def save(node: Node, project: int, *, expert: bool = False) -> Operation[Written]:
+async def save(node: Node, project: int, *, expert: bool = False) -> Written:
     """Save what this host has edited of a project, 1 to 4, and not saved, as `write_project` saves what it writes.
 
     All of it is written once more before, behind the command that selects it: nobody can ask which project is being
@@ -99,9 +99,9 @@ def save(node: Node, project: int, *, expert: bool = False) -> Operation[Written
     number = checked_project(project)
     meant = node.memory.unsaved
     if meant is not None and meant.number == number:
-        return (yield from Alone(_kept(node, meant)))
+        return await Alone(_kept(node, meant))
     if expert:
-        return (yield from Alone(_saved_as_is(node, number)))
+        return await Alone(_saved_as_is(node, number))
     raise RequestError(
         f"nothing of project {number} was edited on this bus and left unsaved",
         expected="edits of this host: saving stores whatever is being edited, also another project",
@@ -110,32 +110,32 @@ def save(node: Node, project: int, *, expert: bool = False) -> Operation[Written
     )
 
 
-def _kept(node: Node, meant: Project) -> Operation[Written]:
-    yield from refuse_while_lent(node, "save")
-    began = yield from Pause(0)
-    found = yield from taken(node, meant.number)
-    return (yield from written(node, found, meant, found.image, save=True, began=began))
+async def _kept(node: Node, meant: Project) -> Written:
+    await refuse_while_lent(node, "save")
+    began = await Pause(0)
+    found = await taken(node, meant.number)
+    return await written(node, found, meant, found.image, save=True, began=began)
 
 
-def _saved_as_is(node: Node, project: int) -> Operation[Written]:
-    yield from refuse_while_lent(node, "save")
-    began = yield from Pause(0)
-    found = yield from taken(node, project)
+async def _saved_as_is(node: Node, project: int) -> Written:
+    await refuse_while_lent(node, "save")
+    began = await Pause(0)
+    found = await taken(node, project)
     before = held(node, found.image, project)
     note = f"project {project} was being saved: what it holds is not known; read it"
-    yield from noted(commands.save_project(node, project), note)
-    now, dumps = yield from noted(read_back(node, before), note)
+    await noted(commands.save_project(node, project), note)
+    now, dumps = await noted(read_back(node, before), note)
     if held(node, now, project) != before:
         raise differs(
             node, now, before, f"project {project} was saved and does not read as before",
             "another project was being edited, or this controller shows what is stored; write it if it is not as meant",
         )  # fmt: skip
-    ended = yield from Pause(0)
+    ended = await Pause(0)
     spent = found.dumps + dumps
     return Written(project, (), 1, spent, ended - began, True, Proof.AS_BEFORE, unwritable(now, b""))
 
 
-def clear(node: Node, project: int, *, expert: bool = False) -> Operation[bytes]:
+async def clear(node: Node, project: int, *, expert: bool = False) -> bytes:
     """Set all of a project, 1 to 4, to zero, stored and edited; gives the 220 bytes it had, which `Program` reads.
 
     Nothing is sent when it reads as cleared already. Project 1 is refused but to an `expert`: jog, single move and
@@ -153,22 +153,22 @@ def clear(node: Node, project: int, *, expert: bool = False) -> Operation[bytes]
             advice="with expert=True it is cleared all the same; nothing was sent",
             node=node.node,
         )
-    return (yield from Alone(_emptied(node, number)))
+    return await Alone(_emptied(node, number))
 
 
-def _emptied(node: Node, project: int) -> Operation[bytes]:
-    yield from refuse_while_lent(node, "clear")
-    found = yield from taken(node, project)
+async def _emptied(node: Node, project: int) -> bytes:
+    await refuse_while_lent(node, "clear")
+    found = await taken(node, project)
     if not is_blank(decode_image(found.image, node.order)):
-        yield from cleared(node, project)
+        await cleared(node, project)
     return found.image
 
 
-def cleared(node: Node, project: int) -> Operation[tuple[int, int]]:
+async def cleared(node: Node, project: int) -> tuple[int, int]:
     """Clear a project and read it; gives how many commands and dumps that took. Call it inside `Alone`."""
     note = f"project {project} was being cleared: it may hold what it held, or nothing"
-    tries = yield from noted(_until_cleared(node, project), note)
-    now, dumps = yield from noted(read_until(node, project, is_blank), note)
+    tries = await noted(_until_cleared(node, project), note)
+    now, dumps = await noted(read_until(node, project, is_blank), note)
     if not is_blank(decode_image(now, node.order)):
         raise differs(
             node, now, Project(), f"project {project} was cleared and does not read as cleared",
@@ -179,13 +179,13 @@ def cleared(node: Node, project: int) -> Operation[tuple[int, int]]:
     return tries, dumps
 
 
-def _until_cleared(node: Node, project: int) -> Operation[int]:
-    told = yield from outcome(commands.clear_project(node, project))
+async def _until_cleared(node: Node, project: int) -> int:
+    told = await outcome(commands.clear_project(node, project))
     if told is None:
         return 1
     if not isinstance(told, OutcomeUnknown | WireError):
         raise told
-    yield from commands.clear_project(node, project)
+    await commands.clear_project(node, project)
     return 2
 
 

@@ -13,7 +13,7 @@ from math import inf
 from typing import Final
 
 from motorbus.core.family import Stop
-from motorbus.core.operation import Answer, Exchange, Operation, Rank, outcome
+from motorbus.core.operation import Answer, Exchange, Rank, outcome
 from motorbus.errors import Interrupted, LinkError, MotorbusError, OutcomeUnknown
 from motorbus.families.stepper.driver.commands import nothing
 from motorbus.families.stepper.driver.exchanges import command
@@ -37,7 +37,7 @@ class Promise(Enum):
     )
 
 
-def stop(node: Node) -> Operation[Promise]:
+async def stop(node: Node) -> Promise:
     """End the project, then any other motion. Returns what was promised.
 
     Both are said, then each again that was not accepted, up to five times. From its first word on no motion and no
@@ -45,12 +45,12 @@ def stop(node: Node) -> Operation[Promise]:
     been heard all the same, and the motor may be turning as well; LinkError when the port is gone.
     """
     node.memory.wanted += 1
-    promise = yield from ended(node)
-    yield from settled(node, "stopped")
+    promise = await ended(node)
+    await settled(node, "stopped")
     return promise
 
 
-def ended(node: Node, names: tuple[str, ...] = STOPS) -> Operation[Promise]:
+async def ended(node: Node, names: tuple[str, ...] = STOPS) -> Promise:
     """The same, as part of a longer work: what others have asked for meanwhile is not called off by it."""
     failures: dict[str, MotorbusError] = {}
     times = 0
@@ -58,7 +58,7 @@ def ended(node: Node, names: tuple[str, ...] = STOPS) -> Operation[Promise]:
     try:
         while times < TRIES:
             times += 1
-            failures = yield from _said(node, tuple(failures) or names)
+            failures = await _said(node, tuple(failures) or names)
             if not failures or any(isinstance(told, LinkError | Interrupted) for told in failures.values()):
                 break
         if failures:
@@ -71,11 +71,11 @@ def ended(node: Node, names: tuple[str, ...] = STOPS) -> Operation[Promise]:
     return Promise.STOP_ACCEPTED
 
 
-def _said(node: Node, names: tuple[str, ...]) -> Operation[dict[str, MotorbusError]]:
+async def _said(node: Node, names: tuple[str, ...]) -> dict[str, MotorbusError]:
     """Say each of them once; what was told of those that were not accepted."""
     failures = {}
     for name in names:
-        told = yield from outcome(command(node, name, nothing, rank=Rank.STOP))
+        told = await outcome(command(node, name, nothing, rank=Rank.STOP))
         if told is not None:
             failures[name] = told
     return failures

@@ -17,7 +17,7 @@ from math import ceil, inf, isfinite
 from sys import float_info
 from typing import Final, NamedTuple, TypeVar
 
-from motorbus.core.operation import Operation, Pause, Progress, Report, Runnable, Stops
+from motorbus.core.operation import Pause, Progress, Report, Runnable, Stops
 from motorbus.errors import Interrupted, MotorbusError, OutcomeUnknown, Refused, RequestError
 from motorbus.families.stepper import execution
 from motorbus.families.stepper.driver.node import Node
@@ -104,13 +104,13 @@ def _stopped(when: str, state: str) -> Interrupted:
     )
 
 
-def honest(watch: Watch, runnable: Runnable[T]) -> Operation[T]:
+async def honest(watch: Watch, runnable: Runnable[T]) -> T:
     """Carry out what may move the motor; an error from before the order has left says so, it is `unmoved`.
 
     A RequestError is always from before: one that comes behind the order becomes OutcomeUnknown.
     """
     try:
-        return (yield from runnable)
+        return await runnable
     except MotorbusError as error:
         ordered = watch.ordered and not isinstance(error, Refused)  # of the gate, which is asked last
         error.unmoved = not (ordered or watch.ended)
@@ -129,18 +129,18 @@ def _afterwards(error: RequestError) -> OutcomeUnknown:
     )
 
 
-def waited(watch: Watch, seconds: float, what: str) -> Operation[None]:
+async def waited(watch: Watch, seconds: float, what: str) -> None:
     """Let so much time (s) pass while something turns; reports `Progress` in ms, by the clock alone.
 
     Raises Interrupted when somebody has stopped it.
     """
-    began = now = yield from Pause(0)
+    began = now = await Pause(0)
     end = (
         began + seconds
     )  # a moment to compare with: what is left of a time may be rounded to nothing, again and again
     while now < end:
-        yield from Report(Progress(round(1000 * (now - began)), round(1000 * seconds), f"{what}, estimated"))
-        now = yield from Pause(min(LOOK, end - now))
+        await Report(Progress(round(1000 * (now - began)), round(1000 * seconds), f"{what}, estimated"))
+        now = await Pause(min(LOOK, end - now))
         watch.check()
 
 
@@ -169,9 +169,9 @@ def _readings(how: Behaviour = USUAL) -> list[Behaviour]:
     return [how, *(replace(how, **changes) for changes in READINGS.values())]
 
 
-def refuse_unless_idle(node: Node, what: str) -> Operation[None]:
+async def refuse_unless_idle(node: Node, what: str) -> None:
     """Raise RequestError while something that was begun on this bus may still turn: `what` would end it half-way."""
-    now = yield from Pause(0)
+    now = await Pause(0)
     if not node.memory.owed and node.memory.turning <= now:
         return
     begun = "a project that was started may still run" if node.memory.owed else "a move may not be over"

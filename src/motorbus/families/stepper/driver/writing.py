@@ -17,7 +17,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from motorbus.core.entry import Entry, Value
-from motorbus.core.operation import Alone, Operation, Pause, Report, outcome
+from motorbus.core.operation import Alone, Pause, Report, outcome
 from motorbus.errors import MotorbusError, OutcomeUnknown, RequestError, WireError
 from motorbus.families.stepper.driver.commands import save_project
 from motorbus.families.stepper.driver.costs import Cost, Taken, taken
@@ -158,9 +158,9 @@ class Kept(NamedTuple):
     proof: Proof
 
 
-def difference(
+async def difference(
     node: Node, program: Program, project: int | None = None, *, save: bool = True
-) -> Operation[Difference]:
+) -> Difference:
     """What `write_project` would write, and its cost; only reads.
 
     The cost is that of a controller that does as is assumed, or is known on this bus to show what is stored. One that
@@ -168,13 +168,13 @@ def difference(
     Raises RequestError as `write_project` does for what no project can hold, and as `dump`.
     """
     number, wanted = _wanted(program, project)
-    found = yield from Alone(taken(node, number))
+    found = await Alone(taken(node, number))
     return compared(node, found, _meant(node, found, wanted), program.raw, save=save)
 
 
-def write_project(
+async def write_project(
     node: Node, program: Program, project: int | None = None, *, save: bool = True, expert: bool = False
-) -> Operation[Written]:
+) -> Written:
     """Write a program into project 1 to 4, its own number when none is said, save it, and read it back.
 
     Only what differs is sent, nothing when nothing does; rows behind its last step stay as they are. All of it is sent
@@ -194,10 +194,10 @@ def write_project(
     """
     number, wanted = _wanted(program, project)
     _linted(program, wanted, expert)
-    return (yield from Alone(_written(node, number, wanted, program.raw, save)))
+    return await Alone(_written(node, number, wanted, program.raw, save))
 
 
-def write(node: Node, /, *, project: int = 1, save: bool = True, **values: Value) -> Operation[Written]:
+async def write(node: Node, /, *, project: int = 1, save: bool = True, **values: Value) -> Written:
     """Write parameters of a project by name, in API units, as `write_project` does: `write(step_3_delay=0.5)`.
 
     All are checked before anything is sent, each by itself; whether they make a good project is said by its lint, and
@@ -206,36 +206,36 @@ def write(node: Node, /, *, project: int = 1, save: bool = True, **values: Value
     """
     checked_project(project)
     raws = {name: _raw(node, node.table[name], value) for name, value in values.items()}
-    return (yield from Alone(_amended(node, project, raws, save)))
+    return await Alone(_amended(node, project, raws, save))
 
 
-def written(
+async def written(
     node: Node, found: Taken, meant: Project, raw: bytes, *, save: bool, began: float
-) -> Operation[Written]:
+) -> Written:
     """Bring a project that was just read to `meant` in all ten rows, and save it. Call it inside `Alone`."""
     plan = compared(node, found, meant, raw, save=save)
     if not plan:
         unread = Readback(found.image, "untold", 0, 0)
-        return (yield from _done(plan, unread, found.dumps, began, Proof.UNCHANGED))
+        return await _done(plan, unread, found.dumps, began, Proof.UNCHANGED)
     alike = held(node, found.image, meant.number) == meant
     if not alike:
         node.memory.unsaved = None
-    yield from Report(Planned(plan))
+    await Report(Planned(plan))
     # nobody can ask which project is being edited: where the reading finds nothing to send, all of it is sent
-    edited = yield from brought(node, found.image, meant, every=alike)
+    edited = await brought(node, found.image, meant, every=alike)
     if not save:
         node.memory.unsaved = meant
         proof = Proof.NOT_SEEN if edited.view == "stored" else Proof.NOT_SAVED
-        return (yield from _done(plan, edited, found.dumps, began, proof))
-    kept = yield from saved(node, meant, edited)
+        return await _done(plan, edited, found.dumps, began, proof)
+    kept = await saved(node, meant, edited)
     node.memory.unsaved = None
     spent = edited._replace(commands=edited.commands + kept.commands, dumps=edited.dumps + kept.dumps)
-    return (yield from _done(plan, spent, found.dumps, began, kept.proof, saved=True))
+    return await _done(plan, spent, found.dumps, began, kept.proof, saved=True)
 
 
-def saved(node: Node, meant: Project, edited: Readback) -> Operation[Kept]:
+async def saved(node: Node, meant: Project, edited: Readback) -> Kept:
     """Save what has just been brought to be `meant`, and read it back. Raises as `write_project`."""
-    kept = yield from noted(
+    kept = await noted(
         _saved(node, meant, edited),
         f"project {meant.number} was being saved: it may hold the old values or the new ones; read it, and write it "
         "again if it is not as meant",
@@ -248,17 +248,17 @@ def saved(node: Node, meant: Project, edited: Readback) -> Operation[Kept]:
     return kept._replace(proof=Proof.STORED) if edited.view == "stored" else kept
 
 
-def _saved(node: Node, meant: Project, edited: Readback) -> Operation[Kept]:
-    told = yield from outcome(save_project(node, meant.number))
+async def _saved(node: Node, meant: Project, edited: Readback) -> Kept:
+    told = await outcome(save_project(node, meant.number))
     if isinstance(told, MotorbusError) and not isinstance(told, OutcomeUnknown | WireError):
         raise told
-    image, dumps = yield from read_back(node, meant)
+    image, dumps = await read_back(node, meant)
     as_meant = held(node, image, meant.number) == meant
     if told is None or (as_meant and edited.view == "stored"):
         return Kept(image, 1, dumps, Proof.ACKNOWLEDGED)
-    again = yield from brought(node, image, meant, every=True)
-    yield from save_project(node, meant.number)
-    image, last = yield from read_back(node, meant)
+    again = await brought(node, image, meant, every=True)
+    await save_project(node, meant.number)
+    image, last = await read_back(node, meant)
     return Kept(image, 2 + again.commands, dumps + again.dumps + last, Proof.ACKNOWLEDGED)
 
 
@@ -285,17 +285,17 @@ def unwritable(image: bytes, wanted: bytes) -> dict[int, int]:
     return {at: image[at] for run in RESERVED for at in run if image[at] != other[at]}
 
 
-def _written(node: Node, number: int, wanted: Project, raw: bytes, save: bool) -> Operation[Written]:
-    yield from refuse_while_lent(node, "write_project")
-    began = yield from Pause(0)
-    found = yield from taken(node, number)
-    return (yield from written(node, found, _meant(node, found, wanted), raw, save=save, began=began))
+async def _written(node: Node, number: int, wanted: Project, raw: bytes, save: bool) -> Written:
+    await refuse_while_lent(node, "write_project")
+    began = await Pause(0)
+    found = await taken(node, number)
+    return await written(node, found, _meant(node, found, wanted), raw, save=save, began=began)
 
 
-def _amended(node: Node, number: int, raws: Mapping[str, int], save: bool) -> Operation[Written]:
-    yield from refuse_while_lent(node, "write")
-    began = yield from Pause(0)
-    found = yield from taken(node, number)
+async def _amended(node: Node, number: int, raws: Mapping[str, int], save: bool) -> Written:
+    await refuse_while_lent(node, "write")
+    began = await Pause(0)
+    found = await taken(node, number)
     before = held(node, found.image, number)
     if before.is_cleared and "total_steps" not in raws:
         raise RequestError(
@@ -305,13 +305,13 @@ def _amended(node: Node, number: int, raws: Mapping[str, int], save: bool) -> Op
             node=node.node,
         )
     meant = amended(before, raws)
-    return (yield from written(node, found, meant, found.image, save=save, began=began))
+    return await written(node, found, meant, found.image, save=save, began=began)
 
 
-def _done(
+async def _done(
     plan: Difference, spent: Readback, before: int, began: float, proof: Proof, *, saved: bool = False
-) -> Operation[Written]:
-    now = yield from Pause(0)
+) -> Written:
+    now = await Pause(0)
     dumps = before + spent.dumps
     return Written(
         plan.project,

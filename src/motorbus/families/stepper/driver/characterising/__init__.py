@@ -22,7 +22,6 @@ from motorbus.core.operation import (
     OUTCOME,
     Alone,
     Journal,
-    Operation,
     Report,
     afterwards,
     outcome,
@@ -73,7 +72,7 @@ _FACTS: Final = ("node", "what", "project", "image")
 _NOMINAL: Final = Project(microsteps=8, step_angle=180)
 
 
-def characterise(node: Node, *, scratch: int = 4, travel: float = 1.0) -> Operation[Profile]:
+async def characterise(node: Node, *, scratch: int = 4, travel: float = 1.0) -> Profile:
     """Find out what can be found out: one to two minutes, in which the motor turns now and then.
 
     Take the load off the motor first: it goes by up to 240 RPM, never more than `travel` turns (0.5 to 100) each way
@@ -93,7 +92,7 @@ def characterise(node: Node, *, scratch: int = 4, travel: float = 1.0) -> Operat
     checked_project(scratch)
     if not (isfinite(travel) and LEAST_TRAVEL <= travel <= MOST_TRAVEL):
         raise _refused(f"travel: {travel!r} turns", f"{LEAST_TRAVEL:g} to {MOST_TRAVEL:g}")
-    return (yield from Alone(_characterised(node, scratch, travel)))
+    return await Alone(_characterised(node, scratch, travel))
 
 
 def experiments(*, travel: float = 1.0) -> tuple[Experiment, ...]:
@@ -106,7 +105,7 @@ def experiments(*, travel: float = 1.0) -> tuple[Experiment, ...]:
     return (*before, *map(Experiment.of, trials(motor, 4, 3)), ramp_experiment(travel))
 
 
-def recovered(node: Node, facts: Mapping[str, Any]) -> Operation[str]:
+async def recovered(node: Node, facts: Mapping[str, Any]) -> str:
     """Put back what was edited when the host was cut off, `facts` being what the journal says. Gives "old".
 
     Raises RequestError, with nothing sent, for facts of something else; else as `characterise`.
@@ -124,7 +123,7 @@ def recovered(node: Node, facts: Mapping[str, Any]) -> Operation[str]:
             expected="what the journal of the bus holds",
             advice="nothing was sent",
         )
-    yield from Alone(put_back(Node(node.node, node.motor, order, node.memory), image, known))
+    await Alone(put_back(Node(node.node, node.motor, order, node.memory), image, known))
     return GIVEN_BACK
 
 
@@ -132,14 +131,14 @@ def _refused(what: str, expected: str) -> RequestError:
     return RequestError(what, expected=expected, advice="nothing was sent")
 
 
-def _characterised(node: Node, scratch: int, travel: float) -> Operation[Profile]:
-    yield from refuse_unless_idle(node, f"{VERB}()")
+async def _characterised(node: Node, scratch: int, travel: float) -> Profile:
+    await refuse_unless_idle(node, f"{VERB}()")
     _refuse_unsaved(node)
-    yield from Report(Journal(VERB, ASKED, {"node": node.node}))
-    yield from ended(node)
+    await Report(Journal(VERB, ASKED, {"node": node.node}))
+    await ended(node)
     stored: dict[int, bytes] = {}
     for number in range(1, PROJECTS + 1):
-        stored[number] = yield from reading.image(node, number)
+        stored[number] = await reading.image(node, number)
     order = likely_order(tuple(stored.values()), node.order)
     home = _home(stored, order, scratch)
     here = Node(node.node, node.motor, order, node.memory)
@@ -147,19 +146,19 @@ def _characterised(node: Node, scratch: int, travel: float) -> Operation[Profile
     case = Case(here, scratch, travel, stored, home if lent.pulses_per_turn is None else scratch)
     facts = _facts(node, stored, home)
     node.memory.commanded(tuple(range(1, OUTPUTS + 1)), None)
-    yield from Report(Journal(VERB, INTENT, facts))
+    await Report(Journal(VERB, INTENT, facts))
     try:
-        found = yield from afterwards(studied(case), lambda: _returned(case, stored[home], facts))
+        found = await afterwards(studied(case), lambda: _returned(case, stored[home], facts))
     except BaseException as error:
         if not case.returned:
             error.add_note(NOTE)
         raise
-    yield from _compared(case.node, stored)
+    await _compared(case.node, stored)
     return found
 
 
-def _returned(case: Case, image: bytes, facts: Mapping[str, Any]) -> Operation[None]:
-    yield from put_back(case.node, image, facts, case.seen)
+async def _returned(case: Case, image: bytes, facts: Mapping[str, Any]) -> None:
+    await put_back(case.node, image, facts, case.seen)
     case.returned = True
 
 
@@ -177,30 +176,30 @@ def _refuse_unsaved(node: Node) -> None:
         )
 
 
-def put_back(node: Node, image: bytes, facts: Mapping[str, Any], seen: bool = False) -> Operation[None]:
+async def put_back(node: Node, image: bytes, facts: Mapping[str, Any], seen: bool = False) -> None:
     """Stop it, let what is edited be the project of these facts again, with this image, and say so.
 
     `seen` says that reading shows what is edited: then every field is sent only where a reading says that it must be.
     """
-    yield from ended(node)
+    await ended(node)
     for left in reversed(range(TRIES)):
-        told = yield from outcome(_edited_again(node, image, int(facts["project"]), seen))
+        told = await outcome(_edited_again(node, image, int(facts["project"]), seen))
         if told is None:
             break
         if isinstance(told, LinkError) or not left:
             raise told
-    yield from Report(Journal(VERB, OUTCOME, {"outcome": GIVEN_BACK, **facts}))
+    await Report(Journal(VERB, OUTCOME, {"outcome": GIVEN_BACK, **facts}))
 
 
-def _edited_again(node: Node, image: bytes, number: int, seen: bool) -> Operation[None]:
+async def _edited_again(node: Node, image: bytes, number: int, seen: bool) -> None:
     project = replace(decode_image(image, node.order), number=number)
-    yield from brought(node, BLANK if seen else image, project, every=not seen)
+    await brought(node, BLANK if seen else image, project, every=not seen)
 
 
-def _compared(node: Node, stored: Mapping[int, bytes]) -> Operation[None]:
+async def _compared(node: Node, stored: Mapping[int, bytes]) -> None:
     """See that all of them read as before. Raises VerificationFailed when one does not."""
     for number, image in stored.items():
-        now = yield from reading.image(node, number)
+        now = await reading.image(node, number)
         if _carried_out(now, node.order) != _carried_out(image, node.order):
             raise VerificationFailed(
                 f"project {number} does not read as it did before the experiments",

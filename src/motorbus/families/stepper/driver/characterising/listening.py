@@ -6,7 +6,7 @@ answered is the same each time, and comes out of runs whose time is known.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Final, NamedTuple
 
 from motorbus.core.operation import (
@@ -14,10 +14,8 @@ from motorbus.core.operation import (
     Goal,
     Listen,
     Notice,
-    Operation,
     Pause,
     Rank,
-    Step,
     Together,
     outcome,
 )
@@ -50,14 +48,14 @@ class Heard(NamedTuple):
     notices: tuple[float, ...]
 
 
-def write(node: Node, project: Project, *, leave: str = "") -> Operation[None]:
+async def write(node: Node, project: Project, *, leave: str = "") -> None:
     """Edit every field that carrying out this project heeds, but none that may be the device's; nothing is saved.
 
     Which numbers were there before does not matter then. `leave` names a command that is left out.
     """
     for edit in edits(project):
         if edit.command not in FLAGS and edit.command != leave:
-            yield from told(node, edit)
+            await told(node, edit)
 
 
 def told(node: Node, edit: Edit) -> Exchange[None]:
@@ -66,9 +64,9 @@ def told(node: Node, edit: Edit) -> Exchange[None]:
     return command(node, edit.command, nothing, rank=Rank.CONFIGURATION, **values)
 
 
-def listened(
+async def listened(
     node: Node, watch: Watch, project: Project, acts: Sequence[Act], seconds: float, wanted: int = 1
-) -> Operation[Heard]:
+) -> Heard:
     """Say these commands at their moments, and listen until so many notices have come, for `seconds` at most.
 
     What is not answered is no error here. In the end everything is stopped. Raises Interrupted when somebody else has
@@ -80,36 +78,36 @@ def listened(
         notices.append(notice.at)
         return len(notices) >= wanted
 
-    yield from outcome(read_input(node, 1))
-    yield from Pause(QUIET)
+    await outcome(read_input(node, 1))
+    await Pause(QUIET)
     node.memory.owed = True
-    said, _ = yield from Together[Any]([_said(node, watch, project, acts), _listening(heard, seconds)])
+    said, _ = await Together[Any]([_said(node, watch, project, acts), _listening(heard, seconds)])
     if watch.overtaken:
         raise Interrupted(
             "somebody stopped the controller during an experiment",
             advice="characterise it again when nobody else uses it",
         )
-    yield from ended(node)
+    await ended(node)
     sent, answered = said
     return Heard(sent, answered, tuple(notices))
 
 
-def _listening(heard: Callable[[Notice], bool], seconds: float) -> Operation[Notice | None]:
-    return (yield from Listen(heard, seconds))
+async def _listening(heard: Callable[[Notice], bool], seconds: float) -> Notice | None:
+    return await Listen(heard, seconds)
 
 
-def _said(
+async def _said(
     node: Node, watch: Watch, project: Project, acts: Sequence[Act]
-) -> Generator[Step, Any, tuple[tuple[float, ...], tuple[float | None, ...]]]:
-    began = now = yield from Pause(0.0)
+) -> tuple[tuple[float, ...], tuple[float | None, ...]]:
+    began = now = await Pause(0.0)
     sent: list[float] = []
     answered: list[float | None] = []
     for act in acts:
         if (rest := began + act.at - now) > 0:
-            yield from Pause(rest)
-        now = yield from Pause(0.0)
+            await Pause(rest)
+        now = await Pause(0.0)
         sent.append(now)
-        came = yield from outcome(timed(order(node, watch, project, act.command)))
+        came = await outcome(timed(order(node, watch, project, act.command)))
         if isinstance(came, Interrupted):
             raise came
         answered.append(None if isinstance(came, MotorbusError) else came)

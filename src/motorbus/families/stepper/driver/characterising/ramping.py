@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from motorbus.core.operation import Operation
 from motorbus.families.stepper import execution
 from motorbus.families.stepper.driver.characterising.experiments import Act, Trial
 from motorbus.families.stepper.driver.characterising.findings import Case
@@ -40,19 +39,19 @@ _FROM: Final = 0.05
 _NAMES: Final = ("ramp", "ramp_tick_ms")
 
 
-def ramped(case: Case, timing: Timing) -> Operation[None]:
+async def ramped(case: Case, timing: Timing) -> None:
     """Find the acceleration to use, time the moves, and see which reading fits."""
-    acceleration = yield from _steepness(case, timing)
+    acceleration = await _steepness(case, timing)
     if not acceleration:
-        return
+        return None
     top, *slower = ramp_speeds(case.motor)
     ways = [(top, _FROM), (top, 0.5), (top, 0.25), *((rpm, _FROM) for rpm in slower)]
     runs: list[Run] = []
     for rpm, part in ways:
         project = ramp(case.motor, case.scratch, case.travel, rpm, acceleration, part)
-        yield from write(case.node, project)
-        first = yield from _timed(case, timing, project)
-        again = yield from _timed(case, timing, project)
+        await write(case.node, project)
+        first = await _timed(case, timing, project)
+        again = await _timed(case, timing, project)
         if first is None or again is None or abs(first - again) > STEADY:
             case.found.doubt("a move took another time when it was made again")
             return _leave(case, "a move did not take the same time twice")
@@ -61,13 +60,13 @@ def ramped(case: Case, timing: Timing) -> Operation[None]:
     return None
 
 
-def _steepness(case: Case, timing: Timing) -> Operation[int]:
+async def _steepness(case: Case, timing: Timing) -> int:
     """An acceleration whose ramp can be timed; 0 when there is none, or no time."""
     top = ramp_speeds(case.motor)[0]
     for acceleration in ACCELERATIONS:
         project = ramp(case.motor, case.scratch, case.travel, top, acceleration, _FROM)
-        yield from write(case.node, project)
-        seconds = yield from _timed(case, timing, project)
+        await write(case.node, project)
+        seconds = await _timed(case, timing, project)
         if seconds is None:
             _leave(case, "a move with a ramp was not seen to begin and to end")
             return 0
@@ -77,9 +76,9 @@ def _steepness(case: Case, timing: Timing) -> Operation[int]:
     return 0
 
 
-def _timed(case: Case, timing: Timing, project: Project) -> Operation[float | None]:
+async def _timed(case: Case, timing: Timing, project: Project) -> float | None:
     trial = Trial("ramp", "", (), (), project, (Act(0.0, "start_project"),))
-    heard = yield from once(case, trial, LONGEST, 1, timing.latency)
+    heard = await once(case, trial, LONGEST, 1, timing.latency)
     if heard is None or not heard.notices:
         case.found.doubt("a move with a ramp was not seen to begin and to end")
         return None

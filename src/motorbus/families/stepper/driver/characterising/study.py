@@ -59,32 +59,32 @@ def ramp_experiment(travel: float) -> Experiment:
     return Experiment("ramp", what, RAMP, travel, 2 * RAMP_SECONDS * RAMP_STEPS)
 
 
-def studied(case: Case) -> Operation[Profile]:
+async def studied(case: Case) -> Profile:
     """All experiments, one after the other. One that a bad line spoils is given up, and the next is begun."""
-    yield from Report(VIEWS)
-    yield from views.view(case)
-    yield from _spared(case, ("flags_scope",), views.flags(case))
+    await Report(VIEWS)
+    await views.view(case)
+    await _spared(case, ("flags_scope",), views.flags(case))
     for trial in controls(case.motor, case.scratch):
-        yield from Report(Experiment.of(trial))
-    timing = yield from _spared(case, (), controlled(case))
+        await Report(Experiment.of(trial))
+    timing = await _spared(case, (), controlled(case))
     if timing is None:
         for name in KNOWN:
             if name not in UNTRIED:
                 case.found.leave(name, f"no time could be taken on this line: {case.found.doubts[0]}")
         return case.found.profile()
-    yield from Report(SELECTION)
-    yield from _spared(case, SELECTION.settles, _selected(case, timing))
+    await Report(SELECTION)
+    await _spared(case, SELECTION.settles, _selected(case, timing))
     for trial in trials(case.motor, case.scratch, _without_steps(case)):
-        yield from _spared(case, trial.settles, _tried(case, timing, trial))
-    yield from Report(ramp_experiment(case.travel))
-    yield from _spared(case, RAMP, ramped(case, timing))
+        await _spared(case, trial.settles, _tried(case, timing, trial))
+    await Report(ramp_experiment(case.travel))
+    await _spared(case, RAMP, ramped(case, timing))
     return case.found.profile()
 
 
-def _spared(case: Case, names: tuple[str, ...], operation: Operation[T]) -> Operation[T | None]:
+async def _spared(case: Case, names: tuple[str, ...], operation: Operation[T]) -> T | None:
     """Carry it out; a line that does not answer it leaves these questions open, and is a doubt."""
     try:
-        return (yield from operation)
+        return await operation
     except (NoReply, WireError) as error:
         case.found.doubt(f"an experiment failed: {error.summary}")
         for name in names:
@@ -92,12 +92,12 @@ def _spared(case: Case, names: tuple[str, ...], operation: Operation[T]) -> Oper
     return None
 
 
-def _selected(case: Case, timing: Timing) -> Operation[None]:
+async def _selected(case: Case, timing: Timing) -> None:
     if case.seen:
         _, last = controls(case.motor, case.scratch)
-        yield from views.select(case, last.project)
+        await views.select(case, last.project)
     else:
-        yield from views.select_unseen(case, timing.offset, timing.clock)
+        await views.select_unseen(case, timing.offset, timing.clock)
 
 
 def _without_steps(case: Case) -> int | None:
@@ -106,17 +106,17 @@ def _without_steps(case: Case) -> int | None:
     return empty[0] if empty else None
 
 
-def _tried(case: Case, timing: Timing, trial: Trial) -> Operation[None]:
+async def _tried(case: Case, timing: Timing, trial: Trial) -> None:
     found = case.found
     if all(name in found.known for name in trial.settles):
         return None
     missing = [name for name, value in trial.needs if found.known.get(name) != value]
     if missing:
         return _leave(case, trial, f"it is tried only where {missing[0]} is {dict(trial.needs)[missing[0]]}")
-    yield from Report(Experiment.of(trial))
+    await Report(Experiment.of(trial))
     if trial.project.total_steps:
-        yield from write(case.node, trial.project)
-    verdict = yield from _repeated(case, timing, trial)
+        await write(case.node, trial.project)
+    verdict = await _repeated(case, timing, trial)
     if verdict is None:
         return _leave(case, trial, f"on this line {found.doubts[-1]}")
     if not verdict.fits:
@@ -135,14 +135,14 @@ def _leave(case: Case, trial: Trial, why: str) -> None:
         case.found.leave(name, why)
 
 
-def _repeated(case: Case, timing: Timing, trial: Trial) -> Operation[Verdict | None]:
+async def _repeated(case: Case, timing: Timing, trial: Trial) -> Verdict | None:
     """Twice, or three times where the answer rests on silence; None when one of them was not acknowledged in time."""
     found = case.found
     seconds, most = trial.longest(found.known) * timing.clock + MARGIN, trial.most(found.known)
     seen: list[tuple[tuple[float, ...], Seen]] = []
     verdict: Verdict | None = None
     while len(seen) < REPETITIONS or (verdict and verdict.silent and verdict.fits and len(seen) < IN_SILENCE):
-        heard = yield from once(case, trial, seconds, most, timing.latency)
+        heard = await once(case, trial, seconds, most, timing.latency)
         if heard is None:
             return None
         seen.append(timing.seen(heard))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Operation, Pause
+from motorbus.core.operation import Pause
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.characterising.experiments import Seen, Trial
 from motorbus.families.stepper.driver.characterising.findings import Case
@@ -51,16 +51,16 @@ class Timing(NamedTuple):
         return at, Seen(tuple(came is not None for came in heard.answered), ends)
 
 
-def controlled(case: Case) -> Operation[Timing | None]:
+async def controlled(case: Case) -> Timing | None:
     """Run both controls; None, and a doubt, when they do not agree with themselves and each other."""
     took: list[tuple[float, float]] = []
     latency = float("inf")
     for trial in controls(case.motor, case.scratch):
-        yield from write(case.node, trial.project)
+        await write(case.node, trial.project)
         known = trial.longest({})
         times = []
         for _ in range(2):
-            heard = yield from once(case, trial, known * (1 + CLOCK) + MARGIN, 1, latency)
+            heard = await once(case, trial, known * (1 + CLOCK) + MARGIN, 1, latency)
             if heard is None or len(heard.notices) != 1:
                 case.found.doubt("a project of known time was not seen to begin and to end")
                 return None
@@ -70,16 +70,16 @@ def controlled(case: Case) -> Operation[Timing | None]:
             case.found.doubt("a project of known time took another time when it was run again")
             return None
         took.append((known, sum(times) / 2))
-    return (yield from _timing(case, took, latency))
+    return await _timing(case, took, latency)
 
 
-def _timing(case: Case, took: list[tuple[float, float]], latency: float) -> Operation[Timing | None]:
+async def _timing(case: Case, took: list[tuple[float, float]], latency: float) -> Timing | None:
     (short, first), (long, second) = took
     clock = (second - first) / (long - short)
     if abs(clock - 1) > CLOCK:
         case.found.doubt(f"a pause of 1 s takes {clock:.2f} s")
         return None
-    turnaround = yield from _turnaround(case)
+    turnaround = await _turnaround(case)
     found = Timing(first - clock * short, clock, latency, turnaround)
     measured = {"overhead": found.offset, "turnaround": turnaround, "clock": clock}
     case.found.measured.update({name: round(value, 5) for name, value in measured.items()})
@@ -89,22 +89,22 @@ def _timing(case: Case, took: list[tuple[float, float]], latency: float) -> Oper
     return found
 
 
-def _turnaround(case: Case) -> Operation[float]:
+async def _turnaround(case: Case) -> float:
     """s that it thinks: a short answer and a long one tell what a byte takes, and with that what is no byte."""
-    yield from read_input(case.node, 1)
-    begin = yield from Pause(0.0)
-    short = (yield from timed(read_input(case.node, 1))) - begin
-    begin = yield from Pause(0.0)
-    whole = (yield from timed(dump_once(case.node, case.scratch))) - begin
+    await read_input(case.node, 1)
+    begin = await Pause(0.0)
+    short = await timed(read_input(case.node, 1)) - begin
+    begin = await Pause(0.0)
+    whole = await timed(dump_once(case.node, case.scratch)) - begin
     byte = max(0.0, whole - short) / (wire.DUMP_LENGTH - wire.REPLY_LENGTH)
     return max(0.0, short - byte * (wire.REQUEST_LENGTH + wire.REPLY_LENGTH))
 
 
-def once(case: Case, trial: Trial, seconds: float, wanted: int, latency: float) -> Operation[Heard | None]:
+async def once(case: Case, trial: Trial, seconds: float, wanted: int, latency: float) -> Heard | None:
     """Carry it out once, `latency` being how soon its commands should be answered; None, and a doubt, when they were
     not, or when a notice came that cannot be of this run.
     """
-    heard = yield from listened(case.node, case.watch, trial.project, trial.acts, seconds, wanted)
+    heard = await listened(case.node, case.watch, trial.project, trial.acts, seconds, wanted)
     if heard.answered[0] is None:
         case.found.doubt("a start was not acknowledged")
     elif _is_late(trial, heard, latency):

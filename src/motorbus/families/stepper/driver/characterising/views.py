@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, Final
 
-from motorbus.core.operation import Operation
 from motorbus.errors import VerificationFailed
 from motorbus.families.stepper.driver import reading
 from motorbus.families.stepper.driver.characterising.experiments import SLACK, SLACK_PART, Act
@@ -37,7 +36,7 @@ _LONGEST: Final = 5.0
 """s of a stored pause that are waited for."""
 
 
-def view(case: Case) -> Operation[Project]:
+async def view(case: Case) -> Project:
     """Write a project and look whether it is shown, and in which order; gives that project.
 
     Raises VerificationFailed when what is shown is neither that nor what was there before.
@@ -48,8 +47,8 @@ def view(case: Case) -> Operation[Project]:
         for one in controls(case.motor, case.scratch)
         if not any(shows(before, one.project, order) for order in ORDERS)
     )
-    yield from write(case.node, project)
-    image = yield from reading.image(case.node, case.scratch)
+    await write(case.node, project)
+    image = await reading.image(case.node, case.scratch)
     orders = [order for order in ORDERS if shows(image, project, order)]
     if len(orders) == 1:
         case.found.settle("read_view", "working", "a project that was edited and not saved reads as edited")
@@ -79,7 +78,7 @@ def shows(image: bytes, project: Project, order: Order) -> bool:
     )
 
 
-def flags(case: Case) -> Operation[None]:
+async def flags(case: Case) -> None:
     """Set the stop mode of the lent project, look whether another one shows it, and set it back."""
     other, mine = case.other, case.stored[case.scratch][_STOP_MODE]
     before = case.stored[other]
@@ -87,13 +86,11 @@ def flags(case: Case) -> Operation[None]:
         case.found.leave("flags_scope", f"project {other} has a stop mode that is none")
         return
     mode = 1 - before[_STOP_MODE]
-    yield from told(case.node, Edit("set_stop_mode", {"stop_mode": mode}))
-    theirs = yield from reading.image(case.node, other)
-    own = yield from reading.image(case.node, case.scratch)
+    await told(case.node, Edit("set_stop_mode", {"stop_mode": mode}))
+    theirs = await reading.image(case.node, other)
+    own = await reading.image(case.node, case.scratch)
     device = theirs[_STOP_MODE] == mode
-    yield from told(
-        case.node, Edit("set_stop_mode", {"stop_mode": before[_STOP_MODE] if device else mine & 1})
-    )
+    await told(case.node, Edit("set_stop_mode", {"stop_mode": before[_STOP_MODE] if device else mine & 1}))
     if not device and theirs != before:
         case.found.leave(
             "flags_scope", f"project {other} reads otherwise than before, and not by its stop mode"
@@ -106,12 +103,12 @@ def flags(case: Case) -> Operation[None]:
         case.found.settle("flags_scope", "device" if device else "project", why)
 
 
-def select(case: Case, edited: Project) -> Operation[None]:
+async def select(case: Case, edited: Project) -> None:
     """Select another project and see what is edited then; `edited` is what was until now."""
     other = case.other
     count = max(1, min(case.stored[other][1], STEPS))
-    yield from told(case.node, _selection(other, count))
-    image = yield from reading.image(case.node, other)
+    await told(case.node, _selection(other, count))
+    image = await reading.image(case.node, other)
     loaded = _without_flags(bytes((other, count)) + case.stored[other][2:])
     case.found.leave("select", f"project {other}, selected, reads neither as stored nor as what was edited")
     if _without_flags(image) == loaded:
@@ -132,7 +129,7 @@ def _without_flags(image: bytes) -> bytes:
     return bytes(0 if at in _FLAG_PLACES else byte for at, byte in enumerate(image))
 
 
-def select_unseen(case: Case, offset: float, clock: float) -> Operation[None]:
+async def select_unseen(case: Case, offset: float, clock: float) -> None:
     """The same where a dump does not show what is edited: a run takes the pause edited before, or the stored one.
 
     With luck it tells the order of bytes too: the stored pause is known in both.
@@ -144,12 +141,12 @@ def select_unseen(case: Case, offset: float, clock: float) -> Operation[None]:
     project = case.motor.project(case.scratch, case.motor.step(1, mine))
     ways: dict[tuple[str, Any], float] = {("relabel", None): mine / 1000}
     ways |= {("load", order): pause for order, pause in stored.items() if pause <= _LONGEST}
-    yield from write(case.node, project)
-    yield from told(case.node, _selection(case.other, max(1, min(case.stored[case.other][1], STEPS))))
-    yield from write(case.node, project, leave="set_step_delay")
+    await write(case.node, project)
+    await told(case.node, _selection(case.other, max(1, min(case.stored[case.other][1], STEPS))))
+    await write(case.node, project, leave="set_step_delay")
     agreed = set(ways)
     for _ in range(2):
-        heard = yield from listened(
+        heard = await listened(
             case.node, case.watch, project, (Act(0.0, "start_project"),), max(ways.values()) + MARGIN
         )
         start = heard.answered[0]
