@@ -140,9 +140,10 @@ class Bus(BaseBus):
 
     def _may_join(self, order: Exchange[Any]) -> bool:
         """This order may leave in one write with the next request."""
-        if order.replies != ():
-            return False
-        return order.effect not in GATED or self.interlock is None or not self.interlock.required_reads(order)
+        interlock = self.engine.interlock
+        if order.replies != () or order.effect not in GATED or interlock is None:
+            return order.replies == ()
+        return not interlock.required_reads(order)
 
     def _needs_reads(self, request: Exchange[Any]) -> bool:
         return request.effect in GATED and bool(self.required_reads(request))

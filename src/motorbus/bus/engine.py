@@ -292,7 +292,8 @@ class Engine:
             raise failures.listen_only(request)
         if request.rank is Rank.STOP:
             return
-        self._check_stops(request, since)
+        if self.latched or since is not self.since:
+            self._check_stops(request, since)
         if request.effect in GATED or (request.later is not None and self.interlock is not None):
             if self.interlock is None:
                 raise failures.no_interlock(request)
@@ -311,7 +312,7 @@ class Engine:
             return
         if self.latched:
             raise failures.latched(self.latched_by)
-        if since is None or since is self.since or not moves(request):
+        if since is None or not moves(request):
             return
         if since.latches != self.latches or self.positions.is_stopped(request, since.stops):
             raise failures.stopped()
