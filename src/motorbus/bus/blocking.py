@@ -63,9 +63,15 @@ class Bus(BaseBus):
                 signals.raise_pending()
 
     def _receive(self, prepared: Prepared, attempt: Attempt) -> Any:
-        """The value of a prepared request that was written."""
-        chunks = self.link.read(attempt.deadline)
-        value = self.accept(prepared, chunks, attempt.deadline)
+        """The value of a prepared request that was written; its reply may come in pieces."""
+        link, deadline = self.link, attempt.deadline
+        chunks: list[Any] = link.read(deadline)
+        if chunks and type(chunks[0]) is bytes and len(chunks[0]) != prepared.size:
+            data: Any = b"".join(chunks)
+            while len(data) < prepared.size and (more := link.read(deadline)):
+                data += b"".join(more)  # type: ignore[arg-type]  # a link gives bytes or frames
+            chunks = [data]
+        value = self.accept(prepared, chunks, deadline)
         if value is not UNLIKE:
             return value
         job = RequestJob(prepared.exchange)

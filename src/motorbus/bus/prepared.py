@@ -19,7 +19,8 @@ class Prepared:
     `budget` is s from the write to the deadline, at this `rate` and `latency`. `alternate` is the same request with a
     reply of another length, itself where there is none. `record` is the one of the two that keeps the last reply:
     `data`, which `source` asked for, its arrival `at` (s) and the number of `orders` sent before it. `times` counts
-    replies by latency. `single` is the state of its node, None for a group.
+    replies by latency. `single` is the state of its node, None for a group. `length` is that of its first reply, `size`
+    that of all (bytes).
     """
 
     engine: object
@@ -32,6 +33,7 @@ class Prepared:
     wire: Data = field(init=False)
     lane: int = field(init=False)
     length: int = field(init=False)
+    size: int = field(init=False)
     single: NodeSync | None = field(init=False)
     alternate: Prepared = field(init=False)
     record: Prepared = field(init=False)
@@ -48,6 +50,7 @@ class Prepared:
         dues = self.exchange.replies
         assert dues is not ANY
         self.wire, self.lane, self.length = self.exchange.request, self.exchange.lane, dues[0].length
+        self.size = sum(due.length for due in dues)
         self.single = self.states[0] if len(dues) == 1 else None
         self.alternate = self.record = self.source = self
 
