@@ -7,7 +7,6 @@ that the node owes. A link is first in, first out, so when the probe is answered
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any, Final, TypeAlias
 
 from motorbus.core.family import Family
@@ -118,17 +117,18 @@ class SyncTable:
         """A probe of this node whose reply it does not owe; where it owes all of them, the longest owed."""
         node = self.of(number)
         owed: dict[Kind, Exchange[bool]] = {}
-        for probe in self._probes(number, node.probes):
+        first: Exchange[bool] | None = None
+        for _ in range(PROBES):
+            probe = self.family.probe(number, node.probes)
+            first = first or probe
+            if owed and probe.request == first.request:  # all probes of the family were compared
+                break
             node.probes += 1
             kind = kind_of(probe)
             if kind not in node.owed:
                 return probe
             owed.setdefault(kind, probe)
         return next(owed[kind] for kind in node.owed if kind in owed)
-
-    def _probes(self, number: int, first: int) -> Iterator[Exchange[bool]]:
-        for attempt in range(first, first + PROBES):
-            yield self.family.probe(number, attempt)
 
     def back_off(self, number: int, now: float, quiet: float) -> None:
         """A probe was not answered: probe this node less often while groups are read."""
