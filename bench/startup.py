@@ -33,8 +33,8 @@ class Start(NamedTuple):
 EMPTY = Start("empty process", ("-c", "pass"))
 STARTS = (
     Start("import motorbus", ("-c", "import motorbus")),
-    Start("motorbus --version", ("-m", "motorbus.cli", "--version")),
-    Start("motorbus --help", ("-m", "motorbus.cli", "--help")),
+    Start("motorbus --version", ("-m", "motorbus", "--version")),
+    Start("motorbus --help", ("-m", "motorbus", "--help")),
     Start("import scservo_sdk", ("-c", "import scservo_sdk"), ("feetech-servo-sdk", "pyserial")),
     Start("import rustypot", ("-c", "import rustypot"), ("rustypot",)),
 )

@@ -198,7 +198,7 @@ def test_verbose_says_what_happens_on_stderr_and_only_then(run: Run) -> None:
 
 def test_a_reader_that_goes_away_ends_it_quietly() -> None:
     process = subprocess.Popen(
-        [sys.executable, "-m", "motorbus.cli", "monitor", "feetech:sim#1", "--rate", "1000", "--json"],
+        [sys.executable, "-m", "motorbus", "monitor", "feetech:sim#1", "--rate", "1000", "--json"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -215,7 +215,7 @@ def test_a_reader_that_goes_away_ends_it_quietly() -> None:
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&-", "<&- >&- 2>&-"])
 @pytest.mark.parametrize(("words", "code"), [("ping feetech:sim,ids=1#1", 0), ("nonsense", 2)])
 def test_a_stream_that_is_closed_is_no_trouble(closed: str, words: str, code: int) -> None:
-    line = f'exec "$0" -m motorbus.cli {words} {closed}'
+    line = f'exec "$0" -m motorbus {words} {closed}'
     ended = subprocess.run(
         ["/bin/sh", "-c", line, sys.executable], capture_output=True, text=True, timeout=60, check=False
     )
@@ -232,7 +232,7 @@ def test_completion_can_be_made_for(shell: str) -> None:
 
 def test_no_color_is_obeyed_by_the_help() -> None:
     ended = subprocess.run(
-        [sys.executable, "-m", "motorbus.cli", "--help"],
+        [sys.executable, "-m", "motorbus", "--help"],
         capture_output=True,
         text=True,
         timeout=60,

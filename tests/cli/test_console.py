@@ -15,7 +15,7 @@ import pytest
 from motorbus.cli.output import LONGEST
 from tests.cli.conftest import Run
 
-MOTORBUS = [sys.executable, "-m", "motorbus.cli"]
+MOTORBUS = [sys.executable, "-m", "motorbus"]
 BUFFERED = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
 SCRIPT = "[31m\x07\x9b\x7f\r\n"
 """What a terminal would obey, or take for another line."""

@@ -435,7 +435,7 @@ def test_who_is_not_read_any_more_ends_with_the_code_of_that(command: str) -> No
     """A pipe whose reader has gone before the first word."""
     reading, writing = os.pipe()
     os.close(reading)
-    words = [sys.executable, "-m", "motorbus.cli", command, "feetech:sim,ids=1-3#1-3"]
+    words = [sys.executable, "-m", "motorbus", command, "feetech:sim,ids=1-3#1-3"]
     ended = subprocess.run(words, stdout=writing, stderr=subprocess.PIPE, text=True, timeout=60)
     os.close(writing)
     assert (ended.returncode, ended.stderr) == (10, "")

@@ -100,7 +100,7 @@ def test_a_signal_stops_the_device_and_the_note_says_where_it_holds(
     with Simulated("feetech", link=link, control=str(control)) as simulated:
         device = f"{simulated.bus}#1"
         words = ["move", f"{device}=260deg", "--velocity", "10deg/s"]
-        command = [sys.executable, "-m", "motorbus.cli", *words]
+        command = [sys.executable, "-m", "motorbus", *words]
         with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as mover:
             wait_until_moved(control, 50)
             mover.send_signal(number)

@@ -57,7 +57,7 @@ def served_machine(tmp_path: Path, state_folder: Path, monkeypatch: pytest.Monke
 def command(*words: str) -> subprocess.Popen[str]:
     """A command in a process of its own, which says what it sends."""
     return subprocess.Popen(
-        [sys.executable, "-m", "motorbus.cli", *words, "-vv", "--json"],
+        [sys.executable, "-m", "motorbus", *words, "-vv", "--json"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -91,7 +91,7 @@ def test_a_switch_changes_how_they_behave(tmp_path: Path, run: Run) -> None:
 
 
 def test_a_ready_line_for_people(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "motorbus.cli", "simulate", "feetech", "--ids", "1-6"]
+    command = [sys.executable, "-m", "motorbus", "simulate", "feetech", "--ids", "1-6"]
     with subprocess.Popen(
         [*command, "--link", str(tmp_path / "bus")], stdout=subprocess.PIPE, text=True
     ) as process:
@@ -145,7 +145,7 @@ def test_every_switch_that_nobody_has_settled_has_a_source_and_a_default_that_is
 def test_the_switches_are_readable_on_a_terminal_of_80_columns() -> None:
     """Two columns, so that what a switch does has room, and a blank line between two switches."""
     ours, theirs = os.openpty()
-    command = [sys.executable, "-m", "motorbus.cli", "simulate", "feetech", "--switches"]
+    command = [sys.executable, "-m", "motorbus", "simulate", "feetech", "--switches"]
     with subprocess.Popen(command, stdout=theirs, env={**os.environ, "COLUMNS": "80", "TERM": "dumb"}):
         os.close(theirs)
         shown = ""

@@ -146,7 +146,7 @@ def opened_again(port: str) -> Any:
 def test_what_happens_is_said_on_stderr_and_at_the_end_how_to_have_it_again(tmp_path: Path) -> None:
     noise = tmp_path / "noise"
     noise.write_text("seed 7\n100%: duplicate  # and still it works\n")
-    command = [sys.executable, "-m", "motorbus.cli", "simulate", "feetech", "--link", str(tmp_path / "arm")]
+    command = [sys.executable, "-m", "motorbus", "simulate", "feetech", "--link", str(tmp_path / "arm")]
     with subprocess.Popen(
         [*command, "--faults", str(noise)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
@@ -171,7 +171,7 @@ def test_what_happens_is_said_on_stderr_and_at_the_end_how_to_have_it_again(tmp_
 def test_what_has_not_happened_is_named_at_the_end_also_of_a_script_that_was_set_later(
     tmp_path: Path,
 ) -> None:
-    command = [sys.executable, "-m", "motorbus.cli", "simulate", "feetech", "--link", str(tmp_path / "arm")]
+    command = [sys.executable, "-m", "motorbus", "simulate", "feetech", "--link", str(tmp_path / "arm")]
     with (
         Control() as control,
         subprocess.Popen(

@@ -109,7 +109,7 @@ def test_what_was_recorded_until_the_bus_died_is_kept(tmp_path: Path, state_fold
             described({"arm": f"{served.bus},latency=1s"}, "1-2", "", False, {}, {}), encoding="utf-8"
         )
         words = ["--machine", str(file), "teach", "arm", "--output", str(wave), "-vv"]
-        command = [sys.executable, "-m", "motorbus.cli", *words]
+        command = [sys.executable, "-m", "motorbus", *words]
         pipe = subprocess.PIPE
         with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as teaching:
             assert teaching.stderr is not None

@@ -27,7 +27,7 @@ PROGRAMS = re.findall(r"^```py\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
 
 def words(line: str) -> list[str]:
     """The program that a line of the page starts."""
-    return [sys.executable, "-m", "motorbus.cli", *shlex.split(line)[1:]]
+    return [sys.executable, "-m", "motorbus", *shlex.split(line)[1:]]
 
 
 @contextmanager

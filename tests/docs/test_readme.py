@@ -134,7 +134,7 @@ def shell(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
 def run_process(line: str, words: list[str], folder: Path) -> Ran:
     """Run the command in a process of its own; send Ctrl-C, or do what it asks its user to do."""
     with subprocess.Popen(
-        [sys.executable, "-m", "motorbus.cli", *words],
+        [sys.executable, "-m", "motorbus", *words],
         cwd=folder,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,

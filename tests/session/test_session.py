@@ -131,3 +131,11 @@ def test_every_bus_has_the_gate() -> None:
             servo.enable_torque()
         bus.reset()
         servo.enable_torque()
+
+
+def test_the_package_lists_its_public_names_and_objects_say_what_they_are() -> None:
+    assert dir(motorbus) == sorted(motorbus.__all__)
+    with motorbus.simulate("feetech", ids="1-2", name="shown") as sim, motorbus.open(sim.url) as bus:
+        assert repr(sim) == "<Simulation feetech:sim:shown, ids 1, 2>"
+        assert repr(bus) == "<Bus feetech:sim:shown, feetech, 1000000 bit/s>"
+        assert repr(motorbus.feetech.Servo(bus, 1)) == f"<Servo 1 on {bus!r}>"

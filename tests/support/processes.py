@@ -47,7 +47,7 @@ def _started(arguments: Sequence[str]) -> subprocess.Popen[str]:
 
 def motorbus(*arguments: str) -> tuple[int, dict[str, Any]]:
     """Run `motorbus ARGUMENTS --json`; return its exit code and its document."""
-    with python("-m", "motorbus.cli", *arguments, "--json") as child:
+    with python("-m", "motorbus", *arguments, "--json") as child:
         output, errors = child.communicate(timeout=LIMIT)
     assert output, errors
     return child.returncode, json.loads(output)
@@ -60,7 +60,7 @@ class Simulator:
         self.port = port
         self.control = port.with_name(port.name + ".control")
         flags = ("--link", str(port), "--control", str(self.control), "--quiet", "--json")
-        self._child = _started(("-m", "motorbus.cli", "simulate", family, *flags, *arguments))
+        self._child = _started(("-m", "motorbus", "simulate", family, *flags, *arguments))
         assert self._child.stdout is not None
         ready = self._child.stdout.readline()
         assert ready, self._child.communicate()[1]

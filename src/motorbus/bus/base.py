@@ -99,6 +99,9 @@ class BaseBus:
         self.stopper.start()
         self.engine.before_motion = None
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.link.name}, {self.family.name}, {self.rate} bit/s>"
+
     def now(self) -> float:
         """s on the clock of the link."""
         return self.link.now()

@@ -45,7 +45,7 @@ class Simulated:
             *(["--pace"] if pace else []),
         ]  # nobody reads its stderr, and a full pipe would stop it
         words += [word for name, value in more.items() for word in (f"--{name}", value)]
-        self._command = [sys.executable, "-m", "motorbus.cli", "simulate", *words, "--json"]
+        self._command = [sys.executable, "-m", "motorbus", "simulate", *words, "--json"]
         self._process: subprocess.Popen[str] | None = None
         self.ready: dict[str, Any] = {}
 

@@ -6,14 +6,20 @@ does I/O and is a method; an attribute never does.
 
 from __future__ import annotations
 
+import inspect
+import re
+import sys
 from collections.abc import Callable, Coroutine
-from functools import partial
-from typing import Any, Concatenate, Generic, ParamSpec, Protocol, Self, TypeVar, overload
+from functools import cached_property
+from inspect import Parameter, Signature, getattr_static, signature
+from typing import Any, ClassVar, Concatenate, Final, Generic, ParamSpec, Protocol, Self, TypeVar, overload
 
 from motorbus.core.operation import Runnable
 
 P = ParamSpec("P")
 T = TypeVar("T")
+VALUE: Final = re.compile(r"^(?:Exchange|Operation|Runnable|Abreast|Errand)\[(.*)\]$")
+"""The type of the value in the return type of a driver function."""
 
 
 class BlockingRunner(Protocol):
@@ -31,9 +37,15 @@ class AsyncRunner(Protocol):
 class _Owner:
     """Base of devices with verbs. A copy drops the cached methods: they are bound to the original."""
 
+    is_async: ClassVar[bool] = False
+
     def __getstate__(self) -> dict[str, Any]:
-        cached = {name for name in self.__dict__ if isinstance(getattr(type(self), name, None), Said)}
+        kind = type(self)
+        cached = {name for name in self.__dict__ if isinstance(getattr_static(kind, name, None), Said)}
         return {name: value for name, value in self.__dict__.items() if name not in cached}
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {getattr(self, 'node', '')} on {getattr(self, 'bus', None)!r}>"
 
 
 class Blocking(_Owner):
@@ -46,29 +58,51 @@ class Blocking(_Owner):
 class Awaiting(_Owner):
     """A device whose verbs run on an async bus."""
 
+    is_async = True
+
     def __init__(self, bus: AsyncRunner) -> None:
         self.bus = bus
 
 
-def _bound(call: Callable[P, T], name: str, function: Callable[..., object], owner: object) -> Callable[P, T]:
-    """Give a method the name, docstring and signature (without the first parameter) of its function."""
-    call.__name__ = name
-    call.__qualname__ = f"{type(owner).__name__}.{name}"
-    call.__doc__ = function.__doc__
-    call.__wrapped__ = partial(function, owner)  # type: ignore[attr-defined]
-    return call
-
-
 class Said(Generic[P, T]):
-    """Base of descriptors that make a method of a driver function; a subclass says how the method runs it."""
+    """Base of descriptors that make a method of a driver function; a subclass says how the method runs it.
+
+    On a class it gives a function with the signature of the method; `function` of that is the driver function.
+    """
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self.function = function
         self.name = getattr(function, "__name__", "")
         self.__doc__ = function.__doc__
+        self._of_class: dict[type, Any] = {}
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
+
+    @cached_property
+    def signature(self) -> Signature:
+        """Of the method, with the type of its value."""
+        found = signature(self.function)
+        first, *rest = found.parameters.values()
+        parameters = [first.replace(name="self", annotation=Parameter.empty), *rest]
+        return found.replace(
+            parameters=parameters, return_annotation=VALUE.sub(r"\1", str(found.return_annotation))
+        )
+
+    def of_class(self, owner: type) -> Any:
+        """The method as an attribute of this class."""
+        if owner not in self._of_class:
+            name = self.name
+
+            def method(self: Any, *args: Any, **kwargs: Any) -> Any:
+                return getattr(self, name)(*args, **kwargs)
+
+            self._describe(method, owner, self.signature)
+            method.function = self.function  # type: ignore[attr-defined]
+            if getattr(owner, "is_async", False) and sys.version_info >= (3, 12):
+                inspect.markcoroutinefunction(method)
+            self._of_class[owner] = method
+        return self._of_class[owner]
 
     def method(self, owner: Any, carry_out: Callable[[Any], Any]) -> Any:
         """The method of `owner`: calls the function and passes the result to `carry_out`."""
@@ -77,7 +111,18 @@ class Said(Generic[P, T]):
         def call(*args: Any, **kwargs: Any) -> Any:
             return carry_out(function(owner, *args, **kwargs))
 
-        return _bound(call, self.name, function, owner)
+        return self._bound(call, owner)
+
+    def _bound(self, call: Callable[..., Any], owner: object) -> Callable[..., Any]:
+        shown = self.signature
+        self._describe(call, type(owner), shown.replace(parameters=list(shown.parameters.values())[1:]))
+        return call
+
+    def _describe(self, method: Any, owner: type, shown: Signature) -> None:
+        method.__name__ = self.name
+        method.__qualname__ = f"{owner.__name__}.{self.name}"
+        method.__doc__ = self.function.__doc__
+        method.__signature__ = shown
 
 
 class verb(Said[P, T]):  # noqa: N801 - used like a function
@@ -96,15 +141,15 @@ class verb(Said[P, T]):  # noqa: N801 - used like a function
     def __get__(self, device: Awaiting, owner: type) -> Callable[P, Coroutine[Any, Any, T]]: ...
     def __get__(self, device: Any, owner: type) -> Any:
         if device is None:
-            return self
+            return self.of_class(owner)
         function: Callable[..., Any] = self.function
 
         def call(*args: Any, **kwargs: Any) -> Any:
             procedure = function(device, *args, **kwargs) if args or kwargs else function(device)
             return device.bus.run(procedure)
 
-        method = _bound(call, self.name, function, device)
+        method = self._bound(call, device)
         # Cache it, so that the next call skips this descriptor; not if a subclass overrides the verb and calls `super`.
-        if getattr(type(device), self.name, None) is self:
+        if getattr_static(type(device), self.name, None) is self:
             device.__dict__[self.name] = method
         return method

@@ -59,6 +59,7 @@ class Led:
 class LedAsync:
     """Carries out its verbs when they are awaited."""
 
+    is_async = True
     conductor: AsyncConductor
 
 
@@ -75,7 +76,9 @@ class together(Said[P, T]):  # noqa: N801 - reads as a word in a list of verbs
     @overload
     def __get__(self, machine: LedAsync, owner: type) -> Callable[P, Coroutine[Any, Any, T]]: ...
     def __get__(self, machine: Any, owner: type) -> Any:
-        return self if machine is None else self.method(machine, lambda work: machine.conductor.run(work))
+        if machine is None:
+            return self.of_class(owner)
+        return self.method(machine, lambda work: machine.conductor.run(work))
 
 
 def settled(results: Mapping[str, Any]) -> dict[str, Any]:

@@ -60,6 +60,10 @@ CLOSED: Final = "closed: load it again"
 class RobotVerbs(Leased):
     """What a robot can do, blocking or async. `names` are names of axes, groups and buses; None means every axis."""
 
+    def __repr__(self) -> str:
+        axes, buses = ", ".join(self.axes), ", ".join(self.buses)
+        return f"<{type(self).__name__}: axes {axes} on {buses}>"
+
     positions = together(group.positions)
     states = together(group.states)
     enable_torque = together(group.enable_torque)

@@ -46,6 +46,9 @@ class Simulation:
     Raises RequestError for an unknown model or option, an impossible clock, or a name that is taken.
     """
 
+    def __repr__(self) -> str:
+        return f"<Simulation {self.url}, ids {', '.join(map(str, self.simulator.nodes))}>"
+
     def __init__(
         self,
         family: Family,

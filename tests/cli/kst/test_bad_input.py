@@ -175,7 +175,7 @@ def test_an_adapter_that_is_unplugged_meanwhile(tmp_path: Path) -> None:
     with Simulated("kst", ids="37", link=tmp_path / "can") as simulated:
         words = ["monitor", f"{simulated.bus},reconnect=no#37", "--rate", "1000", "--json"]
         with subprocess.Popen(
-            [sys.executable, "-m", "motorbus.cli", *words],
+            [sys.executable, "-m", "motorbus", *words],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,

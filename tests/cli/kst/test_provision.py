@@ -28,7 +28,7 @@ def test_a_person_is_asked_for_the_power_cycle_and_the_servo_comes_back(
 ) -> None:
     words = ["kst", "provision", f"{on_slcan.bus}#0x25", "--new-id", "0x27", "--yes", "--json"]
     with subprocess.Popen(
-        [sys.executable, "-m", "motorbus.cli", *words],
+        [sys.executable, "-m", "motorbus", *words],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -66,7 +66,7 @@ def test_its_buttons_are_pressed_by_the_control_socket(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("quiet", [False, True])
 def test_what_no_host_is_told_is_said_on_stderr_with_its_moment(quiet: bool) -> None:
-    words = [sys.executable, "-m", "motorbus.cli", "simulate", "stepper", "--tcp", "0", "--json"]
+    words = [sys.executable, "-m", "motorbus", "simulate", "stepper", "--tcp", "0", "--json"]
     words += ["--quiet"] if quiet else []
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as served:
         assert served.stdout is not None

@@ -33,7 +33,7 @@ def test_a_jog_that_is_interrupted_is_stopped_and_puts_everything_back(run: Run,
     with Simulated("stepper", link=tmp_path / "bus") as served:
         before = run("stepper", "read-project", served.bus, "--project", "1", "--json").document["dump"]
         words = ["jog", f"{served.bus}#1=60rpm", "--seconds", "30", "--yes", "-vv"]
-        command = [sys.executable, "-m", "motorbus.cli", *words]
+        command = [sys.executable, "-m", "motorbus", *words]
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as jogging:
             assert jogging.stderr is not None
             for line in jogging.stderr:
@@ -53,7 +53,7 @@ def test_one_that_is_killed_is_taken_back(run: Run, tmp_path: Path) -> None:
     with Simulated("stepper", link=tmp_path / "bus") as served:
         before = run("stepper", "read-project", served.bus, "--project", "1", "--json").document["dump"]
         words = ["jog", f"{served.bus}#1=60rpm", "--seconds", "30", "--yes", "-vv"]
-        command = [sys.executable, "-m", "motorbus.cli", *words]
+        command = [sys.executable, "-m", "motorbus", *words]
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as jogging:
             assert jogging.stderr is not None
             next(line for line in jogging.stderr if "tx FF AA 03 0C" in line)

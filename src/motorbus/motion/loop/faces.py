@@ -333,7 +333,7 @@ class looped(Said[P, T]):  # noqa: N801 - reads as a word in a list of verbs
     def __get__(self, machine: LedAsync, owner: type) -> Callable[P, Coroutine[Any, Any, T]]: ...
     def __get__(self, machine: Any, owner: type) -> Any:
         if machine is None:
-            return self
+            return self.of_class(owner)
         carry_out = _blocking if isinstance(machine, Led) else _awaiting
         return self.method(machine, lambda errand: carry_out(machine, errand))
 

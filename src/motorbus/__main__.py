@@ -1,4 +1,4 @@
-"""`python -m motorbus.cli` is the same program as `motorbus`, for when the script is not on the PATH."""
+"""`python -m motorbus` is the program `motorbus`."""
 
 from __future__ import annotations
 
