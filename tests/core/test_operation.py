@@ -66,14 +66,15 @@ def test_every_step_yields_itself_and_returns_what_is_sent_in() -> None:
 
 def test_an_outcome_turns_our_errors_into_values_and_no_others() -> None:
     operation: Operation[int | MotorbusError] = outcome(number(1))
-    operation.send(None)
+    begun = operation.send(None)
+    assert isinstance(begun, Exchange)
     with pytest.raises(StopIteration) as end:
-        operation.throw(NoReply("silent"))
+        _ = operation.throw(NoReply("silent"))
     assert isinstance(end.value.value, NoReply)
     operation = outcome(number(1))
-    operation.send(None)
+    begun = operation.send(None)
     with pytest.raises(KeyboardInterrupt):
-        operation.throw(KeyboardInterrupt())
+        _ = operation.throw(KeyboardInterrupt())
 
 
 class Locked(Guard):

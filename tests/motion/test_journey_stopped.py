@@ -199,7 +199,7 @@ def test_who_is_let_go_in_the_beginning_of_a_movement_is_limp_afterwards(act: An
                 while len(heard.sent) < number and not movement.done():
                     await asyncio.sleep(0)
                 if movement.done():
-                    assert await movement
+                    assert isinstance(await movement, Moved)
                     return False
                 await act(robot)
                 (told,) = await asyncio.gather(movement, return_exceptions=True)

@@ -62,7 +62,7 @@ def test_a_name_that_is_taken() -> None:
     with simulation(name="arm"):
         with pytest.raises(RequestError, match="exists already"):
             simulation(name="arm")
-        assert find("arm", "feetech")
+        assert find("arm", "feetech").url == "feetech:sim:arm"
 
 
 def test_the_nodes_are_at_hand() -> None:

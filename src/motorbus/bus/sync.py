@@ -127,7 +127,8 @@ class SyncTable:
             kind = kind_of(probe)
             if kind not in node.owed:
                 return probe
-            owed.setdefault(kind, probe)
+            if kind not in owed:
+                owed[kind] = probe
         return next(owed[kind] for kind in node.owed if kind in owed)
 
     def back_off(self, number: int, now: float, quiet: float) -> None:

@@ -269,7 +269,7 @@ def test_a_number_that_no_motor_has_is_refused(motor: object) -> None:
 
 def test_a_bus_that_is_opened_for_another_motor_simulates_one() -> None:
     with motorbus.open("stepper:sim,motor=0x21") as bus:
-        assert motorbus.stepper.Controller(bus).stop()
+        assert motorbus.stepper.Controller(bus).stop().value
 
 
 def test_verbs_can_be_awaited() -> None:
