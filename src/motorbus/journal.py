@@ -16,7 +16,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from motorbus.core.operation import ASKED, INTENT, OUTCOME, REACHED, READABLE, Journal
+from motorbus.core.operation import ASKED, INTENT, OUTCOME, REACHED, READABLE, JournalEntry
 from motorbus.errors import LinkError, MotorbusError, RequestError
 from motorbus.link.lock import journals
 
@@ -83,7 +83,7 @@ class BusJournal:
         Raises RequestError while another change is unfinished (by another verb, or with other facts), for a first
         record without a device, and for a file of a later version; LinkError when the file cannot be written.
         """
-        assert isinstance(event, Journal)
+        assert isinstance(event, JournalEntry)
         open_change = self.unfinished()
         if open_change is not None and _hinders(open_change, event):
             raise _unfinished(open_change)
@@ -260,14 +260,14 @@ def _sync_folder(folder: Path) -> None:
             os.close(descriptor)
 
 
-def _hinders(change: Change, event: Journal) -> bool:
+def _hinders(change: Change, event: JournalEntry) -> bool:
     """This event is refused while that change is open."""
     if event.state == ASKED:
         return not (event.facts.get(READABLE) and change.facts.get(READABLE))
     return event.state == INTENT or not _belongs(event, change)
 
 
-def _belongs(event: Journal, change: Change) -> bool:
+def _belongs(event: JournalEntry, change: Change) -> bool:
     """This is a record of that change: it has the same verb, and no fact differs."""
     return event.change == change.verb and all(
         change.facts.get(name, fact) == fact for name, fact in event.facts.items() if name != REACHED

@@ -12,10 +12,10 @@ from motorbus.bus.blocking import Bus
 from motorbus.bus.stop_socket import StopOutcome
 from motorbus.bus.tasks import TaskTree
 from motorbus.core.goal import Goal
-from motorbus.core.operation import ANY, UNLIKE, Alone, Answer, Data, Due, Exchange, Listen
+from motorbus.core.operation import ANY, UNLIKE, Data, Exchange, Exclusive, Expected, Response, WaitFor
 from motorbus.core.operation import Effect as Effect
-from motorbus.core.operation import Rank as Priority
-from motorbus.core.operation import Timeout as Timeout
+from motorbus.core.operation import Priority as Priority
+from motorbus.core.operation import TimeoutClass as TimeoutClass
 from motorbus.errors import LinkLost
 from motorbus.families import feetech, kst
 from motorbus.families.kst.wire import download_due, upload_due
@@ -41,11 +41,11 @@ def request(
     """One request and the replies it calls for: (node, key, length) each; None: all until the deadline."""
     makers = {"upload": upload_due, "download": download_due}
     dues = tuple(
-        makers[key[0]](node, key[1]) if isinstance(key, tuple) else Due(node, key, length)
+        makers[key[0]](node, key[1]) if isinstance(key, tuple) else Expected(node, key, length)
         for node, key, length in expected or ()
     )
 
-    def read(answer: Answer) -> Any:
+    def read(answer: Response) -> Any:
         return decode([reply.data for reply in answer.replies])
 
     def whole(data: Any, _: float) -> Any:
@@ -80,12 +80,12 @@ async def exclusive(*requests: Exchange[Any]) -> Any:
             values.append(value)
         return values
 
-    return await Alone(sequence())
+    return await Exclusive(sequence())
 
 
 async def notification(node: int, seconds: float) -> Any:
     """Wait for a notification of this node: its kind, None after so many seconds."""
-    notice = await Listen(lambda one: one.node == node, seconds)
+    notice = await WaitFor(lambda one: one.node == node, seconds)
     return notice and notice.kind
 
 
@@ -253,4 +253,4 @@ class Engine:
         return self.bus.statistics.nodes[node]
 
 
-__all__ = ["PENDING", "Cancelled", "Effect", "Engine", "LinkLost", "Priority", "Timeout", "request"]
+__all__ = ["PENDING", "Cancelled", "Effect", "Engine", "LinkLost", "Priority", "TimeoutClass", "request"]

@@ -7,7 +7,7 @@ from typing import Any
 
 from motorbus.bus.blocking import Bus
 from motorbus.core.family import SimulatedNode
-from motorbus.core.operation import Answer, Data, Due, Effect, Exchange
+from motorbus.core.operation import Data, Effect, Exchange, Expected, Response
 from motorbus.families.feetech import FAMILY, wire
 from motorbus.link.base import Line
 from motorbus.link.memory import MemoryLink
@@ -74,18 +74,18 @@ class Responder:
         self.rate = rate
 
 
-def first_byte(answer: Answer) -> int:
+def first_byte(answer: Response) -> int:
     return answer.replies[0].data[5]
 
 
 def position(node: int) -> Exchange[int]:
     """The low byte of register 56, which is the id."""
-    return Exchange(wire.read(node, 56, 2), (Due(node, node, 8),), first_byte, repeatable=True)
+    return Exchange(wire.read(node, 56, 2), (Expected(node, node, 8),), first_byte, repeatable=True)
 
 
-def write(node: int, address: int, value: int, effect: Effect = Effect.NONE) -> Exchange[Answer]:
+def write(node: int, address: int, value: int, effect: Effect = Effect.NONE) -> Exchange[Response]:
     return Exchange(
-        wire.write(node, address, bytes([value])), (Due(node, node, 6),), effect=effect, repeatable=True
+        wire.write(node, address, bytes([value])), (Expected(node, node, 6),), effect=effect, repeatable=True
     )
 
 

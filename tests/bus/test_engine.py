@@ -27,7 +27,7 @@ from tests.bus.adapter import (
     Effect,
     Engine,
     Priority,
-    Timeout,
+    TimeoutClass,
     exclusive,
     notification,
     request,
@@ -268,7 +268,7 @@ def test_a_group_reply_does_not_prove_a_node_that_owes_one(engine: Engine) -> No
     """A scan is sent without a probe, too."""
     engine.submit("a", read(1, repeatable=False))
     engine.advance(0.03)
-    engine.submit("b", read(1, 3, timeout=Timeout.SCAN))
+    engine.submit("b", read(1, 3, timeout=TimeoutClass.SCAN))
     engine.deliver(said(1, 7, 3))
     assert engine.result("b") == 7
     engine.sent()

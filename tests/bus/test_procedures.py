@@ -8,16 +8,16 @@ import pytest
 
 from motorbus.core.operation import (
     CanFrame,
-    Journal,
-    Listen,
-    Operation,
-    Pause,
+    Emit,
+    Gather,
+    JournalEntry,
+    Procedure,
     Progress,
-    Report,
-    Together,
-    Tune,
-    afterwards,
-    outcome,
+    SetBitrate,
+    Sleep,
+    WaitFor,
+    catch,
+    with_cleanup,
 )
 from motorbus.errors import LinkError, NoReply, RequestError
 from tests.bus.adapter import Cancelled, Effect, Engine
@@ -44,34 +44,34 @@ def lock(node: int, closed: int) -> Any:
     return write(node, closed, address=LOCK, effect=Effect.PERSISTENT, repeatable=True)
 
 
-def guarded(node: int, work: Any = None) -> Operation[None]:
+def guarded(node: int, work: Any = None) -> Procedure[None]:
     """Open the lock, change something, close the lock whatever happens."""
 
     async def change() -> None:
         await lock(node, 0)
         await (work or write(node, 9, repeatable=True))
 
-    return afterwards(change(), lambda: lock(node, 1))
+    return with_cleanup(change(), lambda: lock(node, 1))
 
 
 async def turning(*rests: float) -> None:
     """Wait for ever; then wait for something to come to rest, and write."""
     try:
-        await Pause(1e9)
+        await Sleep(1e9)
     finally:
         for rest in rests:
-            await outcome(Pause(rest))
-        await outcome(write(1, 9))
+            await catch(Sleep(rest))
+        await catch(write(1, 9))
 
 
 def test_each_step_gives_its_value(engine: Engine) -> None:
     async def everything() -> list[Any]:
         values: list[Any] = [await read(1)]
-        values += await Together([read(2), read(3)])
+        values += await Gather([read(2), read(3)])
         none: list[Any] = []
-        values.append(await Together(none))
-        values.append(await Pause(3600.0) > 3600.0)
-        values += [await Tune(500_000), await Tune(0), await read(4)]
+        values.append(await Gather(none))
+        values.append(await Sleep(3600.0) > 3600.0)
+        values += [await SetBitrate(500_000), await SetBitrate(0), await read(4)]
         return values
 
     assert engine.run(everything()) == [100, 200, 300, [], True, 1_000_000, 500_000, 400]
@@ -83,7 +83,7 @@ def test_one_failure_of_several_stops_none_of_the_others(engine: Engine) -> None
     servos.silent = {2, 4}
 
     async def several() -> list[Any]:
-        return await Together([read(node) for node in (1, 2, 3, 4)])
+        return await Gather([read(node) for node in (1, 2, 3, 4)])
 
     with pytest.raises(NoReply, match="node 2") as caught:
         engine.run(several())
@@ -97,7 +97,7 @@ def test_reports_are_handed_over_before_the_next_step_and_what_they_raise_comes_
     async def work() -> None:
         try:
             for done in range(2):
-                await Report(Progress(done, 2))
+                await Emit(Progress(done, 2))
                 await read(1)
         finally:
             await lock(1, 1)
@@ -116,7 +116,7 @@ def test_reports_are_handed_over_before_the_next_step_and_what_they_raise_comes_
 
 def test_without_a_journal_a_guarded_change_is_refused_before_it_begins(engine: Engine) -> None:
     async def change() -> None:
-        await Report(Journal("set_id", "begun", {}))
+        await Emit(JournalEntry("set_id", "begun", {}))
         await write(1, 2, address=5)
 
     with pytest.raises(RequestError, match="keeps no journal"):
@@ -127,7 +127,7 @@ def test_without_a_journal_a_guarded_change_is_refused_before_it_begins(engine: 
 @pytest.mark.parametrize("after", [0.0, 0.0005, 0.001, 0.0015])
 def test_a_cancelled_change_closes_its_lock_at_every_step(engine: Engine, after: float) -> None:
     async def both() -> Any:
-        return await Together([guarded(node, Pause(0.001)) for node in (1, 2)])
+        return await Gather([guarded(node, Sleep(0.001)) for node in (1, 2)])
 
     engine.submit("a", both())
     engine.advance(after)
@@ -167,12 +167,12 @@ def test_a_clean_up_that_does_not_end_is_given_up_and_a_second_cancel_shortens_i
 def test_what_a_clean_up_failed_with_goes_with_the_cancellation_once(engine: Engine) -> None:
     async def failing(text: str) -> None:
         try:
-            await Pause(1e9)
+            await Sleep(1e9)
         finally:
             raise RequestError(text)
 
     async def several() -> Any:
-        return await Together([failing("it may turn"), failing("it may turn"), failing("so may this")])
+        return await Gather([failing("it may turn"), failing("it may turn"), failing("so may this")])
 
     engine.submit("a", several())
     engine.cancel("a")
@@ -182,10 +182,10 @@ def test_what_a_clean_up_failed_with_goes_with_the_cancellation_once(engine: Eng
 
 def test_while_a_bus_only_listens_requests_are_refused_and_notifications_received(can: Engine) -> None:
     async def listen() -> list[Any]:
-        await Tune(125_000, listen_only=True)
-        refused = await outcome(can_read(1))
-        notice = await Listen(lambda one: one.node == 5, 0.1)
-        before = await Tune(500_000)
+        await SetBitrate(125_000, listen_only=True)
+        refused = await catch(can_read(1))
+        notice = await WaitFor(lambda one: one.node == 5, 0.1)
+        before = await SetBitrate(500_000)
         return [refused, notice, before, await can_read(1)]
 
     can.submit("a", listen())
@@ -206,14 +206,14 @@ def test_a_rate_that_the_link_refuses_fails_the_change_only(
 
     monkeypatch.setattr(can.link, "tune", refuse)
     with pytest.raises(LinkError, match="cannot"):
-        can.run(Tune(125_000, listen_only=True))
+        can.run(SetBitrate(125_000, listen_only=True))
     assert can.bus.rate == 500_000
     assert can.run(can_read(1)) == 100
 
 
 def test_a_stop_is_sent_at_the_rate_at_which_nodes_answered(can: Engine) -> None:
     can.run(can_read(1, tells_position=True))
-    can.run(Tune(125_000, listen_only=True))
+    can.run(SetBitrate(125_000, listen_only=True))
     assert can.estop().acknowledged == (1,)
     assert can.bus.rate == can.wire.rate == 500_000
 

@@ -17,7 +17,7 @@ import motorbus
 from motorbus import feetech
 from motorbus.bus.blocking import exchange_on
 from motorbus.bus.running import run_on
-from motorbus.core.operation import Exchange, Pause
+from motorbus.core.operation import Exchange, Sleep
 from motorbus.errors import Interrupted, LinkLost
 from motorbus.families.feetech.driver.torque import disable_torque_everyone
 from tests.bus.test_batches import Arm
@@ -45,7 +45,7 @@ async def carried_out(order: Exchange[Any]) -> None:
 async def reading(arm: Arm, times: int, pause: float = 0.0) -> None:
     for _ in range(times):
         await arm.batch()[1]
-        await Pause(pause)
+        await Sleep(pause)
 
 
 @pytest.mark.parametrize("kind", ["exchange", "run"])
@@ -147,7 +147,7 @@ def test_a_second_signal_does_not_take_the_clean_up_away(arms: list[Arm], where:
                 await arm.batch()[1]
                 signal.raise_signal(signal.SIGINT)
             while True:
-                await Pause(0.5)
+                await Sleep(0.5)
         finally:
             signal.raise_signal(signal.SIGINT)
             await arm.batch()[1]
@@ -203,7 +203,7 @@ def test_an_emergency_stop_ends_the_calls_of_a_loop_that_is_closed() -> None:
 
         async def begin() -> None:
             await bus.run(feetech.Servo.position.function(feetech.AsyncServo(bus, 1)))
-            pending.append(loop.create_task(bus.run(Pause(60.0))))
+            pending.append(loop.create_task(bus.run(Sleep(60.0))))
             await asyncio.sleep(0.05)
 
         loop.run_until_complete(begin())

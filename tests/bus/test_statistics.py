@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motorbus.bus.statistics import BUCKETS, Statistics
-from motorbus.core.operation import ANY, Due
+from motorbus.core.operation import ANY, Expected
 
 
 @pytest.mark.parametrize(
@@ -13,7 +13,7 @@ from motorbus.core.operation import ANY, Due
 )
 def test_a_latency_falls_into_its_power_of_two(seconds: float, bucket: int) -> None:
     statistics = Statistics()
-    dues = Due(3, 3, 8), Due(4, 4, 8)
+    dues = Expected(3, 3, 8), Expected(4, 4, 8)
     statistics.asked(dues)
     statistics.answered(dues, seconds)
     for ledger in statistics.nodes.values():

@@ -14,7 +14,7 @@ import pytest
 
 from motorbus.bus.blocking import Bus
 from motorbus.bus.stop_socket import STOP_TIMEOUT, request_estop
-from motorbus.core.operation import Effect, Exchange, Tune
+from motorbus.core.operation import Effect, Exchange, SetBitrate
 from motorbus.errors import LinkError, LinkLost, PortNotFound
 from motorbus.families.feetech import FAMILY
 from motorbus.link.memory import MemoryLink
@@ -91,7 +91,7 @@ def test_a_stop_is_sent_at_the_rate_of_the_last_prepared_reply() -> None:
     read = position(1)
     kept = Exchange(read.request, read.replies, read.read, repeatable=True, whole=lambda data, at: data[5])
     for rate in (1_000_000, 500_000):
-        bus.run(Tune(rate))
+        bus.run(SetBitrate(rate))
         for _ in range(3):
             assert bus.run(kept) == 1
     bus.estop()

@@ -13,15 +13,15 @@ from motorbus.cli.exits import Unforeseeable
 from motorbus.cli.output import Output
 from motorbus.core.operation import (
     INTENT,
-    Alone,
+    Emit,
     Exchange,
-    Journal,
-    Listen,
-    Pause,
+    Exclusive,
+    Gather,
+    JournalEntry,
     Progress,
-    Report,
-    Together,
-    Tune,
+    SetBitrate,
+    Sleep,
+    WaitFor,
 )
 from motorbus.errors import LimitExceeded
 from motorbus.families.feetech import FAMILY, Servo
@@ -56,10 +56,10 @@ def test_the_gate_stands_in_a_dry_run_too(arm: Simulation) -> None:
 
 def test_nobody_waits_in_a_rehearsal_but_its_time_passes(arm: Simulation) -> None:
     async def waiting() -> float:
-        began = await Pause(0)
-        heard = await Listen(lambda _: True, 100.0)
+        began = await Sleep(0)
+        heard = await WaitFor(lambda _: True, 100.0)
         assert heard is None
-        return await Pause(1000.0) - began
+        return await Sleep(1000.0) - began
 
     with motorbus.open(arm.url) as bus:
         before = bus.link.now()
@@ -69,8 +69,8 @@ def test_nobody_waits_in_a_rehearsal_but_its_time_passes(arm: Simulation) -> Non
 
 def test_events_are_heard_and_no_journal_is_kept(arm: Simulation) -> None:
     async def told() -> None:
-        await Report(Journal("set_id", INTENT, {"node": 1}))
-        await Report(Progress(1, 2))
+        await Emit(JournalEntry("set_id", INTENT, {"node": 1}))
+        await Emit(Progress(1, 2))
 
     heard: list[object] = []
     with motorbus.open(arm.url) as bus:
@@ -121,17 +121,17 @@ def test_another_device_is_apart_and_its_frames_are_shown_with_the_rest(arm: Sim
 
 def test_the_rate_of_the_bus_is_known(arm: Simulation) -> None:
     with motorbus.open(arm.url) as bus:
-        assert DryBus(bus).run(Tune(0)) == 1_000_000
+        assert DryBus(bus).run(SetBitrate(0)) == 1_000_000
 
 
 def test_every_kind_of_step_is_gone_through(arm: Simulation) -> None:
     async def inner(name: str) -> str:
-        await Pause(1.0)
-        await Report(name)
+        await Sleep(1.0)
+        await Emit(name)
         return name
 
     async def outer() -> list[str]:
-        return [await Alone(inner("a")), *await Together([inner("b"), inner("c")])]
+        return [await Exclusive(inner("a")), *await Gather([inner("b"), inner("c")])]
 
     with motorbus.open(arm.url) as bus:
         assert DryBus(bus).run(outer()) == ["a", "b", "c"]

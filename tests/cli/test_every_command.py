@@ -14,7 +14,7 @@ import pytest
 
 import motorbus
 from motorbus import families
-from motorbus.core.operation import INTENT, CanFrame, Journal
+from motorbus.core.operation import INTENT, CanFrame, JournalEntry
 from tests.cli.conftest import Bench, Run
 from tests.support.subjects import FAMILIES, TEMPLATE, template_entry_points, vectors
 from tests.support.world import moves
@@ -210,7 +210,7 @@ def standing(family: str, command: str = "") -> Iterator[str]:
 def leave_unfinished(bus: Any, registers: bytes) -> None:
     """The id of servo 1 was about to become 7 when the program was killed."""
     facts = {"node": 1, "new": 7, "rate": 1_000_000, "new_rate": 1_000_000, "registers": registers.hex()}
-    bus.journal(Journal("set_id", INTENT, {**facts, "others": []}))
+    bus.journal(JournalEntry("set_id", INTENT, {**facts, "others": []}))
 
 
 def can(family: str, command: str) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import motorbus
-from motorbus.core.operation import Pause
+from motorbus.core.operation import Sleep
 from tests.cli.conftest import Bench, Run
 from tests.cli.stepper.conftest import line_of
 
@@ -21,7 +21,7 @@ def homed(
         ran = run("home", f"{line.url}#1", *words)
         orders = line.orders()
         with motorbus.open(line.url) as bus:
-            bus.run(Pause(2.0))  # a slow stop takes its time
+            bus.run(Sleep(2.0))  # a slow stop takes its time
         return ran.code, ran.out + ran.err, orders, simulation[1].status()["frequency"]
 
 

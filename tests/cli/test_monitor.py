@@ -6,7 +6,7 @@ import pytest
 
 import motorbus
 from motorbus.cli import monitor
-from motorbus.core.operation import Pause
+from motorbus.core.operation import Sleep
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Bench, Run
 
@@ -86,7 +86,7 @@ def test_l12_it_goes_on_when_a_port_that_was_gone_is_there_again(
         pauses.append(seconds)
         if len(pauses) == 2:
             arm.unplug(seconds=1.0)
-        await Pause(seconds)
+        await Sleep(seconds)
 
     monkeypatch.setattr(monitor, "_pause", pulled)
     ran = run("monitor", f"{arm.url}#1", "--rate", "4", "--count", "12", "--json")
@@ -105,7 +105,7 @@ def test_it_ends_where_a_port_is_not_looked_for(
 ) -> None:
     async def pulled(seconds: float) -> None:
         arm.unplug(seconds=1.0)
-        await Pause(seconds)
+        await Sleep(seconds)
 
     monkeypatch.setattr(monitor, "_pause", pulled)
     ran = run("monitor", f"{arm.url}#1", "--reconnect", "no", "--count", "12", "--json")

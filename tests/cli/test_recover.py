@@ -14,7 +14,7 @@ import pytest
 import motorbus
 from motorbus import session
 from motorbus.cli.simulated import Simulated
-from motorbus.core.operation import INTENT, Journal
+from motorbus.core.operation import INTENT, JournalEntry
 from motorbus.journal import BusJournal
 from motorbus.link.lock import journal_path
 from motorbus.simulation.named import Simulation
@@ -95,7 +95,7 @@ def half(arm: Simulation) -> Simulation:
             "registers": image,
             "others": [1],
         }
-        bus.journal(Journal("set_id", INTENT, facts))
+        bus.journal(JournalEntry("set_id", INTENT, facts))
     return arm
 
 
@@ -150,7 +150,7 @@ def test_a_port_that_has_another_name_since(run: Run, served: Simulated, tmp_pat
 
 def test_a_change_on_a_port_that_is_gone_is_given_up_without_it(run: Run, state_folder: Path) -> None:
     kept = BusJournal("feetech:/dev/ttyACM42", journal_path("/dev/ttyACM42"))
-    kept(Journal("set_id", INTENT, {"node": 3, "new": 7}))
+    kept(JournalEntry("set_id", INTENT, {"node": 3, "new": 7}))
     assert run("recover", "feetech:/dev/ttyACM42", "--yes").code == 3
     assert run("recover", "feetech:/dev/ttyACM42", "--forget").code == 8
     ran = run("recover", "feetech:/dev/ttyACM42", "--forget", "--yes")
@@ -233,7 +233,7 @@ def lent() -> Iterator[Simulation]:
             "wanted": {"step_1_speed": 60},
         }
         assert bus.journal is not None
-        bus.journal(Journal("jog", INTENT, facts))
+        bus.journal(JournalEntry("jog", INTENT, facts))
         bus.close()
         yield simulation
 
@@ -274,7 +274,7 @@ def test_a_dry_run_of_giving_back_shows_the_stop_first(run: Run, lent: Simulatio
 
 def test_a_borrow_is_listed(run: Run, state_folder: Path) -> None:
     kept = BusJournal("stepper:/dev/ttyUSB7", journal_path("/dev/ttyUSB7"))
-    kept(Journal("move_by", INTENT, {"node": 1, "what": "the borrow of project 1 (for move_by)"}))
+    kept(JournalEntry("move_by", INTENT, {"node": 1, "what": "the borrow of project 1 (for move_by)"}))
     ran = run("recover")
     assert "the borrow of project 1 (for move_by)" in ran.out
     assert "motorbus recover stepper:/dev/ttyUSB7" in ran.out

@@ -11,7 +11,7 @@ from motorbus.cli import robot
 from motorbus.cli.machine import machine as machine_of_file
 from motorbus.cli.machine import using
 from motorbus.cli.output import Output
-from motorbus.core.operation import INTENT, Journal, Progress
+from motorbus.core.operation import INTENT, JournalEntry, Progress
 from motorbus.errors import MotorbusError, RequestError
 from tests.cli.conftest import Bench, Run
 
@@ -56,7 +56,7 @@ def test_a_command_that_is_recommended_names_the_bus_that_is_meant(bench: Bench)
     assert hint("a1", "lift") == "`motorbus recover BUS` gives it back"
     with motorbus.open(bench.simulations["stage"].url) as bus:
         assert bus.journal is not None
-        bus.journal(Journal("jog", INTENT, {"node": 1, "what": "the borrow"}))
+        bus.journal(JournalEntry("jog", INTENT, {"node": 1, "what": "the borrow"}))
     assert hint("a1", "lift") == "`motorbus recover stage` gives it back"
 
 

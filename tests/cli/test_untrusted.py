@@ -6,7 +6,7 @@ import pytest
 
 import motorbus
 from motorbus.cli.exits import Exit
-from motorbus.core.operation import INTENT, OUTCOME, Journal
+from motorbus.core.operation import INTENT, OUTCOME, JournalEntry
 from tests.cli.conftest import Bench, Run
 
 
@@ -14,7 +14,7 @@ def noted(bench: Bench, state: str, **facts: object) -> None:
     """It stands in the journal of the bus of the arm."""
     with motorbus.open(bench.simulations["arm"].url) as bus:
         assert bus.journal is not None
-        bus.journal(Journal("set_id", state, {"node": 1, "new": 9, **facts}))
+        bus.journal(JournalEntry("set_id", state, {"node": 1, "new": 9, **facts}))
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_a_borrow_that_was_cut_off_is_one_error_for_every_command(
 ) -> None:
     with motorbus.open(bench.simulations["stage"].url) as bus:
         assert bus.journal is not None
-        bus.journal(Journal("jog", INTENT, {"node": 1, "what": "the borrow of project 1 (for jog)"}))
+        bus.journal(JournalEntry("jog", INTENT, {"node": 1, "what": "the borrow of project 1 (for jog)"}))
     told = run(*command.split())
     assert told.code == Exit.UNSAFE, told.err
     assert "error: lift is at fault: untrusted: the borrow of project 1 (for jog) did not" in told.err

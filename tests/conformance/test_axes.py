@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from motorbus.core.family import Family, Health, State, Train
-from motorbus.core.operation import Effect, Exchange, Runnable, Together, outcome
+from motorbus.core.operation import Effect, Exchange, Gather, Runnable, catch
 from motorbus.errors import LimitExceeded, NoReply, RequestError
 from tests.support.subjects import line_of
 from tests.support.world import IDS, Steps, World, abilities, kept, sent, world
@@ -164,7 +164,7 @@ def heard(there: World, train: Train) -> dict[int, float]:
 
 
 async def visited(exchanges: Any) -> list[Any]:
-    return await Together([outcome(one) for one in exchanges])
+    return await Gather([catch(one) for one in exchanges])
 
 
 def led(there: World, train: Train, to: Mapping[int, float]) -> None:
@@ -172,7 +172,7 @@ def led(there: World, train: Train, to: Mapping[int, float]) -> None:
 
 
 async def together(exchanges: Any) -> None:
-    await Together(list(exchanges))
+    await Gather(list(exchanges))
 
 
 def stands(there: World) -> dict[int, int]:

@@ -13,15 +13,15 @@ import pytest
 from motorbus.core.family import Family
 from motorbus.core.operation import (
     ANY,
-    Answer,
     CanFrame,
     Data,
-    Due,
     Effect,
     Exchange,
-    Rank,
-    Timeout,
-    Together,
+    Expected,
+    Gather,
+    Priority,
+    Response,
+    TimeoutClass,
 )
 from motorbus.errors import MotorbusError, RequestError
 from tests.support.subjects import FAMILIES, PACKAGES, line_of, possible
@@ -100,22 +100,22 @@ def test_air_time_grows_with_length_and_falls_with_rate(family: Family) -> None:
     rate = family.link.rate
 
     def takes(request: int, *replies: int) -> float:
-        dues = tuple(Due(1, 1, length) for length in replies)
+        dues = tuple(Expected(1, 1, length) for length in replies)
         return family.air_time(Exchange(request_of(family, request), dues), rate)
 
     assert 0 < takes(1) < takes(4) < takes(8) < takes(8, 1) < takes(8, 4) < takes(8, 8) < takes(8, 8, 1)
-    some: Exchange[Any] = Exchange(request_of(family, 8), (Due(1, 1, 8),))
+    some: Exchange[Any] = Exchange(request_of(family, 8), (Expected(1, 1, 8),))
     assert family.air_time(some, rate) > family.air_time(some, 2 * rate)
     assert family.air_time(Exchange(request_of(family, 8), ANY), rate) > 0
 
 
 def test_thinking_takes_some_time_and_storing_no_less(family: Family) -> None:
     times = {
-        kind: family.turnaround(Exchange(request_of(family, 8), (Due(1, 1, 8),), timeout=kind))
-        for kind in Timeout
+        kind: family.turnaround(Exchange(request_of(family, 8), (Expected(1, 1, 8),), timeout=kind))
+        for kind in TimeoutClass
     }
-    assert 0 < times[Timeout.REPLY] <= times[Timeout.STORE]
-    assert times[Timeout.SCAN] > 0
+    assert 0 < times[TimeoutClass.REPLY] <= times[TimeoutClass.STORE]
+    assert times[TimeoutClass.SCAN] > 0
 
 
 def test_the_quiet_time_is_no_shorter_than_a_reply(family: Family) -> None:
@@ -139,7 +139,7 @@ def test_lanes_and_window_agree_and_as_many_fly_as_the_window_allows(subject: Fa
 
 
 async def probes(family: Family) -> list[bool]:
-    return await Together([family.probe(node, 0) for node in possible(family, IDS)])
+    return await Gather([family.probe(node, 0) for node in possible(family, IDS)])
 
 
 # --- probes, echo, stop -------------------------------------------------------------------------------------
@@ -179,7 +179,7 @@ def test_a_probe_knows_a_wrong_answer(subject: Family) -> None:
     with world(subject) as there:
         probe = subject.probe(IDS[0], 0)
         assert probe.read is not None
-        plain: Exchange[Answer] = Exchange(probe.request, probe.replies, lane=probe.lane)
+        plain: Exchange[Response] = Exchange(probe.request, probe.replies, lane=probe.lane)
         answer = there.bus.run(plain)
         assert probe.read(answer) is True
         wrong = [answer.replies[0]._replace(data=damaged) for damaged in one_bit_off(answer.replies[0].data)]
@@ -192,7 +192,7 @@ def one_bit_off(data: bytes) -> list[bytes]:
             for place in range(len(data)) for bit in range(8)]  # fmt: skip
 
 
-def verdict(probe: Exchange[bool], answer: Answer) -> bool | None:
+def verdict(probe: Exchange[bool], answer: Response) -> bool | None:
     """What the probe makes of an answer; None when it calls it an error, as a refusal."""
     assert probe.read is not None
     try:
@@ -206,7 +206,7 @@ def test_a_stop_says_what_it_promises(family: Family, nodes: tuple[int, ...]) ->
     nodes = possible(family, nodes)
     stop = family.stop(dict.fromkeys(nodes))
     assert stop.promise.strip()
-    assert {exchange.rank for exchange in stop.exchanges} <= {Rank.STOP}
+    assert {exchange.rank for exchange in stop.exchanges} <= {Priority.STOP}
     dues = [due.node for one in stop.exchanges if one.replies is not ANY for due in one.replies]
     assert set(dues) == set(nodes)
     assert {dues.count(node) for node in nodes} <= ({1} if line_of(family).devices != 1 else {1, 2})

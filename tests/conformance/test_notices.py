@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from motorbus.core.family import Family
-from motorbus.core.operation import Data, Listen, Notice
+from motorbus.core.operation import Data, Notification, WaitFor
 from motorbus.link.base import Delivery, PerfectLine, Side
 from tests.support.subjects import vectors
 from tests.support.world import IDS, reports, said, sent, world
@@ -32,7 +32,7 @@ def said_unasked(family: Family) -> list[Data]:
         vector.data
         for vector in vectors(family.name)
         if vector.direction == "status"
-        and any(isinstance(event, Notice) for event in family.receiver().feed(vector.data))
+        and any(isinstance(event, Notification) for event in family.receiver().feed(vector.data))
     ]
 
 
@@ -70,8 +70,8 @@ def test_a_notice_names_its_node_and_reaches_who_listens(reporter: Family) -> No
 
 
 def test_who_listens_in_vain_goes_on_in_time(reporter: Family) -> None:
-    async def listening() -> Notice | None:
-        return await Listen(lambda notice: True, 0.5)
+    async def listening() -> Notification | None:
+        return await WaitFor(lambda notice: True, 0.5)
 
     with world(reporter) as there:
         begun = there.link.now()
@@ -80,10 +80,10 @@ def test_who_listens_in_vain_goes_on_in_time(reporter: Family) -> None:
 
 
 def test_a_device_under_way_says_so_and_the_bus_listens(reporting_mover: Family) -> None:
-    async def moved() -> tuple[Notice | None, float]:
+    async def moved() -> tuple[Notification | None, float]:
         to = await said(device, "position") + 1.0
         await said(device, "move", to, wait=False)
-        notice = await Listen(lambda notice: notice.node == NODE, 10.0)
+        notice = await WaitFor(lambda notice: notice.node == NODE, 10.0)
         there.link.advance(5.0)
         return notice, abs(await said(device, "position") - to)
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from motorbus.core.family import Family, Found
-from motorbus.core.operation import Effect, Exchange, Progress, Runnable, Together
+from motorbus.core.operation import Effect, Exchange, Gather, Progress, Runnable
 from motorbus.errors import NoReply
 from tests.support.subjects import possible
 from tests.support.world import IDS, Cut, Steps, TraceRecord, World, has, said, sent, world
@@ -201,7 +201,7 @@ def test_what_a_simulated_node_says_of_itself_is_plain_data(subject: Family) -> 
 
 def test_nodes_that_go_and_come_are_noticed(subject: Family) -> None:
     async def everyone() -> list[bool]:
-        return await Together([said(there.device(node), "ping") for node in there.ids])
+        return await Gather([said(there.device(node), "ping") for node in there.ids])
 
     with world(subject) as there:
         assert there.bus.run(everyone()) == [True] * len(there.ids)

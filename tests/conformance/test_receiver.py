@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motorbus.core.family import Explanation, Family, Receiver
-from motorbus.core.operation import CanFrame, Data, Event, Noise, Notice, Reply
+from motorbus.core.operation import CanFrame, Data, Event, Noise, Notification, Reply
 from tests.support.subjects import FAMILIES, Vector, line_of, payload, possible, vectors
 
 MOST_HELD = 4096
@@ -24,7 +24,7 @@ JUNK = (b"\0", b"\xff", b"\xff\xff", b"\x55\xaa" * 5, bytes(range(32)), b"\xee" 
 
 
 def answers(events: Iterable[Event]) -> list[bytes]:
-    return [event.data for event in events if isinstance(event, Reply | Notice)]
+    return [event.data for event in events if isinstance(event, Reply | Notification)]
 
 
 def fed(receiver: Receiver, pieces: Iterable[Data]) -> list[Event]:

@@ -1,4 +1,4 @@
-"""Steps are values; `await` gives each the type of its value; `afterwards` always cleans up."""
+"""Steps are values; `await` gives each the type of its value; `with_cleanup` always cleans up."""
 
 from __future__ import annotations
 
@@ -8,44 +8,44 @@ from typing import Any, assert_type
 import pytest
 
 from motorbus.core.operation import (
-    Alone,
-    Due,
+    Emit,
     Exchange,
+    Exclusive,
+    Expected,
+    Gather,
     Guard,
-    Listen,
-    Notice,
-    Operation,
-    Pause,
-    Report,
+    Notification,
+    Procedure,
     Runnable,
+    SetBitrate,
     Shielded,
+    Sleep,
     Step,
-    Together,
-    Tune,
-    afterwards,
+    WaitFor,
+    catch,
     discard,
-    outcome,
+    with_cleanup,
 )
 from motorbus.errors import MotorbusError, NoReply
 from tests.families.player import played
 
 
 def number(value: int) -> Exchange[int]:
-    return Exchange(bytes([value]), (Due(1, 1, 1),), lambda answer: answer.replies[0].data[0])
+    return Exchange(bytes([value]), (Expected(1, 1, 1),), lambda answer: answer.replies[0].data[0])
 
 
 async def everything() -> str:
     one = await number(1)
     assert_type(one, int)
-    several = await Together([number(2), number(3)])
+    several = await Gather([number(2), number(3)])
     assert_type(several, list[int])
-    alone = await Alone(number(4))
+    alone = await Exclusive(number(4))
     assert_type(alone, int)
-    await Pause(0.1)
-    notice = await Listen(lambda n: True, 1.0)
-    assert_type(notice, Notice | None)
-    await Tune(500_000)
-    await Report("event")
+    await Sleep(0.1)
+    notice = await WaitFor(lambda n: True, 1.0)
+    assert_type(notice, Notification | None)
+    await SetBitrate(500_000)
+    await Emit("event")
     return f"{one} {several} {alone} {notice}"
 
 
@@ -60,18 +60,18 @@ def test_every_step_yields_itself_and_returns_what_is_sent_in() -> None:
     kinds.append(type(step))
     with pytest.raises(StopIteration) as end:
         operation.send(answers[-1])
-    assert kinds == [Exchange, Together, Alone, Pause, Listen, Tune, Report]
+    assert kinds == [Exchange, Gather, Exclusive, Sleep, WaitFor, SetBitrate, Emit]
     assert end.value.value == "1 [2, 3] 4 None"
 
 
 def test_an_outcome_turns_our_errors_into_values_and_no_others() -> None:
-    operation: Operation[int | MotorbusError] = outcome(number(1))
+    operation: Procedure[int | MotorbusError] = catch(number(1))
     begun = operation.send(None)
     assert isinstance(begun, Exchange)
     with pytest.raises(StopIteration) as end:
         _ = operation.throw(NoReply("silent"))
     assert isinstance(end.value.value, NoReply)
-    operation = outcome(number(1))
+    operation = catch(number(1))
     begun = operation.send(None)
     with pytest.raises(KeyboardInterrupt):
         _ = operation.throw(KeyboardInterrupt())
@@ -118,7 +118,7 @@ CASES.remove((ERRORS[1], 9))  # a bus raises it when the guard has ended
 @pytest.mark.parametrize(("error", "fails_at"), CASES)
 def test_the_end_of_a_guard_follows_its_beginning(kind: str, error: BaseException, fails_at: int) -> None:
     log: list[int] = []
-    work = changed(log) if kind == "guard" else afterwards(number(2), lambda: number(9))
+    work = changed(log) if kind == "guard" else with_cleanup(number(2), lambda: number(9))
     if fails_at in ((1, 2, 9) if kind == "guard" else (2, 9)):
         with pytest.raises(type(error)):
             carried_out(work, log, fails_at=fails_at, error=error)
@@ -136,5 +136,5 @@ def test_a_procedure_that_is_dropped_leaves_no_guard() -> None:
 
 def test_what_is_never_started_is_closed_with_all_that_it_was_given() -> None:
     inner = changed([])
-    discard(Together([Alone(outcome(inner))]))
+    discard(Gather([Exclusive(catch(inner))]))
     assert getcoroutinestate(inner) == CORO_CLOSED

@@ -10,7 +10,7 @@ import pytest
 
 from motorbus import AsyncRobot, NoReply, RequestError, Robot
 from motorbus.core.family import Quality
-from motorbus.core.operation import Pause
+from motorbus.core.operation import Sleep
 from motorbus.motion.axis import AsyncAxis, Axis
 from motorbus.motion.body import Body
 from motorbus.motion.capabilities import ability
@@ -111,12 +111,12 @@ def test_effort_has_the_direction_of_the_axis() -> None:
 
 
 async def _told(value: float) -> float:
-    await Pause(0)
+    await Sleep(0)
     return value
 
 
 async def _pause(seconds: float) -> float:
-    return await Pause(seconds)
+    return await Sleep(seconds)
 
 
 def test_a_linear_axis_is_in_metres() -> None:

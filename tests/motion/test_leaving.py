@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from motorbus import AsyncRobot, LinkLost, MotorbusError, NotHomed, Robot
-from motorbus.core.operation import Pause, Together, outcome
+from motorbus.core.operation import Gather, Sleep, catch
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.leaving import Leaving, given_up, goes_on
 from motorbus.motion.machine import Machine
@@ -102,7 +102,7 @@ def _is_last(titles: list[str], number: int) -> bool:
 
 
 async def _wait(seconds: float) -> None:
-    await Pause(seconds)
+    await Sleep(seconds)
 
 
 def test_everyone_is_visited_though_some_are_dead() -> None:
@@ -299,8 +299,8 @@ def test_a_stop_of_others_in_a_movement_needs_no_more_when_it_is_left() -> None:
     with machine(arm="1") as (made, sims), Robot.of(made) as robot:
 
         async def both() -> list[object]:
-            told = await Together(
-                [outcome(moving.move_axis(robot["a1"], 1.0)), outcome(_stopped_after(robot, 0.3))]
+            told = await Gather(
+                [catch(moving.move_axis(robot["a1"], 1.0)), catch(_stopped_after(robot, 0.3))]
             )
             return list(told)
 
@@ -314,7 +314,7 @@ def test_a_stop_of_others_in_a_movement_needs_no_more_when_it_is_left() -> None:
 async def _stopped_after(robot: Robot, seconds: float) -> object:
     from motorbus.motion.capabilities import stop
 
-    await Pause(seconds)
+    await Sleep(seconds)
     return await stop(robot["a1"])
 
 

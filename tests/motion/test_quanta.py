@@ -8,7 +8,7 @@ from math import inf, nan, radians
 import pytest
 
 from motorbus import AsyncRobot, Robot
-from motorbus.core.operation import Pause
+from motorbus.core.operation import Sleep
 from motorbus.errors import LimitExceeded, MotorbusError, RequestError
 from motorbus.motion.quanta import LONGEST, QUANTUM
 from tests.support.machines import listened, machine, said
@@ -35,7 +35,7 @@ def test_without_a_beat_it_goes_no_further_than_a_quantum(name: str) -> None:
             hand.beat()
             before = robot.positions()[name]
             bus = robot.buses[robot[name].spec.bus]
-            bus.run(Pause(5.0))  # type: ignore[attr-defined]
+            bus.run(Sleep(5.0))  # type: ignore[attr-defined]
             after = robot.positions()[name]
         assert before is not None
         assert after is not None

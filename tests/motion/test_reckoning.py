@@ -9,7 +9,7 @@ from math import pi, tau
 import pytest
 
 from motorbus import AsyncRobot, Interrupted, LimitExceeded, MotorbusError, NotHomed, RequestError, Robot
-from motorbus.core.operation import Pause, Together, outcome
+from motorbus.core.operation import Gather, Sleep, catch
 from motorbus.motion import capabilities as verbs
 from motorbus.motion import reckoning
 from motorbus.motion.abreast import Abreast
@@ -162,14 +162,14 @@ def test_a_stop_in_the_middle_makes_it_unknown(rank: str) -> None:
         lift.declare(0.0)
 
         async def stopped() -> None:
-            await Pause(1.0)
+            await Sleep(1.0)
             if rank == "estop":
                 lift.bus.estop()
             else:
                 await verbs.stop(lift)
 
         async def both() -> list[object]:
-            found = await Together([outcome(reckoning.move_by(lift, 0.1)), outcome(stopped())])
+            found = await Gather([catch(reckoning.move_by(lift, 0.1)), catch(stopped())])
             return list(found)
 
         told: list[object] = robot.conductor.run(Abreast({"stage": both()}, lambda results: results["stage"]))
@@ -254,7 +254,7 @@ def test_a_program_makes_it_unknown() -> None:
 
 
 async def _ran(number: int) -> str:
-    await Pause(0.1)
+    await Sleep(0.1)
     return f"project {number} ran"
 
 

@@ -11,7 +11,7 @@ import pytest
 import motorbus
 from motorbus import AsyncRobot, NoReply, RequestError, Robot
 from motorbus.core.family import Identity
-from motorbus.core.operation import Pause
+from motorbus.core.operation import Sleep
 from motorbus.core.verbs import verb
 from motorbus.motion import recognition
 from tests.support.machines import listened, machine, said
@@ -205,7 +205,7 @@ class Other:
 
     @verb
     async def identify(self) -> Identity:
-        await Pause(0)
+        await Sleep(0)
         return Identity(1, "SCS9999", "9.9", "")
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from motorbus import AsyncRobot, Robot
-from motorbus.core.operation import Data, Pause
+from motorbus.core.operation import Data, Sleep
 from motorbus.errors import Refused, RequestError
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.safety.lease import Lease, Standing
@@ -49,7 +49,7 @@ def turning(sims: dict[str, Simulation], node: int = 1) -> bool:
 def passes(robot: Robot, seconds: float) -> None:
     """Nobody calls the robot for so long."""
     for bus in robot.buses.values():
-        bus.run(Pause(seconds))  # type: ignore[attr-defined]
+        bus.run(Sleep(seconds))  # type: ignore[attr-defined]
 
 
 # -- endless motion ------------------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ import pytest
 
 import motorbus
 from motorbus.bus.base import BaseBus
-from motorbus.core.operation import INTENT, OUTCOME, READABLE, Journal
+from motorbus.core.operation import INTENT, OUTCOME, READABLE, JournalEntry
 from motorbus.errors import Refused
 from motorbus.motion.machine import Machine
 from motorbus.motion.safety import canary
@@ -21,7 +21,7 @@ from tests.support.machines import listened, machine, said
 CHANGE = {"node": 2, "new": 3}
 
 
-def noted(bus: BaseBus, event: Journal) -> None:
+def noted(bus: BaseBus, event: JournalEntry) -> None:
     """It stands in the journal of this bus."""
     assert bus.journal is not None
     bus.journal(event)
@@ -32,7 +32,7 @@ def cut_off(**facts: object) -> Iterator[tuple[Machine, dict[str, Simulation]]]:
     """A machine of four servos, on whose bus the change of the second one was cut off."""
     with machine(arm="1-4") as (made, sims):
         with motorbus.open(sims["arm"].url) as bus:
-            noted(bus, Journal("set_id", INTENT, {**CHANGE, **facts}))
+            noted(bus, JournalEntry("set_id", INTENT, {**CHANGE, **facts}))
         yield made, sims
 
 
@@ -56,7 +56,7 @@ def test_a_device_whose_change_was_cut_off_is_untrusted_by_either_id_until_recov
             robot.disable_torque()
             robot.move({"a1": 0.2, "a4": 0.2})
         with motorbus.open(sims["arm"].url) as bus:
-            noted(bus, Journal("set_id", OUTCOME, {"outcome": "taken back"}))
+            noted(bus, JournalEntry("set_id", OUTCOME, {"outcome": "taken back"}))
         with Robot.of(made) as robot:
             assert robot.faults == {}
             robot.move({"a2": 0.2})
@@ -64,7 +64,7 @@ def test_a_device_whose_change_was_cut_off_is_untrusted_by_either_id_until_recov
 
 def test_it_can_be_cleared_where_the_change_has_ended_meanwhile() -> None:
     with cut_off() as (made, _), Robot.of(made) as robot:
-        noted(robot.buses["arm"], Journal("set_id", OUTCOME, {"outcome": "taken back"}))
+        noted(robot.buses["arm"], JournalEntry("set_id", OUTCOME, {"outcome": "taken back"}))
         robot.clear_fault(["a2", "a3"])
         assert robot.faults == {}
 

@@ -22,7 +22,7 @@ import motorbus
 from motorbus import Robot
 from motorbus.bus.trace import Subscription, TraceRecord
 from motorbus.cli.simulated import Simulated
-from motorbus.core.operation import Report
+from motorbus.core.operation import Emit
 from motorbus.errors import MotorbusError
 from tests.support.machines import machine
 from tests.support.world import is_stopping
@@ -123,8 +123,8 @@ def test_15_whoever_was_told_of_everything_has_gone_away() -> None:
     os.close(writer)
 
 
-def _told() -> Iterator[Report]:
-    yield Report("something")
+def _told() -> Iterator[Emit]:
+    yield Emit("something")
 
 
 def test_15_whoever_asked_for_a_stop_has_gone_away(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from motorbus import AsyncRobot, Robot
-from motorbus.core.operation import CanFrame, Data, outcome
+from motorbus.core.operation import CanFrame, Data, catch
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import disable_torque_all
 from tests.support.machines import Heard, listened, machine
@@ -55,7 +55,7 @@ def befall(robot: Any, sims: Any, fates: Fates) -> None:
 
 def breaking(inner: Callable[[Any], Any]) -> Callable[[Any], Any]:
     async def breaks(device: Any) -> None:
-        await outcome(inner(device))
+        await catch(inner(device))
         raise MotorbusError(FAILS)
 
     return breaks

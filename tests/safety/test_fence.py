@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from motorbus.core.family import Readdressed
-from motorbus.core.operation import Answer, Effect, Exchange, Goal
+from motorbus.core.operation import Effect, Exchange, Goal, Response
 from motorbus.errors import LimitExceeded, NoReply, Refused
 from motorbus.families.feetech import sync_write_positions
 from motorbus.motion.safety.fence import bounds, follow
@@ -182,7 +182,7 @@ def test_what_was_refused_or_only_tried_out_engages_nothing() -> None:
         order = Goal(1, "position", pi + 0.1, 0.0, 6.0)
         axis.position()
         speed = Goal(1, "speed", 1.0, 0.0, 9.0)
-        exchange: Exchange[Answer] = Exchange(b"\x01", effect=Effect.MOTION, goals=(order, speed))
+        exchange: Exchange[Response] = Exchange(b"\x01", effect=Effect.MOTION, goals=(order, speed))
         gate_of(robot).rehearsing()(exchange)
         assert (axis.engaged, axis.under_way) == (False, False)
         gate_of(robot)(exchange)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motorbus.core.goal import Stays, torque_on
-from motorbus.core.operation import EVERY_LANE, Answer, Due, Effect, Exchange, Goal, Rank
+from motorbus.core.operation import EVERY_LANE, Effect, Exchange, Expected, Goal, Priority, Response
 from motorbus.errors import LimitExceeded, Refused
 from motorbus.motion.safety.gate import Gate
 from motorbus.motion.safety.guard import Bounds, Guard
@@ -18,7 +18,7 @@ from motorbus.motion.safety.lease import Lease, Standing
 from motorbus.motion.safety.track import FRESH
 
 
-def motion(*goals: Goal, rank: Rank = Rank.POLL) -> Exchange[Answer]:
+def motion(*goals: Goal, rank: Priority = Priority.POLL) -> Exchange[Response]:
     return Exchange(b"\x01", effect=Effect.MOTION, goals=goals, rank=rank)
 
 
@@ -56,7 +56,7 @@ def test_what_does_not_move_passes(effect: Effect) -> None:
 
 
 def test_a_stop_always_passes() -> None:
-    Gate()(motion(rank=Rank.STOP))
+    Gate()(motion(rank=Priority.STOP))
 
 
 @given(st.floats(), st.floats(-100, 100), st.floats(0, 100))
@@ -86,14 +86,14 @@ class Line:
     def __init__(self, bounds: Bounds = Bounds(-1.0, 2.0, 0.5, 3.0)) -> None:  # noqa: B008 - a value
         self.gate = Gate()
         self.now = 0.0
-        self.seen: dict[int, tuple[Exchange[Any], Answer]] = {}
+        self.seen: dict[int, tuple[Exchange[Any], Response]] = {}
         self.told: list[bool] = []
         self.gate.watch(self.seen, lambda: self.now)
         self.gate.guards[1] = Guard("elbow", bounds, ask=lambda: QUESTION, ordered=self.told.append)
 
     def reads(self, value: float, at: float | None = None) -> None:
         self.now = self.now if at is None else at
-        self.seen[1] = Exchange(b"?", tells_position=lambda _: {1: value}), Answer((), (), self.now)
+        self.seen[1] = Exchange(b"?", tells_position=lambda _: {1: value}), Response((), (), self.now)
 
     def passes(self, *goals: Goal, **options: Any) -> bool:
         try:
@@ -110,7 +110,7 @@ class Line:
         return ""
 
 
-QUESTION: Exchange[Answer] = Exchange(b"?")
+QUESTION: Exchange[Response] = Exchange(b"?")
 
 
 def test_a_guard_wants_to_know_where_it_is_and_looks_by_itself_at_what_the_bus_heard() -> None:
@@ -137,7 +137,7 @@ def test_an_order_for_everyone_is_one_for_those_whom_it_does_not_name() -> None:
     line.reads(0.0, 1.0)
     everyone = {"effect": Effect.MOTION, "lane": EVERY_LANE}
     line.gate(Exchange(b"\x01", goals=(place(0.4, node=2),), **everyone))  # type: ignore[arg-type]
-    order: Exchange[Answer] = Exchange(b"\x01", goals=(place(0.6, node=2),), **everyone)  # type: ignore[arg-type]
+    order: Exchange[Response] = Exchange(b"\x01", goals=(place(0.6, node=2),), **everyone)  # type: ignore[arg-type]
     with pytest.raises(LimitExceeded, match="elbow: this is 0.6 rad"):
         line.gate(order)
     line.now = 9.0
@@ -148,7 +148,7 @@ def test_it_says_what_must_be_asked_before_an_order_can_be_judged() -> None:
     line = Line()
     order = motion(place(0.1), Goal(1, "speed", 1.0, -9.0, 9.0), place(0.0, node=2))
     assert line.gate.required_reads(order) == [QUESTION]
-    assert line.gate.required_reads(motion(place(0.1), rank=Rank.STOP)) == []
+    assert line.gate.required_reads(motion(place(0.1), rank=Priority.STOP)) == []
     assert line.gate.required_reads(motion(Goal(1, "position", 0.1, 0.1, 0.1, Stays.STILL))) == []
     assert line.gate.required_reads(Exchange(b"")) == []
     line.reads(0.0, 1.0)
@@ -198,12 +198,12 @@ def test_a_node_at_fault_neither_moves_nor_gets_torque_and_others_do() -> None:
     line.reads(0.0, 1.0)
     line.gate.faults[1] = "it has lost its supply"
     assert line.reason(place(0.1)) == "fault"
-    torque: Exchange[Answer] = Exchange(b"\x01", (Due(1, 1, 6),), effect=Effect.TORQUE)
+    torque: Exchange[Response] = Exchange(b"\x01", (Expected(1, 1, 6),), effect=Effect.TORQUE)
     with pytest.raises(Refused, match="node 1 is at fault: it has lost its supply"):
         line.gate(torque)
-    line.gate(Exchange(b"\x01", (Due(1, 1, 6),), effect=Effect.TORQUE, rank=Rank.STOP))
-    line.gate(Exchange(b"\x01", (Due(1, 1, 6),), effect=Effect.PERSISTENT))
-    line.gate(Exchange(b"\x01", (Due(2, 2, 6),), effect=Effect.TORQUE))
+    line.gate(Exchange(b"\x01", (Expected(1, 1, 6),), effect=Effect.TORQUE, rank=Priority.STOP))
+    line.gate(Exchange(b"\x01", (Expected(1, 1, 6),), effect=Effect.PERSISTENT))
+    line.gate(Exchange(b"\x01", (Expected(2, 2, 6),), effect=Effect.TORQUE))
     assert line.passes(place(0.1, node=2))
 
 

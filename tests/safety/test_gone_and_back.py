@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Pause
+from motorbus.core.operation import Sleep
 from motorbus.errors import Faulted, LinkLost, NotHomed
 from motorbus.motion.safety.gate import Gate
 from motorbus.session.robot import Robot
@@ -16,7 +16,7 @@ AWAY = 0.5
 
 
 async def pause(seconds: float) -> None:
-    await Pause(seconds)
+    await Sleep(seconds)
 
 
 def wait(robot: Robot, bus: str, seconds: float) -> None:

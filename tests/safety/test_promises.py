@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.core.operation import Data, Pause
+from motorbus.core.operation import Data, Sleep
 from motorbus.errors import LimitExceeded, MotorbusError, Refused, RequestError
 from motorbus.families.feetech import sync_write, sync_write_positions
 from motorbus.link.base import Delivery, PerfectLine, Side
@@ -164,9 +164,9 @@ def test_05_a_holder_who_falls_silent_loses_the_machine_until_somebody_resets_it
             with robot.attended(lasts=0.5) as hand:
                 device.set_velocity(0.5)
                 hand.beat()
-                robot.buses["arm"].run(Pause(0.4))  # type: ignore[attr-defined]
+                robot.buses["arm"].run(Sleep(0.4))  # type: ignore[attr-defined]
                 assert sims["arm"][1].status()["moving"]
-                robot.buses["arm"].run(Pause(2.0))  # type: ignore[attr-defined]
+                robot.buses["arm"].run(Sleep(2.0))  # type: ignore[attr-defined]
                 assert not sims["arm"][1].status()["moving"]
 
         with pytest.raises(Refused) as caught:

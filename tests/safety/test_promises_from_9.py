@@ -8,7 +8,7 @@ from math import nan, pi
 import pytest
 
 import motorbus
-from motorbus.core.operation import Report
+from motorbus.core.operation import Emit
 from motorbus.errors import Faulted, LimitExceeded, MotorbusError, Overloaded, Refused, RequestError
 from motorbus.families.feetech import action_all, reg_write_all, sync_write_positions
 from motorbus.families.feetech.driver.jobs import SET_BAUD, SET_ID
@@ -157,7 +157,7 @@ def test_15_a_bus_can_be_stopped_when_everything_around_it_fails() -> None:
         for node in (1, 2, 3, 4):
             motorbus.feetech.Servo(bus, node).enable_torque()
         with pytest.raises(OSError, match="No space left"):
-            bus.run(Report("something"))
+            bus.run(Emit("something"))
         sim[3].unplug()
         outcome = bus.estop()
         assert (set(outcome.acknowledged), outcome.silent) == ({1, 2, 4}, (3,))

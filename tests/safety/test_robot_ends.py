@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import pytest
 
 from motorbus import Robot
-from motorbus.core.operation import Pause
+from motorbus.core.operation import Sleep
 from motorbus.errors import MotorbusError
 from motorbus.motion.safety.lease import Lease
 from motorbus.simulation.named import Simulation
@@ -49,7 +49,7 @@ def terminal_gone(robot: Robot) -> None:
 
 def lease_lost(robot: Robot) -> None:
     for bus in robot.buses.values():
-        bus.run(Pause(30.0))  # type: ignore[attr-defined]
+        bus.run(Sleep(30.0))  # type: ignore[attr-defined]
 
 
 ENDS: list[tuple[Callable[[Robot], None], type[BaseException]]] = [

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from motorbus import Robot
-from motorbus.core.operation import Data, Pause
+from motorbus.core.operation import Data, Sleep
 from motorbus.errors import MotorbusError, Refused
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion import capabilities
@@ -56,7 +56,7 @@ def turning(sims: dict[str, Simulation], node: int = 1) -> bool:
 def passes(robot: Robot, seconds: float) -> None:
     """Nobody calls the robot for so long."""
     for bus in robot.buses.values():
-        bus.run(Pause(seconds))  # type: ignore[attr-defined]
+        bus.run(Sleep(seconds))  # type: ignore[attr-defined]
 
 
 # -- a loss --------------------------------------------------------------------------------------------------------

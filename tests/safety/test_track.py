@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motorbus.core.family import Quality
-from motorbus.core.operation import Pause
+from motorbus.core.operation import Sleep
 from motorbus.errors import WireError
 from motorbus.motion.safety.track import FASTEST, FRESH, MARGIN, REACH, TREMBLING, Sample, Track, believed
 
@@ -207,7 +207,7 @@ def reading(*angles: float) -> float:
 
     steps = believed(track, ask)
     try:
-        assert isinstance(steps.send(None), Pause)
+        assert isinstance(steps.send(None), Sleep)
         while True:
             at += 0.01
             steps.send(at)

@@ -13,7 +13,7 @@ import pytest
 
 import motorbus
 from motorbus import journal, session
-from motorbus.core.operation import ASKED, INTENT, OUTCOME, REACHED, Journal
+from motorbus.core.operation import ASKED, INTENT, OUTCOME, REACHED, JournalEntry
 from motorbus.errors import LinkError, RequestError
 from motorbus.journal import BusJournal
 from motorbus.link.lock import journal_path, state_folder
@@ -30,8 +30,8 @@ def path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return journal_path("/dev/ttyACM7")
 
 
-def record(state: str, **facts: Any) -> Journal:
-    return Journal("set_id", state, facts or dict(FACTS))
+def record(state: str, **facts: Any) -> JournalEntry:
+    return JournalEntry("set_id", state, facts or dict(FACTS))
 
 
 def begun(path: Path | None) -> BusJournal:
@@ -63,7 +63,7 @@ def test_a_change_is_unfinished_from_its_intent_to_its_outcome(path: Path, on_di
 def test_nothing_begins_while_another_change_is_unfinished(path: Path, state: str) -> None:
     kept = begun(path)
     with pytest.raises(RequestError, match="unfinished on this bus") as caught:
-        kept(Journal("set_baud", state, {"node": 4}))
+        kept(JournalEntry("set_baud", state, {"node": 4}))
     assert f"motorbus recover {BUS}" in caught.value.advice
     assert len(lines(path)) == 2
 
@@ -79,7 +79,7 @@ def test_a_finished_change_makes_room_for_the_next(path: Path) -> None:
     kept = begun(path)
     kept(record(OUTCOME, outcome="new"))
     assert [one.get("state") for one in lines(path)] == [None, INTENT, OUTCOME]
-    kept(Journal("set_baud", INTENT, {"node": 4}))
+    kept(JournalEntry("set_baud", INTENT, {"node": 4}))
     assert [one.get("change") for one in lines(path)] == [None, "set_baud"]
     assert not list(path.parent.glob("*.new"))
 
@@ -171,7 +171,7 @@ def test_a_disk_that_takes_nothing_is_an_error_of_ours(path: Path, monkeypatch: 
 def test_every_unfinished_change_of_this_user_is_listed(path: Path) -> None:
     begun(path)
     other = BusJournal("feetech:COM7", journal_path("COM7"))
-    other(Journal("set_baud", INTENT, {"node": 4}))
+    other(JournalEntry("set_baud", INTENT, {"node": 4}))
     done = BusJournal("feetech:COM8", journal_path("COM8"))
     done(record(INTENT))
     done(record(OUTCOME, outcome="old"))

@@ -12,7 +12,7 @@ import pytest
 
 import motorbus
 from motorbus import AsyncRobot, NoReply, PortNotFound, RequestError, Robot
-from motorbus.core.operation import INTENT, Journal, Progress
+from motorbus.core.operation import INTENT, JournalEntry, Progress
 from motorbus.motion.machine import Machine
 from tests.support.machines import machine
 
@@ -90,7 +90,7 @@ def test_a_change_that_was_cut_off_is_a_warning() -> None:
     with machine(arm="1", can="0x25") as (made, sims):
         with motorbus.open(sims["arm"].url) as bus:
             assert bus.journal is not None
-            bus.journal(Journal("set_id", INTENT, {"node": 1, "to": 5}))
+            bus.journal(JournalEntry("set_id", INTENT, {"node": 1, "to": 5}))
         with Robot.of(made) as robot:
             (warning,) = robot.warnings
             assert warning.startswith("arm: ")

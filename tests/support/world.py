@@ -21,15 +21,15 @@ from motorbus.bus.trace import Subscription, TraceRecord
 from motorbus.core.entry import Entry, Table
 from motorbus.core.family import Family
 from motorbus.core.operation import (
-    Alone,
     Data,
     Effect,
     Exchange,
-    Notice,
+    Exclusive,
+    Gather,
+    Notification,
     Runnable,
     Shielded,
     Step,
-    Together,
     discard,
 )
 from motorbus.errors import RequestError
@@ -262,11 +262,11 @@ def switch_on(device: Any) -> None:
         device.enable_torque()
 
 
-def reports(family: Family) -> list[Notice]:
+def reports(family: Family) -> list[Notification]:
     """The notices that devices of this family send without a request."""
     told = [vector.data for vector in vectors(family.name) if vector.direction == "status"]
     events = [event for data in told for event in family.receiver().feed(data)]
-    return [event for event in events if isinstance(event, Notice)]
+    return [event for event in events if isinstance(event, Notification)]
 
 
 def locks(family: Family) -> list[Entry]:
@@ -359,11 +359,11 @@ class Steps:
                 discard(step)
 
     def _carried_out(self, step: Step[Any]) -> Any:
-        if isinstance(step, Alone):
+        if isinstance(step, Exclusive):
             return self.run(step.operation)
         if isinstance(step, Shielded):
             return self._run_shielded(step)
-        if isinstance(step, Together):
+        if isinstance(step, Gather):
             return [self.run(operation) for operation in step.operations]
         number, self.count = self.count, self.count + 1
         cuts = number == self.cut_at

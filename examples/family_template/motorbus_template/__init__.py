@@ -22,7 +22,7 @@ from motorbus.core.family import (
     Simulator,
     Stop,
 )
-from motorbus.core.operation import ANY, Answer, CanFrame, Exchange, Operation, Runnable, Timeout
+from motorbus.core.operation import ANY, CanFrame, Exchange, Procedure, Response, Runnable, TimeoutClass
 from motorbus.core.verbs import AsyncRunner, Awaiting, Blocking, BlockingRunner, verb
 
 from . import driver, wire
@@ -32,7 +32,7 @@ from .table import TABLE
 from .train import train
 
 RATE: Final = 500_000
-TURNAROUND: Final = {Timeout.REPLY: 0.005, Timeout.SCAN: 0.002, Timeout.STORE: 0.05}
+TURNAROUND: Final = {TimeoutClass.REPLY: 0.005, TimeoutClass.SCAN: 0.002, TimeoutClass.STORE: 0.05}
 """s that a servo may take to answer."""
 
 
@@ -131,7 +131,7 @@ class Template:
         """256 objects whose values are known."""
         return driver.proof(driver.Node(node), attempt)
 
-    def stop(self, nodes: Mapping[int, Answer | None]) -> Stop:
+    def stop(self, nodes: Mapping[int, Response | None]) -> Stop:
         """They brake by themselves, so where they last were does not matter."""
         return driver.stop_all(tuple(nodes))
 
@@ -139,7 +139,7 @@ class Template:
         """Model and firmware."""
         return driver.identify(driver.Node(node))
 
-    def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Operation[list[Found]]:
+    def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Procedure[list[Found]]:
         """Every id, or these."""
         return scan(ids, rates)
 

@@ -15,19 +15,19 @@ from typing import Final, TypeVar
 from motorbus.core.entry import Entry, Storage, Value
 from motorbus.core.family import Health, Identity, State, Stop
 from motorbus.core.operation import (
-    Alone,
-    Answer,
-    Due,
     Effect,
     Exchange,
+    Exclusive,
+    Expected,
     Goal,
-    Listen,
-    Notice,
-    Rank,
+    Notification,
+    Priority,
     Refusal,
-    Timeout,
-    afterwards,
-    outcome,
+    Response,
+    TimeoutClass,
+    WaitFor,
+    catch,
+    with_cleanup,
 )
 from motorbus.errors import (
     DeviceError,
@@ -70,11 +70,11 @@ def exchange(
     value: bytes = b"",
     *,
     take: Callable[[bytes], T],
-    rank: Rank = Rank.POLL,
+    rank: Priority = Priority.POLL,
     effect: Effect = Effect.NONE,
     goals: tuple[Goal, ...] = (),
-    timeout: Timeout = Timeout.REPLY,
-    tells_position: bool | Callable[[Answer], Mapping[int, float]] = False,
+    timeout: TimeoutClass = TimeoutClass.REPLY,
+    tells_position: bool | Callable[[Response], Mapping[int, float]] = False,
     refusal: Refusal | None = None,
 ) -> Exchange[T]:
     """One request to one node; `take` makes a value of the four bytes of the answer.
@@ -82,7 +82,7 @@ def exchange(
     Everything here is repeatable: a goal is absolute. A relative move would have to say `repeatable=False`.
     """
 
-    def read(answer: Answer) -> T:
+    def read(answer: Response) -> T:
         data = answer.replies[0].data
         node.alarm, node.at = wire.alarms(data[3]), answer.at
         if data[3] & 0x0F:
@@ -91,7 +91,7 @@ def exchange(
 
     return Exchange(
         wire.encode_request(node.node, command, index, subindex, value),
-        (Due(node.node, (int(command), index, subindex), wire.LENGTH),),
+        (Expected(node.node, (int(command), index, subindex), wire.LENGTH),),
         read,
         lane=node.node,
         rank=rank,
@@ -126,15 +126,15 @@ def write_row(
         row.subindex or 0,
         row.encode(raw),
         take=_nothing,
-        rank=Rank.CONTROL,
+        rank=Priority.CONTROL,
         effect=row.effect,
         goals=goals,
-        timeout=Timeout.STORE if row.storage is Storage.EEPROM else Timeout.REPLY,
+        timeout=TimeoutClass.STORE if row.storage is Storage.EEPROM else TimeoutClass.REPLY,
         refusal=refusal,
     )
 
 
-def proof(node: Node, attempt: int = 0, timeout: Timeout = Timeout.REPLY) -> Exchange[bool]:
+def proof(node: Node, attempt: int = 0, timeout: TimeoutClass = TimeoutClass.REPLY) -> Exchange[bool]:
     """Ask for something whose answer is known beforehand and differs with `attempt`."""
     subindex = attempt & 0xFF
     right = bytes((~subindex & 0xFF,))
@@ -147,7 +147,7 @@ def position(node: Node) -> Exchange[float]:
     """Present position, rad."""
     row = TABLE["present_position"]
 
-    def where(answer: Answer) -> dict[int, float]:
+    def where(answer: Response) -> dict[int, float]:
         data = answer.replies[0].data
         return {} if data[3] & 0x0F else {node.node: float(row.to_value(row.decode(data[4:])))}
 
@@ -163,7 +163,7 @@ def position(node: Node) -> Exchange[float]:
 
 def stop(node: Node) -> Exchange[None]:
     """Brake and hold; torque stays as it is. Goes before everything else and needs to know nothing."""
-    return exchange(node, wire.Command.STOP, take=_nothing, rank=Rank.STOP, effect=Effect.MOTION)
+    return exchange(node, wire.Command.STOP, take=_nothing, rank=Priority.STOP, effect=Effect.MOTION)
 
 
 def disable_torque(node: Node) -> Exchange[None]:
@@ -223,7 +223,7 @@ async def write(node: Node, /, **values: Value) -> None:
     orders = [(TABLE[name], _checked(TABLE[name], value)) for name, value in values.items()]
     kept = [(row, raw) for row, raw in orders if row.storage is Storage.EEPROM]
     if kept:
-        await Alone(_guarded(node, kept))
+        await Exclusive(_guarded(node, kept))
     for row, raw in orders:
         if row.effect is Effect.MOTION:
             await write_row(node, row, raw, await _goal(node, raw))
@@ -234,7 +234,7 @@ async def write(node: Node, /, **values: Value) -> None:
 async def set_node_id(node: Node, new: int) -> None:
     """Give it another id, 1 to 63, which it takes at its next power-up."""
     TABLE["node_id"].encode(new)
-    await Alone(_guarded(node, [(TABLE["node_id"], new)]))
+    await Exclusive(_guarded(node, [(TABLE["node_id"], new)]))
 
 
 def _checked(row: Entry, value: Value) -> int:
@@ -259,7 +259,7 @@ async def _guarded(node: Node, orders: list[tuple[Entry, int]]) -> None:
     The unlock belongs to what is cleaned up after, for it may have been heard although its answer was not.
     """
     node.limits = None
-    await afterwards(_unlocked(node, orders), lambda: _locked(node))
+    await with_cleanup(_unlocked(node, orders), lambda: _locked(node))
 
 
 async def _unlocked(node: Node, orders: list[tuple[Entry, int]]) -> None:
@@ -274,7 +274,7 @@ async def _unlocked(node: Node, orders: list[tuple[Entry, int]]) -> None:
 async def _locked(node: Node) -> None:
     """Said again when it was not acknowledged, beside what the bus repeats by itself."""
     lock = write_row(node, TABLE["lock"], 1)
-    if await outcome(lock) is not None:
+    if await catch(lock) is not None:
         await lock
 
 
@@ -310,13 +310,13 @@ async def move(
 async def _arrival(node: Node, to: float, tolerance: float) -> None:
     """Wait for the report, and ask now and then: it may have been sent before we listened."""
     while await read_row(node, TABLE["moving"]):
-        await Listen(partial(_is_arrival, node.node), PATIENCE)
+        await WaitFor(partial(_is_arrival, node.node), PATIENCE)
     here = await position(node)
     if abs(here - to) > tolerance:
         raise Stalled(f"node {node.node} stands at {here:.4g} rad, not at {to:.4g} rad", node=node.node)
 
 
-def _is_arrival(node: int, notice: Notice) -> bool:
+def _is_arrival(node: int, notice: Notification) -> bool:
     return notice.node == node and notice.kind == "arrived"
 
 
@@ -360,8 +360,8 @@ def health(node: Node) -> Exchange[Health]:
 
 def stop_all(nodes: tuple[int, ...]) -> Stop:
     """What an emergency stop sends: everyone at once, then each known node until it acknowledges."""
-    everyone = Exchange[Answer](
-        wire.encode_request(wire.EVERYONE, wire.Command.STOP), rank=Rank.STOP, effect=Effect.MOTION
+    everyone = Exchange[Response](
+        wire.encode_request(wire.EVERYONE, wire.Command.STOP), rank=Priority.STOP, effect=Effect.MOTION
     )
     each = [_plain(stop(Node(node))) for node in nodes]
     return Stop(
@@ -370,7 +370,7 @@ def stop_all(nodes: tuple[int, ...]) -> Stop:
     )
 
 
-def _plain(one: Exchange[None]) -> Exchange[Answer]:
+def _plain(one: Exchange[None]) -> Exchange[Response]:
     """The same exchange without a reading of its answer: an alarm must not count as a missing acknowledgement."""
     return Exchange(
         one.request, one.replies, lane=one.lane, rank=one.rank, effect=one.effect, repeatable=True

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from motorbus.core.family import Found
 from motorbus.core.operation import (
-    Alone,
+    Emit,
+    Exclusive,
+    Gather,
     Progress,
-    Report,
-    Timeout,
-    Together,
-    Tune,
-    afterwards,
-    outcome,
+    SetBitrate,
+    TimeoutClass,
+    catch,
+    with_cleanup,
 )
 from motorbus.errors import MotorbusError
 
@@ -25,16 +25,16 @@ from . import driver, wire
 async def scan(ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> list[Found]:
     """Ask every id, two at a time because each has a lane of its own; the present rate is set again in the end."""
     asked = ids or tuple(wire.NODES)
-    present = await Tune(0)
+    present = await SetBitrate(0)
     if not rates:
         return await _everyone(asked, present)
-    return await Alone(afterwards(_at_all_rates(asked, rates), lambda: Tune(present)))
+    return await Exclusive(with_cleanup(_at_all_rates(asked, rates), lambda: SetBitrate(present)))
 
 
 async def _at_all_rates(nodes: tuple[int, ...], rates: tuple[int, ...]) -> list[Found]:
     found: list[Found] = []
     for rate in rates:
-        await Tune(rate)
+        await SetBitrate(rate)
         found += await _everyone(nodes, rate)
     return found
 
@@ -44,17 +44,17 @@ async def _everyone(nodes: tuple[int, ...], rate: int) -> list[Found]:
     found: dict[int, Found] = {}
     for turn in range(2):
         silent = [node for node in nodes if node not in found]
-        looks = await Together([_look(driver.Node(node), rate) for node in silent])
+        looks = await Gather([_look(driver.Node(node), rate) for node in silent])
         found |= {one.node: one for one in looks if one is not None}
-        await Report(Progress((turn + 1) * len(nodes), 2 * len(nodes), f"{rate} bit/s"))
+        await Emit(Progress((turn + 1) * len(nodes), 2 * len(nodes), f"{rate} bit/s"))
     return [found[node] for node in nodes if node in found]
 
 
 async def _look(node: driver.Node, rate: int) -> Found | None:
-    heard = await outcome(driver.proof(node, timeout=Timeout.SCAN))
+    heard = await catch(driver.proof(node, timeout=TimeoutClass.SCAN))
     if heard is not True:
         return None
-    identity = await outcome(driver.identify(node))
+    identity = await catch(driver.identify(node))
     found = Found(node.node, rate, None if isinstance(identity, MotorbusError) else identity)
-    await Report(found)
+    await Emit(found)
     return found

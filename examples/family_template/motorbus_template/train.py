@@ -11,7 +11,7 @@ from math import ceil, isfinite
 from typing import Final
 
 from motorbus.core.family import Positions
-from motorbus.core.operation import Exchange, Goal, Together
+from motorbus.core.operation import Exchange, Gather, Goal
 from motorbus.errors import LimitExceeded, RequestError
 
 from .driver import Node, enable_torque, limits, position, write_row
@@ -23,7 +23,7 @@ _VELOCITY: Final = TABLE["move_velocity"]
 
 async def train(servos: Sequence[Node], *, rate: int) -> Train:
     """These servos, ready to be led; their limits are read and nothing is written. `rate` changes nothing here."""
-    await Together([limits(node) for node in servos])
+    await Gather([limits(node) for node in servos])
     return Train(servos)
 
 
@@ -44,7 +44,7 @@ class Train:
 
         What one cannot be told exactly is rounded up: who follows goals must not fall behind them.
         """
-        await Together([_begin(node, speeds.get(id)) for id, node in self._servos.items()])
+        await Gather([_begin(node, speeds.get(id)) for id, node in self._servos.items()])
 
     def _servo(self, id: int) -> Node:
         if id in self._servos:

@@ -18,7 +18,7 @@ from enum import IntEnum
 from typing import Final, NamedTuple
 
 from motorbus.core.family import Explanation, Part
-from motorbus.core.operation import CanFrame, Data, Event, Key, Noise, Notice, Reply
+from motorbus.core.operation import CanFrame, Data, Event, Key, Noise, Notification, Reply
 from motorbus.errors import RequestError
 
 REQUEST: Final = 0x200
@@ -138,7 +138,7 @@ def _event(frame: CanFrame) -> Event:
         return Reply(answer.node, answer.key, frame.data)
     if (report := decode_report(frame)) is not None:
         node, reason, _ = report
-        return Notice(node, reason.name.lower(), frame.data)
+        return Notification(node, reason.name.lower(), frame.data)
     return Noise(
         frame.data, "foreign"
     )  # a frame stands by itself: a senseless one casts no doubt on the next

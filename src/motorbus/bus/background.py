@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 from motorbus.bus.base import BaseBus
 from motorbus.bus.running import run_here
 from motorbus.bus.tasks import TaskTree
-from motorbus.core.operation import Operation
+from motorbus.core.operation import Procedure
 
 T = TypeVar("T")
 
@@ -16,7 +16,7 @@ T = TypeVar("T")
 class BackgroundTask(Generic[T]):
     """One procedure on one bus, for which either `along` or `carried` is called, once."""
 
-    def __init__(self, bus: BaseBus, procedure: Callable[[], Operation[T]]) -> None:
+    def __init__(self, bus: BaseBus, procedure: Callable[[], Procedure[T]]) -> None:
         self._bus = bus
         self._procedure = procedure
         self._tree: TaskTree[Any] | None = None

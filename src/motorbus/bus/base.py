@@ -22,7 +22,7 @@ from motorbus.bus.tasks import Notify, TaskTree
 from motorbus.bus.trace import TraceRecord
 from motorbus.bus.turn import Turn
 from motorbus.core.family import Family, Readdressed
-from motorbus.core.operation import UNLIKE, Data, Exchange, Journal, Rank, Runnable
+from motorbus.core.operation import UNLIKE, Data, Exchange, JournalEntry, Priority, Runnable
 from motorbus.errors import LinkError, LinkLost, MotorbusError, RequestError
 from motorbus.link.base import Link, Renewable
 from motorbus.link.memory import MemoryLink
@@ -247,7 +247,7 @@ class BaseBus:
         engine = self.engine
         engine.time = now
         engine.check(order, since)
-        if order.rank is Rank.STOP:
+        if order.rank is Priority.STOP:
             engine.note_stop(order)
         else:
             engine.positions.sent(order)
@@ -303,7 +303,7 @@ class BaseBus:
         def deliver(event: object) -> None:
             if readdressed is not None and isinstance(event, Readdressed):
                 readdressed(event)
-            if journal is not None and isinstance(event, Journal):
+            if journal is not None and isinstance(event, JournalEntry):
                 journal(event)
             if observer is not None:
                 observer(event)

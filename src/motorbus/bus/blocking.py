@@ -15,7 +15,7 @@ from motorbus.bus.prepared import Prepared
 from motorbus.bus.running import TURN_TIMEOUT, run_here, run_on
 from motorbus.bus.tasks import Notify
 from motorbus.core.entry import shown
-from motorbus.core.operation import UNLIKE, Exchange, Rank, Runnable, Together
+from motorbus.core.operation import UNLIKE, Exchange, Gather, Priority, Runnable
 from motorbus.errors import LinkError, MotorbusError, RequestError
 
 T = TypeVar("T")
@@ -119,7 +119,7 @@ class Bus(BaseBus):
         pending = Pending(self, requests, signals)
         signals.depth += 1
         try:
-            if self.turn.acquire(Rank.CONTROL, timeout):
+            if self.turn.acquire(Priority.CONTROL, timeout):
                 pending.prepared = self._write_batch(requests, pending.since)
         except LinkError as error:
             self._lost(error)
@@ -221,7 +221,7 @@ async def carry_out_batch(
 ) -> list[Any]:
     """Carry out these requests: those on different lanes at the same time, others in order."""
     if len({request.lane for request in requests}) > 1:
-        return await Together([_tolerate(request, tolerated) for request in requests])
+        return await Gather([_tolerate(request, tolerated) for request in requests])
     values = []
     for request in requests:
         value = await _tolerate(request, tolerated)

@@ -30,23 +30,23 @@ from motorbus.core.family import Family
 from motorbus.core.operation import (
     ANY,
     EVERY_LANE,
-    Answer,
     Data,
-    Due,
     Effect,
     Event,
     Exchange,
+    Expected,
     Noise,
-    Notice,
-    Rank,
+    Notification,
+    Priority,
     Reply,
-    Timeout,
+    Response,
+    TimeoutClass,
 )
 from motorbus.errors import LinkError, LinkLost, MotorbusError
 
 T = TypeVar("T")
 
-MARGIN: Final = {Timeout.SCAN: 0.002, Timeout.REPLY: 0.02, Timeout.STORE: 0.02}
+MARGIN: Final = {TimeoutClass.SCAN: 0.002, TimeoutClass.REPLY: 0.02, TimeoutClass.STORE: 0.02}
 """s that the host may be late; short for a scan, where silence is the usual answer."""
 DIRECT: Final = 0.001
 """s; a link of less latency has no adapter that holds data back."""
@@ -81,7 +81,7 @@ class Engine:
         self.always_listening = self.listening = listen_only
         self.diagnosis: Callable[[], str] = str
         self.trace: Feed[TraceRecord] = Feed()
-        self.notices: Feed[Notice] = Feed()
+        self.notices: Feed[Notification] = Feed()
         self.statistics = Statistics()
         self.sync = SyncTable(family)
         self.echo = Echo()
@@ -89,7 +89,7 @@ class Engine:
         self.positions = LastPositions(family, rate)
         self.in_flight: dict[int, Attempt] = {}
         self.queue: list[Job] = []
-        self.listeners: list[Callable[[Notice], None]] = []
+        self.listeners: list[Callable[[Notification], None]] = []
         self.end_sleeps: list[Callable[[BaseException], None]] = []
         """Called with the error when an emergency stop is latched or the port is lost: procedures that sleep end."""
         self.exclusive: object = None
@@ -125,8 +125,8 @@ class Engine:
 
         For a scan on a link that holds nothing back: the shorter of the normal and the scan turnaround, no margin.
         """
-        if request.timeout is Timeout.SCAN and self.latency < DIRECT:
-            plain: Exchange[Answer] = Exchange(request.request, request.replies)
+        if request.timeout is TimeoutClass.SCAN and self.latency < DIRECT:
+            plain: Exchange[Response] = Exchange(request.request, request.replies)
             return min(self.family.turnaround(plain), self.family.turnaround(request)) + self.latency
         return self.family.turnaround(request) + self.latency + MARGIN[request.timeout]
 
@@ -158,7 +158,7 @@ class Engine:
             except MotorbusError as error:
                 job.settle(error=error)
                 return
-            if job.priority is Rank.STOP:
+            if job.priority is Priority.STOP:
                 self.note_stop(job.request)
             if job.request.whole is not None and getattr(job.request.course, "engine", None) is not self:
                 job.request.course = self.prepare(job.request)
@@ -203,7 +203,7 @@ class Engine:
             job.step = step
             insort(self.queue, job)
 
-    def _decode(self, job: RequestJob, answer: Answer) -> None:
+    def _decode(self, job: RequestJob, answer: Response) -> None:
         request = job.request
         try:
             value = answer if request.read is None else request.read(answer)
@@ -244,7 +244,7 @@ class Engine:
         return None
 
     def _may_use_bus(self, job: Job) -> bool:
-        if job.priority is Rank.STOP:
+        if job.priority is Priority.STOP:
             return True
         return not self.stopping and (self.exclusive is None or self.exclusive is job.owner)
 
@@ -264,7 +264,7 @@ class Engine:
         # Another request to this node may have failed since the probe was chosen: its quiet time runs again.
         if now < self._earliest(attempt):
             return None
-        unprobed = attempt.is_probe or request.rank is Rank.STOP or request.timeout is Timeout.SCAN
+        unprobed = attempt.is_probe or request.rank is Priority.STOP or request.timeout is TimeoutClass.SCAN
         doubtful = [] if unprobed else self.sync.doubtful(request)
         if any(node not in attempt.excluded for node in doubtful):
             self._resume(job)
@@ -290,7 +290,7 @@ class Engine:
         """Raise the error that forbids sending this request now. `since`: the counts when its caller decided."""
         if self.listening:
             raise failures.listen_only(request)
-        if request.rank is Rank.STOP:
+        if request.rank is Priority.STOP:
             return
         if self.latched or since is not self.since:
             self._check_stops(request, since)
@@ -308,7 +308,7 @@ class Engine:
 
         A stop is latched; or the request moves something, and a stop of its nodes or a lost port came after `since`.
         """
-        if request.effect not in GATED or request.rank is Rank.STOP:
+        if request.effect not in GATED or request.rank is Priority.STOP:
             return
         if self.latched:
             raise failures.latched(self.latched_by)
@@ -345,7 +345,7 @@ class Engine:
         else:
             self.free_at = start + air
             self._unacknowledged.append(attempt)
-        if (request.effect or request.goals) and request.rank is not Rank.STOP:
+        if (request.effect or request.goals) and request.rank is not Priority.STOP:
             self.positions.sent(request)
         if isinstance(request.request, bytes):
             self.echo.sent(request.request, attempt.is_probe or request is self.echo.test)
@@ -439,7 +439,7 @@ class Engine:
     def _take(self, event: Event, now: float) -> None:
         if isinstance(event, Reply):
             self._take_reply(event, now)
-        elif isinstance(event, Notice):
+        elif isinstance(event, Notification):
             self.statistics.other["notices"] += 1
             notice = event._replace(at=now)
             self.notices.put(notice)
@@ -466,7 +466,7 @@ class Engine:
 
     def _settle_older(self, attempt: Attempt, reply: Reply) -> bool:
         """True for an owed reply of an earlier request, which is settled; only an unprobed request can meet one."""
-        unprobed = attempt.request.rank is Rank.STOP or attempt.request.replies is ANY
+        unprobed = attempt.request.rank is Priority.STOP or attempt.request.replies is ANY
         return unprobed and self._settle_late(reply)
 
     def _settle_late(self, reply: Reply) -> bool:
@@ -556,19 +556,19 @@ class Engine:
         if attempt.job is not None:
             self._resume(attempt.job, attempt)
 
-    def _judge_reply(self, attempt: Attempt, index: int, due: Due, now: float) -> bool:
+    def _judge_reply(self, attempt: Attempt, index: int, due: Expected, now: float) -> bool:
         """True if this reply counts. Else count the error, and note the quiet time or the owed reply of its node."""
         if not attempt.fault and index in attempt.replies and due.node not in attempt.excluded:
             return True
         quiet_until = now + self.quiet_time
-        if index in attempt.replies or attempt.request.rank is Rank.STOP:
+        if index in attempt.replies or attempt.request.rank is Priority.STOP:
             self.sync.of(due.node).quiet_until = quiet_until
         else:
             self.sync.mark_owed(attempt.request.lane, due, quiet_until)
         self.statistics.of(due.node).errors[attempt.failure()] += 1
         return False
 
-    def _accept(self, attempt: Attempt, answer: Answer, answered: Sequence[Due], now: float) -> None:
+    def _accept(self, attempt: Attempt, answer: Response, answered: Sequence[Expected], now: float) -> None:
         request = attempt.request
         if request.replies is ANY:
             if (
@@ -576,7 +576,9 @@ class Engine:
             ):  # on such a bus the lane is the node: a stop must reach all that answered
                 self.positions.add([reply.lane for reply in answer.replies])
             return
-        if request.rank is not Rank.STOP:  # an earlier reply may still come, so a stop puts no node in sync
+        if (
+            request.rank is not Priority.STOP
+        ):  # an earlier reply may still come, so a stop puts no node in sync
             for due in answered:
                 self.sync.confirm(due, probe=attempt.is_probe)
         self.statistics.answered(answered, now - attempt.sent_at)
@@ -593,7 +595,7 @@ class Engine:
 
     def prepare(self, request: Exchange[Any]) -> Prepared | None:
         """Prepare a request that is repeated; None if it needs the general path (queue, policy, receiver)."""
-        if request.whole is None or request.rank is Rank.STOP or request.effect or not request.replies:
+        if request.whole is None or request.rank is Priority.STOP or request.effect or not request.replies:
             return None
         prepared = self._prepare(request)
         if request.other is not None and prepared is not None:
@@ -683,7 +685,7 @@ class Engine:
         """s that a stop waits at most: the whole air time on a half-duplex line, else the rest of the request."""
         if not self.family.link.both_ways:
             return self.air_time(attempt.request)
-        request: Exchange[Answer] = Exchange(attempt.request.request)
+        request: Exchange[Response] = Exchange(attempt.request.request)
         return max(0.0, attempt.sent_at + self.air_time(request) - now)
 
     def stop_sent(self) -> None:

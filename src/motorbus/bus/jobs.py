@@ -8,7 +8,7 @@ from math import inf
 from typing import Any, NamedTuple, TypeAlias
 
 from motorbus.bus.failures import FAULTS
-from motorbus.core.operation import ANY, Answer, Due, Exchange, Rank, Reply, Tune
+from motorbus.core.operation import ANY, Exchange, Expected, Priority, Reply, Response, SetBitrate
 
 NOISE_KEPT = 16
 """Pieces of noise kept for the error message."""
@@ -31,7 +31,7 @@ class Wait(NamedTuple):
     until: float
 
 
-Policy: TypeAlias = "Generator[Attempt | Wait, Any, Answer]"
+Policy: TypeAlias = "Generator[Attempt | Wait, Any, Response]"
 """What is done for one request: it yields attempts and gets each back when it has ended, or None after a wait."""
 
 
@@ -41,7 +41,7 @@ class Job:
     `settled` is called once, when `done` is set.
     """
 
-    priority: Rank
+    priority: Priority
 
     def __init__(self, owner: object = None, settled: Callable[[], None] | None = None) -> None:
         self.owner = owner
@@ -95,7 +95,7 @@ class RateJob(Job):
 
     def __init__(
         self,
-        tune: Tune,
+        tune: SetBitrate,
         owner: object = None,
         settled: Callable[[], None] | None = None,
         *,
@@ -103,13 +103,13 @@ class RateJob(Job):
     ) -> None:
         super().__init__(owner, settled)
         self.tune = tune
-        self.priority = Rank.STOP if urgent else Rank.CONFIGURATION
+        self.priority = Priority.STOP if urgent else Priority.CONFIGURATION
 
 
 class ExclusiveJob(Job):
     """A wish to have the bus alone; it is settled when nothing else is in flight."""
 
-    priority = Rank.POLL
+    priority = Priority.POLL
 
 
 @dataclass(slots=True, eq=False)
@@ -138,11 +138,11 @@ class Attempt:
     fault: str = ""
     surplus: bool = False
     complete: bool = False
-    accepted: Answer | None = None
+    accepted: Response | None = None
     ended: bool = False
 
     @property
-    def dues(self) -> tuple[Due, ...]:
+    def dues(self) -> tuple[Expected, ...]:
         """The replies expected; none where any reply counts."""
         return () if self.request.replies is ANY else self.request.replies
 
@@ -196,13 +196,13 @@ class Attempt:
             return "checksum"
         return kinds[0] if kinds and kinds[0] in FAULTS else "silence"
 
-    def answer(self, at: float) -> Answer:
+    def answer(self, at: float) -> Response:
         """The replies in the order expected; excluded nodes count as missing."""
         if self.request.replies is ANY:
-            return Answer(tuple(self.replies.values()), (), at)
+            return Response(tuple(self.replies.values()), (), at)
         taken = [i for i, due in enumerate(self.dues) if i in self.replies and due.node not in self.excluded]
         missing = tuple(due.node for i, due in enumerate(self.dues) if i not in taken)
-        return Answer(tuple(self.replies[i] for i in taken), missing, at)
+        return Response(tuple(self.replies[i] for i in taken), missing, at)
 
     def received(self) -> bytes:
         """All that came, for the error message."""

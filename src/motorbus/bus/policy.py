@@ -9,7 +9,7 @@ from motorbus.bus import failures
 from motorbus.bus.jobs import Attempt, Policy, Wait
 from motorbus.bus.statistics import Statistics
 from motorbus.bus.sync import SyncTable
-from motorbus.core.operation import ANY, Exchange, Rank, Timeout
+from motorbus.core.operation import ANY, Exchange, Priority, TimeoutClass
 from motorbus.errors import MotorbusError
 
 RETRIES = 2
@@ -37,7 +37,9 @@ def carry_out(engine: Context, request: Exchange[Any]) -> Policy:
     tries, sent, fault = 0, False, ""
     while True:
         excluded: tuple[int, ...] = ()
-        if request.rank is not Rank.STOP and (request.timeout is not Timeout.SCAN or fault == "echo"):
+        if request.rank is not Priority.STOP and (
+            request.timeout is not TimeoutClass.SCAN or fault == "echo"
+        ):
             for node in engine.sync.doubtful(request):
                 failed, probes = yield from _resync(engine, request, node)
                 tries += probes
@@ -55,7 +57,7 @@ def carry_out(engine: Context, request: Exchange[Any]) -> Policy:
         fault = attempt.fault
         if attempt.accepted is not None:
             return attempt.accepted
-        if engine.stopping and request.rank is not Rank.STOP:
+        if engine.stopping and request.rank is not Priority.STOP:
             raise failures.latched(engine.latched_by)
         tries += 1
         if not _may_repeat(request, fault) or tries > RETRIES:
@@ -65,8 +67,8 @@ def carry_out(engine: Context, request: Exchange[Any]) -> Policy:
 
 def _may_repeat(request: Exchange[Any], fault: str) -> bool:
     """A scan is not repeated, for silence is its usual answer; nor is a stop, which has rounds of its own."""
-    patient = request.timeout is not Timeout.SCAN or fault == "echo"
-    return request.repeatable and request.rank is not Rank.STOP and request.replies is not ANY and patient
+    patient = request.timeout is not TimeoutClass.SCAN or fault == "echo"
+    return request.repeatable and request.rank is not Priority.STOP and request.replies is not ANY and patient
 
 
 def _resync(

@@ -14,7 +14,7 @@ from motorbus.bus.jobs import Stops
 from motorbus.bus.prepared import Prepared
 from motorbus.core.family import Family, Stop
 from motorbus.core.goal import Goal, Stays
-from motorbus.core.operation import ANY, Answer, Due, Effect, Exchange, Rank
+from motorbus.core.operation import ANY, Effect, Exchange, Expected, Priority, Response
 
 FRESH: Final = 0.02
 """s; a position older than this is not where a moving device is."""
@@ -23,7 +23,7 @@ GATED: Final = (Effect.MOTION, Effect.TORQUE)
 ENDLESS: Final = ("velocity", "load", "current")
 """Quantities that a device obeys until another order comes."""
 
-Reading = tuple[Exchange[Any], Answer]
+Reading = tuple[Exchange[Any], Response]
 
 
 class LastPositions(Mapping[int, Reading]):
@@ -40,11 +40,11 @@ class LastPositions(Mapping[int, Reading]):
         self.nodes: frozenset[int] = frozenset()
         self.orders = self.stop_total = 0
         self.stops: Stops = {}
-        self.latest: dict[int, Prepared | tuple[Exchange[Any], Answer, int]] = {}
+        self.latest: dict[int, Prepared | tuple[Exchange[Any], Response, int]] = {}
         self._ordered: dict[tuple[int, ...], int] = {}  # by the nodes that an order was for (empty: all)
         self._accepted: Counter[int] = Counter()
-        self._acknowledged: dict[int, Answer] = {}  # the reply to the last order of a node
-        self._stop_replies: dict[int, set[Due]] = {}  # of a stop that takes several requests
+        self._acknowledged: dict[int, Response] = {}  # the reply to the last order of a node
+        self._stop_replies: dict[int, set[Expected]] = {}  # of a stop that takes several requests
 
     # -- positions ---------------------------------------------------------------------------------------------
 
@@ -57,11 +57,11 @@ class LastPositions(Mapping[int, Reading]):
     def __len__(self) -> int:
         return len(self.latest)
 
-    def _reading(self, node: int) -> tuple[Exchange[Any], Answer, int]:
+    def _reading(self, node: int) -> tuple[Exchange[Any], Response, int]:
         latest = self.latest[node]
         return latest.reading() if isinstance(latest, Prepared) else latest
 
-    def answered(self, nodes: Iterable[int], exchange: Exchange[Any], answer: Answer, rate: int) -> None:
+    def answered(self, nodes: Iterable[int], exchange: Exchange[Any], answer: Response, rate: int) -> None:
         """These nodes answered this request."""
         self.rate = rate
         self.add(nodes)
@@ -75,9 +75,9 @@ class LastPositions(Mapping[int, Reading]):
         if not self.nodes.issuperset(nodes):
             self.nodes = self.nodes.union(nodes)
 
-    def fresh(self, now: float) -> dict[int, Answer | None]:
+    def fresh(self, now: float) -> dict[int, Response | None]:
         """Every known node with its last position, None where it is older than `FRESH` or an order has left since."""
-        found: dict[int, Answer | None] = dict.fromkeys(sorted(self.nodes))
+        found: dict[int, Response | None] = dict.fromkeys(sorted(self.nodes))
         for node in self:
             _, answer, orders = self._reading(node)
             if now - answer.at < FRESH and orders >= self._last_order(node):
@@ -102,7 +102,7 @@ class LastPositions(Mapping[int, Reading]):
 
         The last position and acknowledgement of the nodes of an order (none: all) count no longer.
         """
-        if exchange.rank is Rank.STOP:
+        if exchange.rank is Priority.STOP:
             if exchange.effect in GATED:
                 stops = Counter(self.stops)
                 stops.update(addressed(exchange) or (None,))
@@ -138,12 +138,12 @@ class LastPositions(Mapping[int, Reading]):
         except Exception:  # the stop must go out
             return self.family.stop(dict.fromkeys(sorted(self.nodes)))
 
-    def accept(self, exchange: Exchange[Any], answer: Answer) -> None:
+    def accept(self, exchange: Exchange[Any], answer: Response) -> None:
         """This request was answered and not refused: nodes that it stops have accepted a stop."""
         if exchange.effect not in GATED or exchange.replies is ANY:
             return
         answered = [due for due in exchange.replies if self._acknowledged.get(due.node) is answer]
-        if exchange.rank is Rank.STOP:
+        if exchange.rank is Priority.STOP:
             for due in answered:
                 replies = self._stop_replies.setdefault(due.node, set())
                 replies.add(due)
@@ -182,7 +182,7 @@ def rests(goal: Goal) -> bool:
 
 def moves(exchange: Exchange[Any]) -> bool:
     """The request moves something or switches torque on."""
-    if exchange.effect not in GATED or exchange.rank is Rank.STOP:
+    if exchange.effect not in GATED or exchange.rank is Priority.STOP:
         return False
     return exchange.sure or not exchange.goals or not all(map(rests, exchange.goals))
 

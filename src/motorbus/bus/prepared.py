@@ -9,7 +9,7 @@ from typing import Any
 
 from motorbus.bus.jobs import Attempt
 from motorbus.bus.sync import NodeSync
-from motorbus.core.operation import ANY, Answer, CanFrame, Data, Exchange, Reply, Whole
+from motorbus.core.operation import ANY, CanFrame, Data, Exchange, Reply, Response, Whole
 
 
 @dataclass(slots=True, eq=False)
@@ -44,7 +44,7 @@ class Prepared:
     data: Data = b""
     at: float = -inf
     orders: int = 0
-    kept: Answer | None = None
+    kept: Response | None = None
 
     def __post_init__(self) -> None:
         dues = self.exchange.replies
@@ -54,11 +54,11 @@ class Prepared:
         self.single = self.states[0] if len(dues) == 1 else None
         self.alternate = self.record = self.source = self
 
-    def reading(self) -> tuple[Exchange[Any], Answer, int]:
+    def reading(self) -> tuple[Exchange[Any], Response, int]:
         """The request, its last reply, split into the replies of the nodes, and the orders sent before it."""
         exchange = self.source.exchange
         if self.kept is None:
-            self.kept = Answer(split(exchange, self.data), (), self.at)
+            self.kept = Response(split(exchange, self.data), (), self.at)
         return exchange, self.kept, self.orders
 
 

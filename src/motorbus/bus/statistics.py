@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from motorbus.core.operation import ANY, Any_, Due
+from motorbus.core.operation import ANY, Any_, Expected
 
 BUCKETS = 32
 """Of latencies: the last one begins at 18 minutes, longer than any time-out."""
@@ -55,7 +55,7 @@ class Statistics:
         """Requests that all of these nodes answered, by latency; prepared requests count here."""
         return self._groups.setdefault(nodes, [0] * BUCKETS)
 
-    def asked(self, dues: tuple[Due, ...] | Any_) -> None:
+    def asked(self, dues: tuple[Expected, ...] | Any_) -> None:
         """Count a request that expects these replies; one without reply, or for any reply, belongs to no node."""
         if dues is ANY or not dues:
             self.other["sent"] += 1
@@ -63,12 +63,12 @@ class Statistics:
         for due in dues:
             self.of(due.node).sent += 1
 
-    def retried(self, dues: tuple[Due, ...] | Any_) -> None:
+    def retried(self, dues: tuple[Expected, ...] | Any_) -> None:
         """Count a request that is sent again."""
         for due in () if dues is ANY else dues:
             self.of(due.node).retries += 1
 
-    def answered(self, dues: Iterable[Due], seconds: float) -> None:
+    def answered(self, dues: Iterable[Expected], seconds: float) -> None:
         """Count a valid reply of each of these, after so many seconds."""
         bucket = min(int(seconds * 1e6).bit_length(), BUCKETS - 1)
         for due in dues:

@@ -27,7 +27,7 @@ from motorbus.bus.stop_rounds import stop_in_rounds
 from motorbus.bus.stop_socket import STOP_TIMEOUT, StopOutcome, asked_by, client_name, listening
 from motorbus.bus.tasks import TaskTree
 from motorbus.bus.turn import Turn
-from motorbus.core.operation import Rank, Tune
+from motorbus.core.operation import Priority, SetBitrate
 from motorbus.errors import LinkError, LinkLost
 from motorbus.link.base import Link
 
@@ -125,7 +125,7 @@ class EmergencyStop:
         bus, engine = self.bus, self.bus.engine
         by = asked_by(client)
         engine.announce_stop(by)
-        if bus.turn.acquire(Rank.STOP, engine.stop_delay(bus.now())):
+        if bus.turn.acquire(Priority.STOP, engine.stop_delay(bus.now())):
             return self._stop_with_turn(by)
         stop = engine.positions.frames(bus.now())
         disturbs_no_reply = [request for request in stop.exchanges if not request.replies]
@@ -133,7 +133,7 @@ class EmergencyStop:
             engine.note_stop(request)
             with contextlib.suppress(LinkError):
                 bus.link.write(request.request)
-        if bus.turn.acquire(Rank.STOP, STOP_TIMEOUT):
+        if bus.turn.acquire(Priority.STOP, STOP_TIMEOUT):
             return self._stop_with_turn(by)
         engine.stop_sent()
         silent = tuple(sorted(engine.positions.nodes))
@@ -159,7 +159,7 @@ class EmergencyStop:
         """A scan may be trying another rate: the nodes are stopped at the rate at which they answered last."""
         engine = self.bus.engine
         if (engine.rate, engine.listening) != (engine.positions.rate, engine.always_listening):
-            engine.submit(RateJob(Tune(engine.positions.rate), urgent=True), self.bus.now())
+            engine.submit(RateJob(SetBitrate(engine.positions.rate), urgent=True), self.bus.now())
             self.bus.send()
 
     # -- the thread --------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from motorbus.bus.engine import Engine
 from motorbus.bus.positions import GATED
 from motorbus.bus.prepared import nodes_of
 from motorbus.bus.stop_socket import StopOutcome
-from motorbus.core.operation import Answer, Exchange, Pause, Together, outcome
+from motorbus.core.operation import Exchange, Gather, Response, Sleep, catch
 from motorbus.errors import DeviceError, LinkLost, MotorbusError
 
 ROUNDS: Final = 5
@@ -23,7 +23,7 @@ async def stop_in_rounds(engine: Engine, now: Callable[[], float]) -> StopOutcom
     positions.forget_stop_replies()
     before = {node: positions.accepted_count(node) for node in positions.nodes}
     stop = positions.frames(now())
-    frames: Sequence[Exchange[Answer]] = stop.exchanges
+    frames: Sequence[Exchange[Response]] = stop.exchanges
     acknowledged: list[int] = []
     rounds = 0
     while frames and rounds < ROUNDS and not engine.listening:
@@ -31,7 +31,7 @@ async def stop_in_rounds(engine: Engine, now: Callable[[], float]) -> StopOutcom
             break
         rounds += 1
         begun = now()
-        found = await Together([outcome(_stop_by(engine, one, now)) for one in frames])
+        found = await Gather([catch(_stop_by(engine, one, now)) for one in frames])
         errors = [error for error in found if isinstance(error, MotorbusError)]
         acknowledged = sorted(
             node for node in positions.nodes if positions.accepted_count(node) > before.get(node, 0)
@@ -40,7 +40,7 @@ async def stop_in_rounds(engine: Engine, now: Callable[[], float]) -> StopOutcom
         if acknowledged and not missing:
             break
         if not all(isinstance(error, LinkLost | DeviceError) for error in errors):
-            await outcome(Pause(begun + SHORTEST_ROUND - now()))
+            await catch(Sleep(begun + SHORTEST_ROUND - now()))
         frames = [
             one
             for one in _frames_for(engine, missing, now(), frames)
@@ -51,7 +51,7 @@ async def stop_in_rounds(engine: Engine, now: Callable[[], float]) -> StopOutcom
     return StopOutcome(tuple(acknowledged), silent, rounds, promise)
 
 
-async def _stop_by(engine: Engine, request: Exchange[Answer], now: Callable[[], float]) -> Any:
+async def _stop_by(engine: Engine, request: Exchange[Response], now: Callable[[], float]) -> Any:
     """Send this request of a stop. If it reads a position, hold the node there."""
     try:
         await request
@@ -62,12 +62,12 @@ async def _stop_by(engine: Engine, request: Exchange[Answer], now: Callable[[], 
     nodes = nodes_of(request)
     if request.effect not in GATED and nodes:
         frames = _frames_for(engine, nodes, now(), ())
-        await Together([one for one in frames if one.effect in GATED and nodes_of(one)])
+        await Gather([one for one in frames if one.effect in GATED and nodes_of(one)])
 
 
 def _frames_for(
-    engine: Engine, nodes: Iterable[int], now: float, before: Sequence[Exchange[Answer]]
-) -> Sequence[Exchange[Answer]]:
+    engine: Engine, nodes: Iterable[int], now: float, before: Sequence[Exchange[Response]]
+) -> Sequence[Exchange[Response]]:
     """The requests that stop these nodes as things are now."""
     fresh = engine.positions.fresh(now)
     try:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any, Final, TypeAlias
 
 from motorbus.core.family import Family
-from motorbus.core.operation import ANY, Due, Exchange, Key
+from motorbus.core.operation import ANY, Exchange, Expected, Key
 
 PROBES: Final = 64
 """Probes compared with what a node owes, to find one that differs."""
@@ -73,7 +73,7 @@ class SyncTable:
             node.asked_at, node.lane = now, request.lane
             self.out_of_sync.add(due.node)
 
-    def mark_owed(self, lane: int, due: Due, quiet_until: float) -> None:
+    def mark_owed(self, lane: int, due: Expected, quiet_until: float) -> None:
         """This reply did not come in time and may still come."""
         node = self.of(due.node)
         node.owed[lane, due.key, due.length] = None
@@ -94,7 +94,7 @@ class SyncTable:
             node.silences = 0
         self.out_of_sync.update(self.nodes)
 
-    def confirm(self, due: Due, *, probe: bool) -> None:
+    def confirm(self, due: Expected, *, probe: bool) -> None:
         """This reply was accepted. A node that owes others is in sync again only after a probe."""
         node = self.of(due.node)
         node.length = due.length

@@ -12,21 +12,21 @@ from motorbus.bus.engine import Engine
 from motorbus.bus.jobs import ExclusiveJob, Job, RateJob, RequestJob, Since
 from motorbus.bus.positions import GATED
 from motorbus.core.operation import (
-    Alone,
+    Emit,
     Exchange,
-    Journal,
-    Listen,
-    Notice,
-    Pause,
-    Rank,
-    Report,
+    Exclusive,
+    Gather,
+    JournalEntry,
+    Notification,
+    Priority,
     Runnable,
+    SetBitrate,
     Shielded,
+    Sleep,
     Step,
-    Together,
-    Tune,
+    WaitFor,
+    catch,
     discard,
-    outcome,
 )
 from motorbus.errors import MotorbusError, RequestError
 
@@ -51,7 +51,7 @@ class Timer(Job):
     def __init__(self, settled: Callable[[], None] | None, until: float) -> None:
         super().__init__(settled=settled)
         self.until = until
-        self.listener: Callable[[Notice], None] | None = None
+        self.listener: Callable[[Notification], None] | None = None
 
 
 class Task:
@@ -227,13 +227,13 @@ class TaskTree(Generic[T]):
     def _begin(self, task: Task, step: Step[Any]) -> None:
         if isinstance(step, Exchange):
             self._begin_request(task, step)
-        elif isinstance(step, Together):
+        elif isinstance(step, Gather):
             task.joins_one = False
             task.children = [Task(procedure, task) for procedure in step.operations]
             if not task.children:
                 task.job = Job()
                 task.job.settle([])
-        elif isinstance(step, Alone):
+        elif isinstance(step, Exclusive):
             child = Task(step.operation, task)
             child.claims = child.owner is None  # what is nested belongs to the outermost
             child.owner = child.owner or child
@@ -245,17 +245,17 @@ class TaskTree(Generic[T]):
             child = Task(step.operation, task)
             child.cancelled = True
             task.children, task.joins_one = [child], True
-        elif isinstance(step, Report):
+        elif isinstance(step, Emit):
             self._report(task, step.event)
-        elif isinstance(step, Listen):
+        elif isinstance(step, WaitFor):
             self._listen(task, step)
-        elif isinstance(step, Pause):
+        elif isinstance(step, Sleep):
             task.job = timer = Timer(self.settled, self.now() + step.seconds)
             self.timers.append(timer)
             if LONG_SLEEP <= step.seconds <= self.extension:
                 self.extension -= step.seconds
                 self.deadline += step.seconds
-        elif isinstance(step, Tune):
+        elif isinstance(step, SetBitrate):
             task.job = RateJob(step, task.owner, self.settled)
             self.engine.submit(task.job, self.now())
         else:
@@ -267,7 +267,7 @@ class TaskTree(Generic[T]):
         if (
             interlock is not None
             and request.effect in GATED
-            and request.rank is not Rank.STOP
+            and request.rank is not Priority.STOP
             and not task.checked
         ):
             reads = interlock.required_reads(request)
@@ -292,16 +292,16 @@ class TaskTree(Generic[T]):
         try:
             if self.report is not None:
                 self.report(event)
-            elif isinstance(event, Journal):
+            elif isinstance(event, JournalEntry):
                 raise _no_journal(event)
         except Exception as error:
             task.job.settle(error=error)
         task.job.settle()
 
-    def _listen(self, task: Task, step: Listen) -> None:
+    def _listen(self, task: Task, step: WaitFor) -> None:
         task.job = timer = Timer(self.settled, self.now() + step.until)
 
-        def listen(notice: Notice) -> None:
+        def listen(notice: Notification) -> None:
             try:
                 if step.match(notice):
                     self._end(timer, notice)
@@ -377,7 +377,7 @@ async def _read_first(required: Callable[[Exchange[Any]], Any], reads: Any, requ
     """Carry out the reads that the interlock requires, again where they were doubtful, then the request."""
     for _ in range(READS):
         for read in reads:
-            await outcome(read)
+            await catch(read)
         reads = required(request)
     return await request
 
@@ -397,11 +397,11 @@ def _not_a_step(step: object) -> RequestError:
     return RequestError(
         f"a procedure awaited {type(step).__name__}, which is no step",
         cause="asyncio.sleep(), futures and tasks need an event loop; a procedure runs without one",
-        advice="await steps of motorbus only, such as Pause(seconds)",
+        advice="await steps of motorbus only, such as Sleep(seconds)",
     )
 
 
-def _no_journal(event: Journal) -> RequestError:
+def _no_journal(event: JournalEntry) -> RequestError:
     return RequestError(
         f"this bus keeps no journal, so it refuses {event.change}()",
         cause="a guarded change is recorded before it begins, so that a crash can be repaired",

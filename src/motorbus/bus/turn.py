@@ -9,7 +9,7 @@ from threading import Lock, get_ident
 from time import monotonic
 from typing import Final, Self
 
-from motorbus.core.operation import Rank
+from motorbus.core.operation import Priority
 
 AGED: Final = 0.25
 """s after which a waiting thread goes first, whatever its priority."""
@@ -39,7 +39,7 @@ class Turn:
         """A thread has it."""
         return self._lock.locked()
 
-    def acquire(self, priority: Rank = Rank.POLL, timeout: float = -1.0) -> bool:
+    def acquire(self, priority: Priority = Priority.POLL, timeout: float = -1.0) -> bool:
         """Take the turn; False when `timeout` s have passed without it (-1: no limit)."""
         me = get_ident()
         if self._owner == me:
@@ -71,7 +71,7 @@ class Turn:
             with self._guard:
                 self._pass_on()
 
-    def _wait(self, priority: Rank, timeout: float, thread: int) -> bool:
+    def _wait(self, priority: Priority, timeout: float, thread: int) -> bool:
         bell = Lock()
         bell.acquire()
         waiter = (priority, next(self._serial), monotonic(), bell, thread)

@@ -15,21 +15,21 @@ from motorbus.cli import frame as frames
 from motorbus.cli.exits import Unforeseeable
 from motorbus.core.operation import (
     ANY,
-    Alone,
-    Answer,
     CanFrame,
     Effect,
+    Emit,
     Exchange,
-    Journal,
-    Listen,
-    Pause,
-    Rank,
+    Exclusive,
+    Gather,
+    JournalEntry,
+    Priority,
     Reply,
-    Report,
+    Response,
+    SetBitrate,
     Shielded,
+    Sleep,
     Step,
-    Together,
-    Tune,
+    WaitFor,
     discard,
 )
 from motorbus.errors import MotorbusError
@@ -150,25 +150,25 @@ class DryBus:
     def _step(self, step: object) -> object:
         if isinstance(step, Exchange):
             return self._one(step)
-        if isinstance(step, Alone | Shielded):
+        if isinstance(step, Exclusive | Shielded):
             return self.run(step.operation)
-        if isinstance(step, Together):
+        if isinstance(step, Gather):
             return [self.run(operation) for operation in step.operations]
-        if isinstance(step, Tune) and (step.rate == 0 or self.family.link.kind == "bytes"):
+        if isinstance(step, SetBitrate) and (step.rate == 0 or self.family.link.kind == "bytes"):
             return self._bus.run(
                 step
             )  # on CAN whoever speaks at another rate disturbs the bus: only ask there
-        if isinstance(step, Pause):
+        if isinstance(step, Sleep):
             self._waited += step.seconds
             return self.link.now() + self._waited
-        if isinstance(step, Listen):
+        if isinstance(step, WaitFor):
             self._waited += step.until
-        if isinstance(step, Report) and self._report is not None and not isinstance(step.event, Journal):
+        if isinstance(step, Emit) and self._report is not None and not isinstance(step.event, JournalEntry):
             self._report(step.event)
         return None  # nobody has said anything; another rate: nothing is sent
 
     def _one(self, exchange: Exchange[Any]) -> object:
-        if exchange.effect is Effect.NONE and exchange.rank is Rank.POLL:
+        if exchange.effect is Effect.NONE and exchange.rank is Priority.POLL:
             return self._foreseen(exchange) if self._follows(exchange) else self._told(exchange)
         for question in self._bus.required_reads(exchange):
             self._bus.run(question)
@@ -195,7 +195,7 @@ class DryBus:
         if data is None or exchange.replies is ANY or exchange.read is None:
             return _AsWritten()
         reply = Reply(exchange.lane, exchange.replies[0].key, data)
-        return exchange.read(Answer((reply,), (), self.link.now() + self._waited))
+        return exchange.read(Response((reply,), (), self.link.now() + self._waited))
 
     def _follows(self, exchange: Exchange[Any]) -> bool:
         """Does it ask somebody whom something was withheld from?"""

@@ -14,7 +14,7 @@ from motorbus.cli.output import Output
 from motorbus.cli.rates import check_rate
 from motorbus.cli.read import Told, own_position, sampled, state_facts
 from motorbus.cli.target import able, everyone, face, gathered, opened, target
-from motorbus.core.operation import Pause
+from motorbus.core.operation import Sleep
 from motorbus.errors import LinkError, LinkLost, MotorbusError, NoReply, RequestError
 
 if TYPE_CHECKING:
@@ -199,7 +199,7 @@ class _Away:
 
 
 async def _pause(seconds: float) -> None:
-    await Pause(seconds)
+    await Sleep(seconds)
 
 
 def _verdict(watched: set[tuple[str, int]], heard: set[tuple[str, int]]) -> Exit:

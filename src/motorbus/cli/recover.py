@@ -13,7 +13,7 @@ from motorbus.cli.exits import Exit, Unforeseeable
 from motorbus.cli.identity import address, carried_out
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.target import face, offers, opened, takes, target
-from motorbus.core.operation import OUTCOME, Journal
+from motorbus.core.operation import OUTCOME, JournalEntry
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.journal import Change
 
@@ -143,7 +143,7 @@ def _unfinished(bus: Bus, kept: BusJournal | None) -> Change | None:
 def _closed(kept: BusJournal | None, change: Change, outcome: str) -> None:
     """End a change in the journal by its former name; its own the bus has closed already."""
     if kept is not None:
-        kept(Journal(change.verb, OUTCOME, {"outcome": outcome}))
+        kept(JournalEntry(change.verb, OUTCOME, {"outcome": outcome}))
 
 
 def _nothing(bus: str, output: Output) -> Exit:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 from motorbus.cli import frame
 from motorbus.cli.exits import Exit
 from motorbus.cli.target import opened, target
-from motorbus.core.operation import CanFrame, Pause
+from motorbus.core.operation import CanFrame, Sleep
 from motorbus.errors import NoReply, RequestError
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def listen(
 
 
 async def _pause() -> None:
-    await Pause(LOOK)
+    await Sleep(LOOK)
 
 
 def _tell(opening: Bus, bus: str, record: TraceRecord, at: float, output: Output) -> None:

@@ -17,7 +17,7 @@ from motorbus.cli.files import usable
 from motorbus.cli.simulated import Simulated
 from motorbus.cli.target import face, nobody, opened
 from motorbus.core import units
-from motorbus.core.operation import Together
+from motorbus.core.operation import Gather
 from motorbus.errors import MotorbusError, RequestError
 
 if TYPE_CHECKING:
@@ -156,7 +156,7 @@ def _all(opening: Bus, exchanges: Sequence[Exchange[Any]]) -> list[Any]:
 
 
 async def _together(exchanges: Sequence[Exchange[Any]]) -> list[Any]:
-    return await Together(exchanges)
+    return await Gather(exchanges)
 
 
 def _told(opening: Bus, reads: Sequence[Exchange[Positions]]) -> dict[int, float]:

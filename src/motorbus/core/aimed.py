@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from motorbus.core.operation import Answer, Effect, Exchange, Goal, Rank, Refusal, Timeout
+from motorbus.core.operation import Effect, Exchange, Goal, Priority, Refusal, Response, TimeoutClass
 
 
 class Aim:
@@ -41,9 +41,9 @@ class Aimed(Exchange[None]):
     sure = True
     replies = ()  # type: ignore[misc]  # the same for all requests, so it is a class attribute
     lane = 0  # type: ignore[misc]
-    rank = Rank.CONTROL  # type: ignore[misc]
+    rank = Priority.CONTROL  # type: ignore[misc]
     effect = Effect.MOTION  # type: ignore[misc]
-    timeout = Timeout.REPLY  # type: ignore[misc]
+    timeout = TimeoutClass.REPLY  # type: ignore[misc]
     repeatable = False  # type: ignore[misc]
     tells_position = False  # type: ignore[misc]
     later = None  # type: ignore[misc]
@@ -63,7 +63,7 @@ class Aimed(Exchange[None]):
         return Aimed(self.request, aim, self._raws)  # type: ignore[arg-type]  # always bytes here
 
     @staticmethod
-    def read(_: Answer) -> None:
+    def read(_: Response) -> None:
         """There is no reply to read."""
 
     @property  # type: ignore[misc]

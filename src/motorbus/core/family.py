@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Protocol
 from motorbus.core.assurance import Assurance
 from motorbus.core.capture import Captures
 from motorbus.core.entry import Table, Value
-from motorbus.core.operation import Answer, Data, Event, Exchange, Operation, Runnable
+from motorbus.core.operation import Data, Event, Exchange, Procedure, Response, Runnable
 
 
 class Option(NamedTuple):
@@ -72,7 +72,7 @@ class Identity:
 
 
 class Found(NamedTuple):
-    """A node found by a scan, its rate (bit/s) and identity (None: unknown); also an event for `Report`."""
+    """A node found by a scan, its rate (bit/s) and identity (None: unknown); also an event for `Emit`."""
 
     node: int
     rate: int
@@ -80,7 +80,7 @@ class Found(NamedTuple):
 
 
 class Readdressed(NamedTuple):
-    """An event for `Report` before a device gets another id: from now on `new` may reach the device `node`.
+    """An event for `Emit` before a device gets another id: from now on `new` may reach the device `node`.
 
     `node` is None if the device is unknown. The event precedes the first write.
     """
@@ -170,7 +170,7 @@ class Train(Protocol):
         a node that is not one of these.
         """
 
-    def begin(self, speeds: Mapping[int, float]) -> Operation[None]:
+    def begin(self, speeds: Mapping[int, float]) -> Procedure[None]:
         """Prepare every node of this train for goals: torque on without a jump.
 
         `speeds` gives a maximum tracking speed (rad/s, above 0) for some nodes. A device rounds it up to a value that
@@ -182,7 +182,7 @@ class Train(Protocol):
 class Stop(NamedTuple):
     """Requests that stop the nodes, in order, and what their acknowledgement promises."""
 
-    exchanges: tuple[Exchange[Answer], ...]
+    exchanges: tuple[Exchange[Response], ...]
     promise: str
 
 
@@ -378,7 +378,7 @@ class Family(Protocol):
         of its request.
         """
 
-    def stop(self, nodes: Mapping[int, Answer | None]) -> Stop:
+    def stop(self, nodes: Mapping[int, Response | None]) -> Stop:
         """Requests that stop these nodes.
 
         `nodes` maps each node to the last answer with its position, None if there is no valid one.
@@ -386,7 +386,7 @@ class Family(Protocol):
 
     def identify(self, node: int) -> Runnable[Identity]: ...
 
-    def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Operation[list[Found]]:
+    def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Procedure[list[Found]]:
         """Search devices by unicast. () means all ids, or the present rate, which is restored at the end.
 
         Reports `Progress`, and `Found` when a device answers, possibly before its identity is read.

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, Final, NamedTuple, Protocol, TypeVar
 
 from motorbus.core import units
-from motorbus.core.operation import Alone, Pause, Runnable, Together, afterwards, outcome
+from motorbus.core.operation import Exclusive, Gather, Runnable, Sleep, catch, with_cleanup
 from motorbus.errors import MotorbusError, RequestError
 
 T = TypeVar("T")
@@ -48,7 +48,7 @@ async def stopped_if_interrupted(move: Runnable[T], *devices: Moving) -> T:
     """
     wait = _Wait(devices)
     try:
-        return await afterwards(wait.run(move), wait.stop)
+        return await with_cleanup(wait.run(move), wait.stop)
     except BaseException as error:
         for note in wait.notes:
             error.add_note(note)
@@ -81,15 +81,15 @@ class _Wait:
             return
         interrupted = MotorbusError("its stop was interrupted")
         self.notes = [_note(moving, interrupted) for moving in self._devices]
-        results = await Together([outcome(Alone(self._stop(moving))) for moving in self._devices])
+        results = await Gather([catch(Exclusive(self._stop(moving))) for moving in self._devices])
         self._open = False
         stopped = [pair for pair in zip(self._devices, results, strict=True) if pair[1]]
         self.notes = [_note(moving, result) for moving, result in stopped]
-        places = await Together([_place(moving, result) for moving, result in stopped])
+        places = await Gather([_place(moving, result) for moving, result in stopped])
         self.notes = [note + place for note, place in zip(self.notes, places, strict=True)]
 
     async def _stop(self, moving: Moving) -> str:
-        """Run it inside `Alone`: a newer move is then ordered either before the check or after the stop."""
+        """Run it inside `Exclusive`: a newer move is then ordered either before the check or after the stop."""
         if moving.device.last_move is not self._move:
             return ""
         promise = await moving.stop()
@@ -110,13 +110,13 @@ async def _place(moving: Moving, result: str | MotorbusError) -> str:
     """Return the text of the position at which a stopped device came to rest, or of its last reading."""
     if isinstance(result, MotorbusError):
         return ""
-    begin = since = await Pause(0)
+    begin = since = await Sleep(0)
     rest: float | None = None
     while True:
-        position = await outcome(moving.position())
+        position = await catch(moving.position())
         if isinstance(position, MotorbusError):
             return f", and its position is not known: {position.summary}"
-        now = await Pause(PERIOD)
+        now = await Sleep(PERIOD)
         if rest is None or abs(position - rest) > TOLERANCE:
             rest, since = position, now
         place = f" at {units.show(position, 'position')}"

@@ -28,7 +28,7 @@ Data: TypeAlias = bytes | CanFrame
 Key: TypeAlias = Hashable
 
 
-class Rank(IntEnum):
+class Priority(IntEnum):
     """Priority among waiting exchanges: the lowest number leaves first."""
 
     STOP = 0
@@ -47,7 +47,7 @@ class Effect(IntEnum):
     MOTION = 4
 
 
-class Timeout(IntEnum):
+class TimeoutClass(IntEnum):
     """Class of the time that a device takes before it replies; the family defines the seconds."""
 
     REPLY = 0
@@ -55,7 +55,7 @@ class Timeout(IntEnum):
     STORE = 2
 
 
-class Due(NamedTuple):
+class Expected(NamedTuple):
     """An expected reply: its node, the key that identifies it, and its exact length in bytes.
 
     A refusal is a reply, too; where it is shorter, the family pads it to this length, as CANopen does.
@@ -86,7 +86,7 @@ class Reply(NamedTuple):
     data: bytes
 
 
-class Notice(NamedTuple):
+class Notification(NamedTuple):
     """A frame that a device sent unsolicited: a report, an alarm, the end of a program.
 
     `at` is its arrival time (s, link clock), set by the bus.
@@ -110,10 +110,10 @@ class Noise(NamedTuple):
     lane: int | None = None
 
 
-Event: TypeAlias = Reply | Notice | Noise
+Event: TypeAlias = Reply | Notification | Noise
 
 
-class Answer(NamedTuple):
+class Response(NamedTuple):
     """The replies in the expected order, the nodes without a reply, and the arrival time (s, link clock)."""
 
     replies: tuple[Reply, ...]
@@ -152,8 +152,8 @@ class Exchange(Step[T_co]):
     """One request and its expected replies. A value: no field but `course` changes.
 
     `request`     the bytes or the CAN frame to send
-    `replies`     one `Due` per expected reply; () for none; `ANY` for all replies before the deadline
-    `read`        answer -> value; None: the value is the `Answer`. Matching of replies does not use it
+    `replies`     one `Expected` per expected reply; () for none; `ANY` for all replies before the deadline
+    `read`        answer -> value; None: the value is the `Response`. Matching of replies does not use it
     `lane`        exchanges on the same lane never overlap
     `effect`      highest effect of the rows that it writes
     `goals`       goal of each node, for the gate
@@ -170,16 +170,16 @@ class Exchange(Step[T_co]):
     """
 
     request: Final[Data]
-    replies: Final[tuple[Due, ...] | Any_] = ()
-    read: Callable[[Answer], T_co] | None = None
+    replies: Final[tuple[Expected, ...] | Any_] = ()
+    read: Callable[[Response], T_co] | None = None
     _: KW_ONLY
     lane: Final[int] = 0
-    rank: Final[Rank] = Rank.POLL
+    rank: Final[Priority] = Priority.POLL
     effect: Final[Effect] = Effect.NONE
     goals: Final[tuple[Goal, ...]] = ()
-    timeout: Final[Timeout] = Timeout.REPLY
+    timeout: Final[TimeoutClass] = TimeoutClass.REPLY
     repeatable: Final[bool] = False
-    tells_position: Final[bool | Callable[[Answer], Mapping[int, float]]] = False
+    tells_position: Final[bool | Callable[[Response], Mapping[int, float]]] = False
     refusal: Final[Refusal | None] = None
     later: Final[Later | None] = None
     other: Callable[[], Exchange[T_co]] | None = None
@@ -195,7 +195,7 @@ class Exchange(Step[T_co]):
         """The nodes of the goals."""
         return [goal.node for goal in self.goals]
 
-    def reading(self, read: Callable[[Answer], T]) -> Exchange[T]:
+    def reading(self, read: Callable[[Response], T]) -> Exchange[T]:
         """The same request with another `read`, without `other` and `whole`."""
         own = ("request", "replies", "read", "other", "whole", "course")
         rest = [name for name in Exchange.__slots__ if name not in own]
@@ -207,43 +207,43 @@ class Exchange(Step[T_co]):
 
 
 @dataclass(slots=True, eq=False)
-class Together(Step[list[T_co]]):
+class Gather(Step[list[T_co]]):
     """Operations that overlap where the bus allows it; gives their results in order.
 
     An error in one does not end the others; an interruption (KeyboardInterrupt, MemoryError) ends all. After all have
-    ended the first error is raised, with a note for each other; `outcome()` around each gives errors as values.
+    ended the first error is raised, with a note for each other; `catch()` around each gives errors as values.
     """
 
     operations: Sequence[Runnable[T_co]]
 
 
 @dataclass(slots=True, eq=False)
-class Alone(Step[T_co]):
+class Exclusive(Step[T_co]):
     """An operation during which the bus sends nothing else, except a stop."""
 
     operation: Runnable[T_co]
 
 
 @dataclass(slots=True, eq=False)
-class Pause(Step[float]):
+class Sleep(Step[float]):
     """Wait at least `seconds` on the link clock; gives the time (s) then. 0 only reads the clock."""
 
     seconds: Final[float]
 
 
 @dataclass(slots=True, eq=False)
-class Listen(Step["Notice | None"]):
+class WaitFor(Step["Notification | None"]):
     """Wait at most `until` seconds from this step on for a notice that `match` accepts; gives it, or None."""
 
-    match: Final[Callable[[Notice], bool]]
+    match: Final[Callable[[Notification], bool]]
     until: Final[float]
 
 
 @dataclass(slots=True, eq=False)
-class Tune(Step[int]):
+class SetBitrate(Step[int]):
     """Set the rate of the link (bit/s) when nothing is in flight; gives the previous rate. 0 only reads it.
 
-    With `listen_only` the link sends nothing until the next `Tune`, not even the acknowledge bit of CAN: a bus of
+    With `listen_only` the link sends nothing until the next `SetBitrate`, not even the acknowledge bit of CAN: a bus of
     unknown rate is not disturbed. A serial link has no such bit.
     """
 
@@ -252,15 +252,15 @@ class Tune(Step[int]):
 
 
 class Progress(NamedTuple):
-    """An event for `Report`: `done` of `total` units of work, and the present activity."""
+    """An event for `Emit`: `done` of `total` units of work, and the present activity."""
 
     done: int
     total: int
     what: str = ""
 
 
-class Journal(NamedTuple):
-    """An event for `Report` that must be on disk before the next step: the state of a guarded change.
+class JournalEntry(NamedTuple):
+    """An event for `Emit` that must be on disk before the next step: the state of a guarded change.
 
     `change`  the verb that makes the change, as "set_id"
     `state`   ASKED    requested, conditions not yet checked; not stored, but refused while another change on the bus
@@ -286,7 +286,7 @@ READABLE: Final = "readable"  # in the facts: True for a change that only reads 
 
 
 @dataclass(slots=True, eq=False)
-class Report(Step[None]):
+class Emit(Step[None]):
     """Pass an event (progress, an early result, a journal record) to its observers before the next step."""
 
     event: Final[object]
@@ -299,7 +299,7 @@ class Shielded(Step[T_co]):
     operation: Runnable[T_co]
 
 
-Operation: TypeAlias = Coroutine[Step[Any], Any, T]
+Procedure: TypeAlias = Coroutine[Step[Any], Any, T]
 Runnable: TypeAlias = "Coroutine[Step[Any], Any, T] | Step[T]"
 """What a bus runs: a procedure or a step."""
 
@@ -343,13 +343,13 @@ class CleanUp(Guard):
         await self._function()
 
 
-async def afterwards(runnable: Runnable[T], clean_up: Callable[[], Runnable[object]]) -> T:
+async def with_cleanup(runnable: Runnable[T], clean_up: Callable[[], Runnable[object]]) -> T:
     """Run `runnable`, then `clean_up()`, whatever is raised; see `Guard`."""
     async with CleanUp(clean_up):
         return await runnable
 
 
-async def outcome(runnable: Runnable[T]) -> T | MotorbusError:
+async def catch(runnable: Runnable[T]) -> T | MotorbusError:
     """Run `runnable`; a MotorbusError becomes the value, so that a loop can visit all nodes."""
     try:
         return await runnable
@@ -365,9 +365,9 @@ def discard(runnable: object) -> None:
         runnable.close()
     elif isinstance(runnable, list | tuple):
         given = runnable
-    elif isinstance(runnable, Together):
+    elif isinstance(runnable, Gather):
         given = runnable.operations
-    elif isinstance(runnable, Alone | Shielded):
+    elif isinstance(runnable, Exclusive | Shielded):
         given = (runnable.operation,)
     for one in given:
         discard(one)

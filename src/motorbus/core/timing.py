@@ -9,20 +9,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-from motorbus.core.operation import Operation
+from motorbus.core.operation import Procedure
 
 
 class Timing(Protocol):
     """Synchronises one device with others, which may be on other buses."""
 
-    def agreed(self, shortest: float, fitted: Callable[[float], float]) -> Operation[float]:
+    def agreed(self, shortest: float, fitted: Callable[[float], float]) -> Procedure[float]:
         """Return the common duration (s), at least `shortest`, once every device has given its minimum.
 
         `fitted` maps a duration that the others need to the nearest one, not shorter, that this device supports.
         Raises Interrupted if one of the devices cannot take part.
         """
 
-    def start(self, lead: float) -> Operation[float]:
+    def start(self, lead: float) -> Procedure[float]:
         """Report this device ready. Return `lead` s before the common start; the value is that start (s, link clock).
 
         Raises Interrupted if one of the devices cannot take part.

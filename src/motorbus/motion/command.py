@@ -15,16 +15,16 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 from motorbus.bus import failures
 from motorbus.core.aimed import Aim, Aimed
 from motorbus.core.operation import (
-    Alone,
     Effect,
     Exchange,
-    Rank,
+    Exclusive,
+    Gather,
+    Priority,
     Refusal,
     Runnable,
     Step,
     Stops,
-    Together,
-    outcome,
+    catch,
 )
 from motorbus.errors import Interrupted, MotorbusError
 
@@ -198,11 +198,11 @@ class Command:
 
     def _watching(self, step: Step[Any]) -> Step[Any]:
         if isinstance(step, Exchange):
-            return self.guarded(step) if step.effect in GUARDED and step.rank is not Rank.STOP else step
-        if isinstance(step, Together):
-            return Together([self.watched(one) for one in step.operations])
-        if isinstance(step, Alone):
-            return Alone(self.watched(step.operation))
+            return self.guarded(step) if step.effect in GUARDED and step.rank is not Priority.STOP else step
+        if isinstance(step, Gather):
+            return Gather([self.watched(one) for one in step.operations])
+        if isinstance(step, Exclusive):
+            return Exclusive(self.watched(step.operation))
         return step
 
     async def stop(self, *, anew: bool = False) -> dict[str, MotorbusError]:
@@ -211,7 +211,7 @@ class Command:
         With `anew` also those for which a stop has left on their bus, where nobody knows whether it was accepted.
         """
         axes = self.untold() if anew else self.held()
-        ended = await Together([outcome(axis.able["stop"](axis.device)) for axis in axes])
+        ended = await Gather([catch(axis.able["stop"](axis.device)) for axis in axes])
         errors = {
             axis.name: told for axis, told in zip(axes, ended, strict=True) if isinstance(told, MotorbusError)
         }

@@ -12,7 +12,7 @@ from functools import partial
 from typing import Any, TypeAlias
 
 from motorbus.core.family import State
-from motorbus.core.operation import Operation
+from motorbus.core.operation import Procedure
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion import capabilities as one
 from motorbus.motion import reckoning
@@ -109,7 +109,7 @@ def _each(
     axes: Mapping[str, AxisVerbs],
     act: Act[Any],
     combined: Callable[[dict[str, Any]], Any],
-    how: Callable[[list[AxisVerbs], Act[Any]], Operation[Told]] = everyone,
+    how: Callable[[list[AxisVerbs], Act[Any]], Procedure[Told]] = everyone,
 ) -> Abreast[Any]:
     """Do it to each of these, and make of what came of them what is wanted; in the order of the names."""
     parts = body.by_bus(axes)

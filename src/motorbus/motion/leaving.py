@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Iterable, Mapping
 from typing import Any, Final, TypeAlias
 
-from motorbus.core.operation import Operation, outcome
+from motorbus.core.operation import Procedure, catch
 from motorbus.errors import Interrupted, MotorbusError, NotHomed, Stalled
 from motorbus.motion import capabilities as one
 from motorbus.motion.abreast import Abreast
@@ -29,7 +29,7 @@ TRIES: Final = 3
 PATIENCE: Final = 0.5
 """s for which what was stopped is looked at, at most, before it is let go."""
 
-How: TypeAlias = "Callable[[list[AxisVerbs], Act[Any]], Operation[Told]]"
+How: TypeAlias = "Callable[[list[AxisVerbs], Act[Any]], Procedure[Told]]"
 
 
 class Leaving:
@@ -197,7 +197,7 @@ async def _rest(axis: AxisVerbs) -> Rest:
     """Whether an axis that was stopped rests; raises nothing, for it is let go all the same."""
     if "position" not in axis.able:
         return Rest.UNSEEN
-    told = await outcome(watched(lambda: axis.able["position"](axis.device), PATIENCE))
+    told = await catch(watched(lambda: axis.able["position"](axis.device), PATIENCE))
     return Rest.UNSEEN if isinstance(told, MotorbusError) else told[0]
 
 

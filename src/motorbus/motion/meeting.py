@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Final, Generic, TypeVar
 
-from motorbus.core.operation import Pause, Runnable
+from motorbus.core.operation import Runnable, Sleep
 from motorbus.errors import Interrupted, MotorbusError
 
 T = TypeVar("T")
@@ -39,7 +39,7 @@ class Meeting(Generic[T]):
         while self._said.keys() != self.parties:
             if self._failed is not None:
                 raise _called_off(name, self._failed) from self._failed
-            await Pause(LOOK)
+            await Sleep(LOOK)
         return self._said
 
     def fail(self, error: MotorbusError) -> None:
@@ -97,12 +97,12 @@ class Seat:
 
     async def start(self, lead: float, meanwhile: Callable[[], Runnable[object]] | None = None) -> float:
         """See `core.timing.Timing`. Once all are ready there is `NOTICE` left; `meanwhile` is done in that time."""
-        now = await Pause(0) - self._origin
+        now = await Sleep(0) - self._origin
         ready = await self._beat.ready.meet(self._party, now + lead)
         moment = max(ready.values()) + NOTICE + self._origin
         if meanwhile is not None:
             await meanwhile()
-        await Pause(max(0.0, moment - lead - await Pause(0)))
+        await Sleep(max(0.0, moment - lead - await Sleep(0)))
         return moment
 
     def fails(self, error: BaseException) -> None:

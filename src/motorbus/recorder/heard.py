@@ -8,7 +8,7 @@ from motorbus import families
 from motorbus.core.capture import ABSENT, NOTICE, REPLY, Captures, PacketFacts, Run
 from motorbus.core.entry import shown
 from motorbus.core.family import Family
-from motorbus.core.operation import CanFrame, Data, Event, Noise, Notice
+from motorbus.core.operation import CanFrame, Data, Event, Noise, Notification
 from motorbus.errors import RequestError
 
 
@@ -55,12 +55,12 @@ class ByReceiver:
     def tell(self, packets: list[bytes]) -> PacketFacts:
         """What the receiver said of these, which it has found last."""
         found, self._found = self._found[: len(packets)], self._found[len(packets) :]
-        kinds = [NOTICE if isinstance(event, Notice) else REPLY for event in found]
+        kinds = [NOTICE if isinstance(event, Notification) else REPLY for event in found]
         nodes = [self._node(event) for event in found]
         return lambda: (kinds, nodes, [ABSENT] * len(found))
 
     def _node(self, event: Event) -> int:
-        if isinstance(event, Notice):
+        if isinstance(event, Notification):
             return event.node
         return event.lane if self._frames and event.lane is not None else ABSENT
 

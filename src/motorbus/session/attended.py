@@ -18,7 +18,7 @@ from collections.abc import Mapping
 from types import TracebackType
 from typing import Any, Final, Self
 
-from motorbus.core.operation import Pause, outcome
+from motorbus.core.operation import Sleep, catch
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.body import Body
@@ -124,7 +124,7 @@ class Attending:
         async def on(bus: str) -> dict[str, MotorbusError]:
             sentry = self._robot._sentry
             while sentry is not None and sentry.busy(bus):
-                await outcome(Pause(LOOK))
+                await catch(Sleep(LOOK))
             return await stopped_going_on(parts[bus])
 
         def combine(results: Mapping[str, Any]) -> dict[str, MotorbusError]:

@@ -13,7 +13,7 @@ from threading import Event, Thread
 from typing import Any, Final
 
 from motorbus.bus.background import BackgroundTask
-from motorbus.core.operation import Pause, outcome
+from motorbus.core.operation import Sleep, catch
 from motorbus.errors import MotorbusError
 from motorbus.motion.body import Body
 from motorbus.motion.leaving import given_up, goes_on, moves, stopped_going_on
@@ -102,7 +102,7 @@ class Sentry:
         while not self._over.is_set():
             if self._late(bus):
                 await self._stopping(bus)
-            await outcome(Pause(self._left(bus)))
+            await catch(Sleep(self._left(bus)))
 
     def _watch(self, bus: str) -> None:
         woken = self._posts[bus].woken

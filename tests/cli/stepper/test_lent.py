@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import motorbus
-from motorbus.core.operation import INTENT, Journal
+from motorbus.core.operation import INTENT, JournalEntry
 from tests.cli.conftest import Run
 from tests.cli.stepper.conftest import Line
 
@@ -24,7 +24,7 @@ def lent(line: Line) -> Line:
     }
     with motorbus.open(line.url) as bus:
         assert bus.journal is not None
-        bus.journal(Journal("jog", INTENT, facts))
+        bus.journal(JournalEntry("jog", INTENT, facts))
     return line
 
 

@@ -6,7 +6,7 @@ import pytest
 
 import motorbus
 from motorbus.cli import monitor
-from motorbus.core.operation import Operation
+from motorbus.core.operation import Procedure
 from tests.cli.conftest import Run
 from tests.cli.stepper.conftest import Line
 
@@ -171,7 +171,7 @@ def test_a_controller_that_falls_silent_keeps_its_columns(
 ) -> None:
     pause = monitor._pause
 
-    def unplugged(seconds: float) -> Operation[None]:
+    def unplugged(seconds: float) -> Procedure[None]:
         line.simulation[1].unplug()
         return pause(seconds)
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from motorbus.core.operation import Alone, Data, Journal
+from motorbus.core.operation import Data, Exclusive, JournalEntry
 from motorbus.errors import LinkLost, MotorbusError
 from motorbus.families.feetech import FAMILY
 from motorbus.families.feetech.driver import Node, prepare, recover
@@ -160,7 +160,7 @@ class World:
 
         def record(event: object) -> None:
             link._alive()
-            if isinstance(event, Journal) and event.state != "asked" and next(records) == cut.record:
+            if isinstance(event, JournalEntry) and event.state != "asked" and next(records) == cut.record:
                 if cut.kept:
                     self.journal(event)
                 link.strike()
@@ -182,7 +182,7 @@ class World:
         cut, self.link.cut = self.link.cut, NEVER
         bus.run(prepare(node))
         self.link.cut, self.link.left, self.link.sent = cut, 0, []
-        bus.run(Alone(changed(self.job(), node, Course(self.job()))))
+        bus.run(Exclusive(changed(self.job(), node, Course(self.job()))))
 
     def job(self) -> Job:
         return Job(self.verb, self.old, self.new, bytes(self.servo.memory.live[:40]), (STRANGER,))

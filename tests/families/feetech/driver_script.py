@@ -12,16 +12,16 @@ from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from motorbus.core.operation import (
     ANY,
-    Alone,
-    Answer,
     Effect,
+    Emit,
     Exchange,
-    Pause,
+    Exclusive,
     Reply,
-    Report,
+    Response,
     Runnable,
+    SetBitrate,
     Shielded,
-    Tune,
+    Sleep,
 )
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown
 from motorbus.families.feetech.driver import Node
@@ -148,16 +148,16 @@ class Played:
     def _carry_out(self, step: Any) -> Any:
         if isinstance(step, Exchange):
             return self._exchange(step)
-        if isinstance(step, Alone):
+        if isinstance(step, Exclusive):
             self.alone += 1
             return self.run(step.operation)
         if isinstance(step, Shielded):
             return self._shielded(step)
-        if isinstance(step, Tune):
+        if isinstance(step, SetBitrate):
             return self._tune(step.rate)
-        if isinstance(step, Report):
+        if isinstance(step, Emit):
             self.events.append(step.event)
-        elif isinstance(step, Pause):
+        elif isinstance(step, Sleep):
             self.now += step.seconds
             return self.now
         else:
@@ -206,7 +206,7 @@ class Played:
         missing = tuple(due.node for due in dues if due.node not in {reply.data[2] for reply in replies})
         if len(dues) == 1 and missing:
             raise silence(exchange)
-        answer = Answer(tuple(replies), missing, self.now)
+        answer = Response(tuple(replies), missing, self.now)
         return answer if exchange.read is None else exchange.read(answer)
 
 

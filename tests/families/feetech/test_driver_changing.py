@@ -10,7 +10,7 @@ import pytest
 import motorbus
 from motorbus import session
 from motorbus.bus.blocking import Bus
-from motorbus.core.operation import INTENT, Alone, Data, Journal
+from motorbus.core.operation import INTENT, Data, Exclusive, JournalEntry
 from motorbus.errors import LinkError, LinkLost, MotorbusError, NoReply, RequestError
 from motorbus.families.feetech.driver import Node, prepare
 from motorbus.families.feetech.driver.changing import guarded
@@ -109,7 +109,7 @@ def refused(world: World, error: MotorbusError, *, kept: bool, monkeypatch: pyte
     record = BusJournal.__call__
 
     def refuse(journal: BusJournal, event: object) -> None:
-        if isinstance(event, Journal) and event.state == INTENT:
+        if isinstance(event, JournalEntry) and event.state == INTENT:
             if kept:
                 record(journal, event)
             raise error
@@ -140,7 +140,7 @@ def test_an_intent_that_is_on_the_disk_although_its_folder_was_not_synced_is_clo
 def test_the_journal_of_another_change_stays_open(interrupted: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of two that one program begins at the same time, the first was cut off."""
     world = World("set_id", {})
-    world.journal(Journal("set_id", INTENT, {"node": 9, "new": 8}))
+    world.journal(JournalEntry("set_id", INTENT, {"node": 9, "new": 8}))
     if interrupted:
         error: BaseException = KeyboardInterrupt()
         monkeypatch.setattr("motorbus.journal._unfinished", lambda change: error)
@@ -217,7 +217,7 @@ def test_an_interruption_when_all_is_over_says_that_it_is() -> None:
     done = world.job()
     operation = guarded(done, Node(OLD))
     step = operation.send(None)
-    assert isinstance(step, Alone)
+    assert isinstance(step, Exclusive)
 
     def work(bus: Bus) -> None:
         bus.run(prepare(Node(OLD)))

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Effect, Pause, Rank, Timeout
+from motorbus.core.operation import Effect, Priority, Sleep, TimeoutClass
 from motorbus.errors import ChecksumError, MotorbusError, NoReply, OutcomeUnknown, VerificationFailed
 from motorbus.families.feetech.driver import write
 from motorbus.families.feetech.table import TABLES, Mode
@@ -40,7 +40,7 @@ WHOLE = (*LOOK, UNLOCK, OFF, IDLE, *WRITES, STILL_OPEN, LOCK, LOCKED)
 def test_the_sequence_and_nobody_else_on_the_bus_meanwhile() -> None:
     played = watch(write(prepared(), position_p=33, led_mask=5), *WHOLE)
     assert played.alone == 1
-    stores = [one for one in played.exchanges if one.timeout is Timeout.STORE]
+    stores = [one for one in played.exchanges if one.timeout is TimeoutClass.STORE]
     assert stores == [played.exchanges[0], played.exchanges[2], *played.exchanges[4:]]
     assert [exchange.effect for exchange in played.exchanges] == [
         Effect.NONE,
@@ -54,7 +54,7 @@ def test_the_sequence_and_nobody_else_on_the_bus_meanwhile() -> None:
         Effect.PERSISTENT,
         Effect.NONE,
     ]
-    assert played.exchanges[3].rank is Rank.STOP
+    assert played.exchanges[3].rank is Priority.STOP
 
 
 def test_several_runs_of_registers_are_one_guarded_sequence_and_ram_follows() -> None:
@@ -274,5 +274,5 @@ def test_a_servo_that_restarts_with_its_torque_on_is_not_moved_by_a_setting(chan
         if begun < at < closed - 1:
             assert failure is not None
             assert real.memory["torque_enable"] == 0
-        servo.bus.run(Pause(2.0))
+        servo.bus.run(Sleep(2.0))
         assert real.motion.position(real._now()) == pytest.approx(stood, abs=1)

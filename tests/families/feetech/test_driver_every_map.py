@@ -11,7 +11,7 @@ import pytest
 
 import motorbus
 from motorbus.bus.blocking import Bus
-from motorbus.core.operation import Pause
+from motorbus.core.operation import Sleep
 from motorbus.errors import RequestError
 from motorbus.families.feetech import (
     Servo,
@@ -43,7 +43,7 @@ def world(name: str, **options: Any) -> Iterator[tuple[Bus, Servo, Any]]:
 
 
 def later(bus: Bus, seconds: float) -> None:
-    bus.run(Pause(seconds))
+    bus.run(Sleep(seconds))
 
 
 @pytest.mark.parametrize("name", TABLES)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import motorbus
-from motorbus.core.operation import Answer, Data, Due, Rank, Reply
+from motorbus.core.operation import Data, Expected, Priority, Reply, Response
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.holding import COUNT, PROMISE, ask, held_ids, holds, resting
 from motorbus.families.feetech.driver.line import stop
@@ -36,8 +36,8 @@ def registers(name: str, *, torque: int = 1, here: bytes = HERE, **changes: int)
     return bytes(image)
 
 
-def answered(data: bytes, node: int = 3) -> Answer:
-    return Answer((Reply(0, node, packet(node, 0, *data)),), (), 1.0)
+def answered(data: bytes, node: int = 3) -> Response:
+    return Response((Reply(0, node, packet(node, 0, *data)),), (), 1.0)
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_what_is_no_id_is_refused(said: Any) -> None:
 def test_everything_that_matters_is_asked_in_one_read_with_the_rank_of_a_stop() -> None:
     exchange = ask(3)
     assert exchange.request == packet(3, READ, 0, 58)
-    assert (exchange.replies, exchange.rank) == ((Due(3, 3, 64),), Rank.STOP)
+    assert (exchange.replies, exchange.rank) == ((Expected(3, 3, 64),), Priority.STOP)
     assert exchange.tells_position
 
 
@@ -122,7 +122,7 @@ def test_nobody_else_keeps_torque_and_those_who_hold_never_lose_it() -> None:
     ]
     limp = [node for request in requests[4:] for node in bytes(request)[7:-1:2]]  # type: ignore[arg-type]
     assert limp == [node for node in range(254) if node not in (1, 3, 200)]
-    assert {frame.rank for frame in frames} == {Rank.STOP}
+    assert {frame.rank for frame in frames} == {Priority.STOP}
     assert promise.endswith(PROMISE)
 
 

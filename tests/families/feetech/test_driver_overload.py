@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Pause
+from motorbus.core.operation import Sleep
 from motorbus.errors import DeviceError, MotorbusError, NoReply, RequestError
 from motorbus.families.feetech.driver import Recovery, recover_overload
 from motorbus.families.feetech.driver.overload import REST, TRIPS
@@ -108,7 +108,7 @@ def overloaded(name: str, **options: Any) -> Iterator[tuple[Any, Any]]:
 
 
 async def pause() -> None:
-    await Pause(0.1)
+    await Sleep(0.1)
 
 
 @pytest.mark.parametrize("name", TABLES)

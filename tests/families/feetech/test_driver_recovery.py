@@ -11,7 +11,7 @@ import pytest
 
 import motorbus
 from motorbus import session
-from motorbus.core.operation import INTENT, Journal
+from motorbus.core.operation import INTENT, JournalEntry
 from motorbus.errors import LinkError, NoReply, OutcomeUnknown, RequestError
 from motorbus.families.feetech.driver import Node, recover
 from motorbus.families.feetech.driver.jobs import SET_BAUD, SET_ID, Job, Place
@@ -31,9 +31,9 @@ def begin(
     job = Job(verb, Place(3, RATE), there, bytes(servo.memory.read(0, 40)), tuple(others))
     with motorbus.open(simulation.url) as bus:
         assert bus.journal is not None
-        bus.journal(Journal(verb, INTENT, job.facts()))
+        bus.journal(JournalEntry(verb, INTENT, job.facts()))
         for state in reached:
-            bus.journal(Journal(verb, state, {}))
+            bus.journal(JournalEntry(verb, state, {}))
 
 
 def end(simulation: Simulation, **how: Any) -> str:

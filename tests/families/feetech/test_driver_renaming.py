@@ -9,7 +9,7 @@ import pytest
 
 import motorbus
 from motorbus import session
-from motorbus.core.operation import Data, Journal, Progress
+from motorbus.core.operation import Data, JournalEntry, Progress
 from motorbus.errors import DeviceError, NoReply, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.feetech.driver import Node, set_id
 from motorbus.families.feetech.simulator.memory import Written
@@ -88,7 +88,7 @@ def test_the_journal_is_closed_and_tells_each_step() -> None:
     ):
         bus.run(set_id(Node(3), 7))
         assert session.unfinished(bus) is None
-    told = [event for event in events if isinstance(event, Journal)]
+    told = [event for event in events if isinstance(event, JournalEntry)]
     assert [event.state for event in told] == [
         "asked",
         "asked",

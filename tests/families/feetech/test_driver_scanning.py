@@ -6,7 +6,7 @@ import pytest
 
 import motorbus
 from motorbus.core.family import Found
-from motorbus.core.operation import Progress, Rank, Timeout
+from motorbus.core.operation import Priority, Progress, TimeoutClass
 from motorbus.errors import ChecksumError, LinkError, LinkLost, RequestError
 from motorbus.families.feetech.driver import Skipped, Suspicion, scan
 from motorbus.families.feetech.driver.scanning import DRAIN
@@ -54,7 +54,10 @@ def test_every_id_is_asked_when_none_is_named() -> None:
 def test_a_scan_writes_nothing_and_yields_to_everything() -> None:
     played = watch(scan([1]), answers(1), tells(1))
     assert {exchange.effect.name for exchange in played.exchanges} == {"NONE"}
-    assert (played.exchanges[0].timeout, played.exchanges[0].rank) == (Timeout.SCAN, Rank.CONFIGURATION)
+    assert (played.exchanges[0].timeout, played.exchanges[0].rank) == (
+        TimeoutClass.SCAN,
+        Priority.CONFIGURATION,
+    )
 
 
 def test_noise_is_no_answer() -> None:

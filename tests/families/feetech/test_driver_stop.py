@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Pause, Rank
+from motorbus.core.operation import Priority, Sleep
 from motorbus.errors import RequestError, VerificationFailed
 from motorbus.families.feetech import Servo
 from motorbus.families.feetech.driver import Node, Promise, move, stop
@@ -37,7 +37,7 @@ def stands(raw: int) -> Line:
 def test_stop_holds_where_the_servo_is_and_promises_no_more() -> None:
     wish = stop(prepared())
     played = watch(wish, prepares(), stands(777), writes(3, 42, *low_high(777)))
-    assert played.exchanges[2].rank is Rank.CONTROL
+    assert played.exchanges[2].rank is Priority.CONTROL
     hold = play(stop(prepared()), prepares(), stands(777), writes(3, 42, *low_high(777)))
     assert hold is Promise.HOLD_ACCEPTED
     assert "not verified" in Promise.HOLD_ACCEPTED.value
@@ -126,7 +126,7 @@ def test_stop_of_a_new_servo_asks_it_first() -> None:
 
 
 def later(servo: Any, seconds: float) -> None:
-    servo.bus.run(Pause(seconds))
+    servo.bus.run(Sleep(seconds))
 
 
 @pytest.mark.parametrize("name", TABLES)
@@ -251,7 +251,7 @@ def test_a_servo_is_not_sent_back_to_where_it_was_before_the_host_slept(where: s
         servo.enable_torque()
         servo.move(0.5)
         servo.move(5.5, velocity=1.0, wait=False)
-        servo.bus.run(Pause(1.0))
+        servo.bus.run(Sleep(1.0))
         line: Any = servo.bus.link
         write = line.write
         slept: list[float] = []
@@ -269,7 +269,7 @@ def test_a_servo_is_not_sent_back_to_where_it_was_before_the_host_slept(where: s
         line.write = wrote
         assert servo.stop() is Promise.HOLD_ACCEPTED
         line.write = write
-        servo.bus.run(Pause(2.0))
+        servo.bus.run(Sleep(2.0))
         assert len(slept) == 1
         assert real.motion.position(real._now()) - slept[0] > 1000, (
             "counts; it was on its way for two seconds"

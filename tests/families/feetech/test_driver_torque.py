@@ -6,7 +6,7 @@ import pytest
 
 from motorbus import Robot
 from motorbus.bus.positions import LastPositions, addressed
-from motorbus.core.operation import Effect, Pause, Rank, Together
+from motorbus.core.operation import Effect, Gather, Priority, Sleep
 from motorbus.errors import ChecksumError, MotorbusError, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.feetech import Feetech
 from motorbus.families.feetech.driver import Node, disable_torque, disable_torque_all
@@ -38,7 +38,7 @@ def all_off(*ids: int) -> Line:
 
 def test_a_stranger_is_let_go_with_one_packet_that_passes_everyone() -> None:
     (exchange,) = watch(disable_torque(Node(3)), off(3)).exchanges
-    assert (exchange.rank, exchange.effect) == (Rank.STOP, Effect.TORQUE)
+    assert (exchange.rank, exchange.effect) == (Priority.STOP, Effect.TORQUE)
 
 
 def test_each_frame_names_whom_it_lets_go_so_that_nobody_else_counts_as_stopped() -> None:
@@ -56,17 +56,17 @@ def test_who_is_let_go_does_not_end_the_movement_of_another_and_does_not_hide_it
         bus, first = robot["a1"].bus, robot["a1"]
 
         async def off() -> None:
-            await Pause(0.5)
+            await Sleep(0.5)
             await disable_torque_all([2, 3])
 
-        bus.run(Together([type(first).move.function(first, 0.8), off()]))
+        bus.run(Gather([type(first).move.function(first, 0.8), off()]))
         assert first.position() == pytest.approx(0.8, abs=0.01)
         robot["a2"].device.write(status_return_level=0)
         robot["a2"].device.disable_torque()
         bus.run(disable_torque_all([2, 3]))
         sims["arm"][1].unplug()
         sims["arm"][1].plug()
-        bus.run(Pause(1.0))
+        bus.run(Sleep(1.0))
         first.state()
         assert set(robot.faults) == {"a1"}
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.core.operation import Pause
+from motorbus.core.operation import Sleep
 from motorbus.errors import Interrupted, RequestError
 from motorbus.families.feetech import AsyncServo, Servo, action_all, sync_write, sync_write_positions
 from motorbus.families.feetech.table import Mode
@@ -46,7 +46,7 @@ SETTINGS = [steps, calibrates, limits]
 
 
 def later(servo: Any, seconds: float = 2.0) -> None:
-    servo.bus.run(Pause(seconds))
+    servo.bus.run(Sleep(seconds))
 
 
 def line(bus: Any) -> Any:
@@ -80,7 +80,7 @@ async def interfered(model: str, lost: bool) -> tuple[list[Any], float, int]:
             came: list[Any] = await asyncio.gather(servo.move(1.0, wait=False), return_exceptions=True)
             came += await asyncio.gather(*beside, return_exceptions=True)
             link.write = write
-            await bus.run(Pause(3.0))
+            await bus.run(Sleep(3.0))
             return came, real.raw_position, real.memory["torque_enable"]
 
 
@@ -155,7 +155,7 @@ def test_an_order_that_waited_for_a_change_of_settings_is_refused() -> None:
                 stood = real.motion.position(real._now())
                 await servo.set_mode("step")
                 (failure,) = await asyncio.gather(*beside, return_exceptions=True)
-                await bus.run(Pause(3.0))
+                await bus.run(Sleep(3.0))
                 return failure, servo.known_mode, stood, real.motion.position(real._now())
 
     failure, mode, stood, stands = asyncio.run(both())

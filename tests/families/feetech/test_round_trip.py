@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from motorbus.core.entry import Coding, Entry, Storage
-from motorbus.core.operation import Effect, Tune
+from motorbus.core.operation import Effect, SetBitrate
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.families.feetech.simulator import simulate
 from motorbus.families.feetech.table import BAUD_CODES, BAUD_CODES_OF, CONTROL, TABLES
@@ -360,7 +360,7 @@ def test_a_rate_is_written_by_set_baud(there: Bench) -> None:
     for code in BAUD_CODES_OF[there.servo().identify().table]:
         found = there.servo().set_baud(BAUD_CODES[code], among=(ID,))
         assert (found.node, found.rate) == (ID, BAUD_CODES[code])
-        there.bus.run(Tune(BAUD_CODES[code]))
+        there.bus.run(SetBitrate(BAUD_CODES[code]))
         assert_kept(there, ID, row, code)
 
 

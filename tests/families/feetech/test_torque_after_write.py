@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.core.operation import Pause
+from motorbus.core.operation import Sleep
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import AsyncServo, Servo
 from motorbus.families.feetech.driver import TorqueAfterWrite
@@ -54,7 +54,7 @@ def sags(real: Any, _: Any, frame: bytes) -> bool:
 def test_torque_returns_where_the_servo_is_then_and_it_does_not_move() -> None:
     with holding(sags) as (real, servo, events):
         servo.write(max_temperature=65)
-        servo.bus.run(Pause(1.0))
+        servo.bus.run(Sleep(1.0))
         assert (real.memory["max_temperature"], real.memory["torque_enable"]) == (65, 1)
         assert real.memory["goal_position"] == pytest.approx(SAGGED, abs=1)
         assert real.raw_position == pytest.approx(SAGGED, abs=1)
@@ -111,9 +111,9 @@ def test_an_interrupt_in_front_of_any_frame_ends_with_torque_and_at_rest(at: int
         assert real.memory["torque_enable"] == 1
         assert real.memory["lock"] == 1
         if at >= 2:  # before that, nothing has been changed and its move goes on
-            servo.bus.run(Pause(0.5))
+            servo.bus.run(Sleep(0.5))
             stands = real.raw_position
-            servo.bus.run(Pause(1.0))
+            servo.bus.run(Sleep(1.0))
             assert real.raw_position == stands
 
 

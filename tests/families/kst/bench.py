@@ -15,18 +15,18 @@ from motorbus.bus.stop_socket import StopOutcome
 from motorbus.core.operation import (
     ANY,
     EVERY_LANE,
-    Alone,
-    Answer,
     CanFrame,
     Effect,
+    Emit,
     Exchange,
-    Listen,
-    Pause,
+    Exclusive,
+    Gather,
     Reply,
-    Report,
+    Response,
     Runnable,
-    Together,
-    Tune,
+    SetBitrate,
+    Sleep,
+    WaitFor,
 )
 from motorbus.errors import NoReply, OutcomeUnknown
 from motorbus.families.kst import FAMILY, Kst, Servo, wire
@@ -135,21 +135,21 @@ class Played:
     def _carry_out(self, step: Any) -> Any:
         if isinstance(step, Exchange):
             return self._exchange(step)
-        if isinstance(step, Alone):
+        if isinstance(step, Exclusive):
             self.alone += 1
             return self.run(step.operation)
-        if isinstance(step, Together):
+        if isinstance(step, Gather):
             return [self.run(operation) for operation in step.operations]
-        if isinstance(step, Tune):
+        if isinstance(step, SetBitrate):
             self.rates += [step.rate] if step.rate else []
             return 500_000
-        if isinstance(step, Report):
+        if isinstance(step, Emit):
             self.events.append(step.event)
-        elif isinstance(step, Pause):
+        elif isinstance(step, Sleep):
             self.waited += step.seconds
             self.now += step.seconds
         else:
-            assert isinstance(step, Listen)
+            assert isinstance(step, WaitFor)
         return None
 
     def _exchange(self, exchange: Exchange[Any]) -> Any:
@@ -159,7 +159,7 @@ class Played:
         assert isinstance(exchange.request, CanFrame)
         assert str(exchange.request) == sent
         self.now += 0.001
-        answer = Answer(self._replies(exchange, back), (), self.now)
+        answer = Response(self._replies(exchange, back), (), self.now)
         return answer if exchange.read is None else exchange.read(answer)
 
     def _replies(self, exchange: Exchange[Any], back: Any) -> tuple[Reply, ...]:

@@ -11,7 +11,7 @@ from random import Random
 
 from motorbus.core.can_bits import bits
 from motorbus.core.family import SimulatedNode
-from motorbus.core.operation import CanFrame, Data, Together
+from motorbus.core.operation import CanFrame, Data, Gather
 from motorbus.errors import MotorbusError
 from motorbus.families.kst import FAMILY, Servo
 from motorbus.families.kst.simulator import KstBus
@@ -87,7 +87,7 @@ class Rig:
         """So many positions of each node, all nodes at once."""
 
         async def together() -> None:
-            await Together([self.reading(node, count) for node in self.devices])
+            await Gather([self.reading(node, count) for node in self.devices])
 
         self.bus.run(together())
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from motorbus.bus.blocking import Bus
-from motorbus.core.operation import Pause, Progress
+from motorbus.core.operation import Progress, Sleep
 from motorbus.core.timing import Turned
 from motorbus.errors import Interrupted, MotorbusError
 from motorbus.families.stepper import Controller, driver
@@ -36,7 +36,7 @@ class Partner:
     async def start(self, lead: float) -> float:
         self.lead = lead
         await self._thought("start")
-        self.moment = await Pause(0.05) + lead
+        self.moment = await Sleep(0.05) + lead
         return self.moment
 
     def fails(self, error: BaseException) -> None:
@@ -44,7 +44,7 @@ class Partner:
 
     async def _thought(self, where: str) -> None:
         self.asked.append(where)
-        await Pause(self.thinks)
+        await Sleep(self.thinks)
         if self._fails == where:
             raise Interrupted("the others do not move", cause="made up")
 

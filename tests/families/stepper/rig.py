@@ -10,7 +10,7 @@ from contextlib import suppress
 from random import Random
 from typing import Any
 
-from motorbus.core.operation import Data, Exchange, Rank, Runnable
+from motorbus.core.operation import Data, Exchange, Priority, Runnable
 from motorbus.errors import MotorbusError
 from motorbus.families.stepper import FAMILY, Controller, wire
 from motorbus.families.stepper.driver import commands, goals
@@ -224,5 +224,5 @@ def _longest(exchange: Exchange[Any]) -> float:
     probe = FAMILY.probe(1, 0)
     quiet = FAMILY.quiet_time(9600)
     each = [FAMILY.air_time(one, 9600) + FAMILY.turnaround(one) + 0.02 for one in (exchange, probe)]
-    tries = 1 if exchange.rank is Rank.STOP else RETRIES + 2
+    tries = 1 if exchange.rank is Priority.STOP else RETRIES + 2
     return tries * (sum(each) + 2 * quiet) + quiet

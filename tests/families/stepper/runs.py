@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from motorbus.core.operation import Data, Operation, Pause, Together
+from motorbus.core.operation import Data, Gather, Procedure, Sleep
 from motorbus.families.stepper import driver
 from motorbus.families.stepper.driver import Ran
 from motorbus.families.stepper.execution import Happening
@@ -49,9 +49,9 @@ class Running(Bench):
     def go(self, **options: Any) -> Ran:
         return self.device.run(self.number, **options)
 
-    def beside(self, *others: Operation[Any], **options: Any) -> Ran:
+    def beside(self, *others: Procedure[Any], **options: Any) -> Ran:
         """The run, with other operations on the same bus."""
-        both: Together[Any] = Together([driver.run(self.device, self.number, **options), *others])
+        both: Gather[Any] = Gather([driver.run(self.device, self.number, **options), *others])
         found = self.run(both)
         assert isinstance(found[0], Ran)
         return found[0]
@@ -74,15 +74,15 @@ class Running(Bench):
         return [event for event in self.events if isinstance(event, kind)]
 
 
-async def later(seconds: float, do: Callable[[], Operation[Any]]) -> Any:
+async def later(seconds: float, do: Callable[[], Procedure[Any]]) -> Any:
     """Another operation, after a while."""
-    await Pause(seconds)
+    await Sleep(seconds)
     return await do()
 
 
 async def at(seconds: float, do: Callable[[], object]) -> None:
     """Something that happens to the controller, after a while."""
-    await Pause(seconds)
+    await Sleep(seconds)
     do()
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import motorbus
 from motorbus.core.family import Found
-from motorbus.core.operation import Answer, Exchange, Reply, Timeout
+from motorbus.core.operation import Exchange, Reply, Response, TimeoutClass
 from motorbus.errors import FramingError, OutcomeUnknown, RequestError, UnexpectedReply
 from motorbus.families.stepper import FAMILY, AsyncController, Controller, Program, Sends, driver
 from motorbus.families.stepper.driver import Node, presence, vote
@@ -187,7 +187,7 @@ def test_a_reply_that_is_not_due_is_told_byte_by_byte(
     exchange = command(Node(), name, bytes, **values)
     assert exchange.read is not None
     with pytest.raises(UnexpectedReply) as raised:
-        exchange.read(Answer((Reply(0, (), bytes.fromhex(came)),), (), 1.0))
+        exchange.read(Response((Reply(0, (), bytes.fromhex(came)),), (), 1.0))
     assert raised.value.summary == f"the reply to {name} is not the one that is due: {says}"
     assert (raised.value.sent, raised.value.received) == (exchange.request, bytes.fromhex(came))
 
@@ -312,5 +312,5 @@ def test_a_command_takes_17_7_ms_of_the_line_and_a_dump_246_9() -> None:
     assert FAMILY.air_time(dump, 9600) * 1000 == pytest.approx(246.875, abs=0.001)
     assert FAMILY.turnaround(command) == 0.2
     assert FAMILY.turnaround(dump) + 0.2354167 == pytest.approx(0.6)
-    assert FAMILY.turnaround(Exchange(b"", timeout=Timeout.STORE)) == 1.0
+    assert FAMILY.turnaround(Exchange(b"", timeout=TimeoutClass.STORE)) == 1.0
     assert FAMILY.quiet_time(9600) == pytest.approx(0.2354167 + 0.05)

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import INTENT, OUTCOME, Journal, Pause, Progress, Together
+from motorbus.core.operation import INTENT, OUTCOME, Gather, JournalEntry, Progress, Sleep
 from motorbus.errors import Interrupted, MotorbusError, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.stepper import Controller
 from motorbus.families.stepper.driver import jog, stop
@@ -40,7 +40,7 @@ def starts(frames: list[str]) -> list[str]:
 
 
 def states(line: Line1) -> list[str]:
-    return [one.state for one in line.events if isinstance(one, Journal) and one.state != "asked"]
+    return [one.state for one in line.events if isinstance(one, JournalEntry) and one.state != "asked"]
 
 
 def failed(told: object, error: type[MotorbusError], text: str = "") -> list[str]:
@@ -135,7 +135,7 @@ def test_what_slows_down_has_its_time_before_anything_is_edited() -> None:
             phases.append(line.simulated.state.phase)
 
     def both(device: Controller) -> object:
-        return device.bus.run(Together([jog(device, 3 * tau, 50.0), _stopped(device, 15.0)]))
+        return device.bus.run(Gather([jog(device, 3 * tau, 50.0), _stopped(device, 15.0)]))
 
     line.react = look
     failed(line.run(both), Interrupted)
@@ -279,7 +279,7 @@ def test_two_borrows_come_one_after_the_other() -> None:
 
     def both(device: Controller) -> object:
         other = Controller(device.bus)
-        return device.bus.run(Together([jog(device, tau, 0.5), jog(other, -tau, 0.25)]))
+        return device.bus.run(Gather([jog(device, tau, 0.5), jog(other, -tau, 0.25)]))
 
     line.run(both)
     assert line.simulated.position == 400
@@ -290,7 +290,7 @@ def test_two_borrows_come_one_after_the_other() -> None:
 
 
 async def _stopped(device: Controller, moment: float) -> object:
-    await Pause(moment)
+    await Sleep(moment)
     return await stop(device)
 
 
@@ -301,7 +301,7 @@ def test_a_stop_of_somebody_else_ends_it(moment: float) -> None:
 
     def both(device: Controller) -> object:
         other = Controller(device.bus)
-        return device.bus.run(Together([jog(device, tau, 50.0), _stopped(other, moment)]))
+        return device.bus.run(Gather([jog(device, tau, 50.0), _stopped(other, moment)]))
 
     failed(line.run(both), Interrupted, "the motion was stopped")
     assert (MOVE in starts(line.sent)) == (moment == 0.4)
@@ -334,7 +334,7 @@ def test_a_full_disk_lets_nothing_begin() -> None:
     line = Line1()
 
     def full(event: object) -> None:
-        if isinstance(event, Journal) and event.state == INTENT:
+        if isinstance(event, JournalEntry) and event.state == INTENT:
             raise OSError("no space left on device")
 
     def refusing(device: Any) -> object:

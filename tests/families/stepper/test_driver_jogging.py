@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Pause
+from motorbus.core.operation import Sleep
 from motorbus.errors import Interrupted, OutcomeUnknown, RequestError
 from motorbus.families.stepper import Controller
 from motorbus.families.stepper.driver import Moved, Outcome, Ran
@@ -241,7 +241,7 @@ def test_what_was_left_is_over_with_its_time_or_with_a_stop() -> None:
 
     def waits(device: Controller) -> Moved:
         told = leave(device)
-        device.bus.run(Pause(told.seconds))
+        device.bus.run(Sleep(told.seconds))
         return device.jog(-tau, 1.0)
 
     assert isinstance(line.run(waits), Moved)

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import INTENT, OUTCOME, Operation, Pause, Together, outcome
+from motorbus.core.operation import INTENT, OUTCOME, Gather, Procedure, Sleep, catch
 from motorbus.core.timing import Turned
 from motorbus.errors import Interrupted, LinkLost, MotorbusError, NotHomed, OutcomeUnknown, RequestError
 from motorbus.families.stepper import FAMILY, Controller, driver
@@ -134,7 +134,7 @@ def test_it_reads_agrees_edits_meets_moves_stops_and_gives_back() -> None:
     sent: dict[str, list[str]] = {}
 
     class Looking(Partner):
-        def _thought(self, where: str) -> Operation[None]:
+        def _thought(self, where: str) -> Procedure[None]:
             sent[where] = list(states(line))
             return super()._thought(where)
 
@@ -211,7 +211,7 @@ def beside(line: Line1, partner: Partner, other: Any, angle: float = 5 * tau) ->
 
     def together(device: Controller) -> list[Any]:
         mine = driver.keep_time(device, angle, partner, velocity=10.0)
-        found: list[Any] = device.bus.run(Together([outcome(mine), outcome(other(device))]))
+        found: list[Any] = device.bus.run(Gather([catch(mine), catch(other(device))]))
         return found
 
     told, too = line.run(together)  # type: ignore[misc]
@@ -220,7 +220,7 @@ def beside(line: Line1, partner: Partner, other: Any, angle: float = 5 * tau) ->
 
 def stopping(seconds: float) -> Any:
     async def work(device: Controller) -> object:
-        await Pause(seconds)
+        await Sleep(seconds)
         return await driver.stop(device)
 
     return work
@@ -228,7 +228,7 @@ def stopping(seconds: float) -> Any:
 
 def emergency(seconds: float) -> Any:
     async def work(device: Any) -> None:
-        await Pause(seconds)
+        await Sleep(seconds)
         device.bus.estop()
         device.bus.reset()
 
@@ -309,7 +309,7 @@ def test_a_supply_that_goes_while_it_waits_is_told(place: str) -> None:
     line = paced()
 
     class Cutting(Partner):
-        def _thought(self, where: str) -> Operation[None]:
+        def _thought(self, where: str) -> Procedure[None]:
             if where == place:
                 line.simulated.power_cycle()
             return super()._thought(where)

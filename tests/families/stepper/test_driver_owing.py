@@ -10,7 +10,7 @@ import pytest
 
 import motorbus
 from motorbus import session
-from motorbus.core.operation import INTENT, OUTCOME, Journal
+from motorbus.core.operation import INTENT, OUTCOME, JournalEntry
 from motorbus.errors import Interrupted, LinkError, OutcomeUnknown, RequestError
 from motorbus.families.stepper import Controller, driver
 from motorbus.families.stepper.driver import Outcome, Promise, Unrecorded
@@ -96,7 +96,7 @@ def test_a_stop_goes_through_whatever_else_is_unfinished() -> None:
     """The journal of a borrow is none of its business."""
     with motorbus.simulate("stepper") as simulation, opened(simulation) as controller:
         journal = controller.bus.journal  # type: ignore[attr-defined]
-        journal(Journal("jog", INTENT, {"node": 1, "image": "00"}))
+        journal(JournalEntry("jog", INTENT, {"node": 1, "image": "00"}))
         trace = controller.bus.trace.subscribe()  # type: ignore[attr-defined]
         controller.stop()
         sent = [r.data.hex(" ").upper() for r in trace if r.direction == "tx"]
@@ -132,7 +132,7 @@ def test_a_journal_that_cannot_be_written_is_told_and_stops_no_stop() -> None:
 
         def full(event: object) -> None:
             told.append(event)
-            if isinstance(event, Journal) and event.state == OUTCOME:
+            if isinstance(event, JournalEntry) and event.state == OUTCOME:
                 raise LinkError("no space left")
 
         assert controller.bus.run(driver.run(controller, 1), full).outcome is Outcome.COMPLETED  # type: ignore[call-arg]

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.core.operation import ASKED, INTENT, Journal, Together, outcome
+from motorbus.core.operation import ASKED, INTENT, Gather, JournalEntry, catch
 from motorbus.errors import LimitExceeded, OutcomeUnknown, RequestError
 from motorbus.families.stepper import AsyncController, Behaviour, Controller, driver
 from motorbus.families.stepper.driver import Estimated, InputChanged, Outcome, Ran
@@ -27,7 +27,7 @@ def test_a_project_is_read_twice_started_and_waited_for() -> None:
         assert ran.seconds == pytest.approx(ran.predicted.seconds, abs=0.003)
         assert ran.seconds == pytest.approx(1.685587, abs=0.003)
         assert ran.why == "its notice came 1.684 s after its acknowledgement"
-        assert there.events[0] == Journal("run", ASKED, {"node": 1})
+        assert there.events[0] == JournalEntry("run", ASKED, {"node": 1})
         assert len(there.told(Estimated)) == 7
         assert there.owed is False
 
@@ -208,8 +208,8 @@ def test_while_one_may_still_run_no_other_is_started() -> None:
 
 def test_of_two_that_are_asked_for_at_once_one_is_started() -> None:
     with Running() as there:
-        other = outcome(driver.run(there.device, 1))
-        both: Together[Any] = Together([driver.run(there.device, 1), other])
+        other = catch(driver.run(there.device, 1))
+        both: Gather[Any] = Gather([driver.run(there.device, 1), other])
         ran, refused = there.run(both)
         assert ran.outcome is Outcome.COMPLETED
         assert isinstance(refused, RequestError)
@@ -220,7 +220,7 @@ def test_of_two_that_are_asked_for_at_once_one_is_started() -> None:
 def test_an_unfinished_change_of_project_1_refuses_every_run() -> None:
     with motorbus.simulate("stepper") as simulation, motorbus.open(simulation.url) as bus:
         assert bus.journal is not None
-        bus.journal(Journal("jog", INTENT, {"node": 1, "image": "00"}))
+        bus.journal(JournalEntry("jog", INTENT, {"node": 1, "image": "00"}))
         sent = bus.statistics.nodes[1].sent
         for start in (Controller(bus).run, Controller(bus).start_project):
             with pytest.raises(RequestError, match="unfinished"):
@@ -245,7 +245,9 @@ def test_a_start_whose_acknowledgement_is_lost_is_owed_too() -> None:
     with Running() as there:
 
         def armed(event: object) -> None:
-            if isinstance(event, Journal) and event.state == INTENT:  # nothing but the start is left to say
+            if (
+                isinstance(event, JournalEntry) and event.state == INTENT
+            ):  # nothing but the start is left to say
                 there.simulated.switch(reply_fault="lost", fault_every=1)
 
         there.bus.report = armed

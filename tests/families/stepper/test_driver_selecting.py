@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import ASKED, Journal, outcome
+from motorbus.core.operation import ASKED, JournalEntry, catch
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.stepper import Backup, Controller, Program
 from motorbus.families.stepper.driver.selecting import EditsLost, clear, is_blank, select
@@ -153,7 +153,7 @@ def test_an_expert_saves_what_is_there() -> None:
 def test_an_expert_who_stores_another_project_is_told(reading: str) -> None:
     with bench(save_cross=reading) as there:
         there.simulated.put(2, PICK)
-        told = there.run(outcome(_saved(there.device, 2)))
+        told = there.run(catch(_saved(there.device, 2)))
         assert isinstance(told, OutcomeUnknown if reading == "refuse" else VerificationFailed)
         assert (stored(there.simulated, 2) == PICK) is (reading == "refuse")
 
@@ -252,7 +252,7 @@ def test_a_clear_among_faults_is_done_or_told(fault: str, every: int) -> None:
     with bench() as there:
         there.simulated.put(2, PICK)
         there.simulated.switch(reply_fault=fault, fault_every=every)
-        told = there.run(outcome(clear(there.device, 2)))
+        told = there.run(catch(clear(there.device, 2)))
         held = stored(there.simulated, 2)
         assert held == Project() or (isinstance(told, MotorbusError) and held == PICK)
 
@@ -281,7 +281,7 @@ def test_nothing_is_written_while_project_1_is_lent(write: Callable[[Controller]
         there.simulated.put(2, LONGER)
 
         def unfinished(event: object) -> None:
-            if isinstance(event, Journal) and event.state == ASKED:
+            if isinstance(event, JournalEntry) and event.state == ASKED:
                 raise RequestError("a change is unfinished on this bus")
 
         there.bus.report = unfinished

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from motorbus.core.operation import Journal, Progress, outcome
+from motorbus.core.operation import JournalEntry, Progress, catch
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.stepper import AsyncController, Controller, Program
 from motorbus.families.stepper.driver.writing import Planned, Proof, Written, write_project
@@ -137,7 +137,7 @@ def test_the_plan_comes_before_the_first_command() -> None:
     with bench() as there:
         there.simulated.put(2, PICK)
         there.device.write_project(program(PICK, delay=1000))
-        plan, *rest = [one for one in there.events if not isinstance(one, Journal)]
+        plan, *rest = [one for one in there.events if not isinstance(one, JournalEntry)]
         assert isinstance(plan, Planned)
         assert str(plan.difference).startswith("project 2: 3 commands and 4 dumps, about ")
         assert [edit.command for edit in plan.difference.edits] == ["select_project", "set_step_delay"]
@@ -341,7 +341,7 @@ def test_no_fault_makes_a_success_of_something_else(fault: str, dumps: str, ever
             there.simulated.put(2, LONGER)
             others = [there.simulated.store.stored[number] for number in (1, 3, 4)]
             there.simulated.switch(reply_fault=fault, dump_fault=dumps, fault_every=every)
-            told = there.run(outcome(write_project(there.device, program(PICK))))
+            told = there.run(catch(write_project(there.device, program(PICK))))
             there.simulated.switch(reply_fault="none", dump_fault="none")
             held = stored(there.simulated, 2)
             done = replace(PICK, steps=PICK.steps[:3] + LONGER.steps[3:])
@@ -364,7 +364,7 @@ def test_a_bad_line_never_makes_one_either(
     with bench(**kind) as there:
         there.simulated.put(2, LONGER)
         there.simulated.switch(request_errors=requests, byte_errors=replies, seed=seed)
-        told = there.run(outcome(write_project(there.device, program(PICK))))
+        told = there.run(catch(write_project(there.device, program(PICK))))
         if isinstance(told, Written):
             held = stored(there.simulated, 2)
             assert held == replace(PICK, steps=PICK.steps[:3] + LONGER.steps[3:])

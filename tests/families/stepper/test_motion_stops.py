@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Operation, Pause, Progress, Together, outcome
+from motorbus.core.operation import Gather, Procedure, Progress, Sleep, catch
 from motorbus.errors import Interrupted, MotorbusError, OutcomeUnknown, RequestError
 from motorbus.families.stepper import Controller, driver
 from motorbus.families.stepper.driver import Moved, Outcome, Ran
@@ -114,16 +114,16 @@ def test_an_echo_of_the_stop_is_no_stop(work: Work) -> None:
     assert not line.at_rest
 
 
-def beside(line: Line1, *works: Callable[[Controller], Operation[Any]]) -> list[Any]:
+def beside(line: Line1, *works: Callable[[Controller], Procedure[Any]]) -> list[Any]:
     """What came of these, begun a tenth of a second apart."""
 
-    async def after(seconds: float, device: Controller, work: Callable[[Controller], Operation[Any]]) -> Any:
-        await Pause(seconds)
-        return await outcome(work(device))
+    async def after(seconds: float, device: Controller, work: Callable[[Controller], Procedure[Any]]) -> Any:
+        await Sleep(seconds)
+        return await catch(work(device))
 
     def together(device: Controller) -> list[Any]:
         branches = [after(0.1 * number, Controller(device.bus), work) for number, work in enumerate(works)]
-        found: list[Any] = device.bus.run(Together(branches))
+        found: list[Any] = device.bus.run(Gather(branches))
         return found
 
     found = line.run(together)
@@ -131,19 +131,19 @@ def beside(line: Line1, *works: Callable[[Controller], Operation[Any]]) -> list[
     return found
 
 
-def turning(device: Controller) -> Operation[Any]:
+def turning(device: Controller) -> Procedure[Any]:
     return driver.jog(device, tau, 30.0)
 
 
-def stopped_at(moment: float) -> Callable[[Controller], Operation[Any]]:
+def stopped_at(moment: float) -> Callable[[Controller], Procedure[Any]]:
     async def stopping(device: Controller) -> Any:
-        await Pause(moment)
+        await Sleep(moment)
         return await driver.stop(device)
 
     return stopping
 
 
-SECONDS: dict[str, Callable[[Controller], Operation[Any]]] = {
+SECONDS: dict[str, Callable[[Controller], Procedure[Any]]] = {
     "jog": lambda device: driver.jog(device, -tau, 2.0),
     "run_once": lambda device: driver.run_once(device),
     "home": lambda device: driver.home(device, deadline=3.0),
@@ -207,7 +207,7 @@ def test_an_emergency_and_a_reset_call_off_what_waits(second: str) -> None:
     line = Line1(home_switch="never")
 
     async def strike(device: Any) -> Any:
-        await Pause(2.5)
+        await Sleep(2.5)
         device.bus.estop()
         device.bus.reset()
 
@@ -227,7 +227,7 @@ def test_an_emergency_and_a_reset_call_off_what_is_being_prepared(work: str, mom
     line.pace = True
 
     async def strike(device: Any) -> Any:
-        await Pause(moment - 0.1)
+        await Sleep(moment - 0.1)
         device.bus.estop()
         device.bus.reset()
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import outcome
+from motorbus.core.operation import catch
 from motorbus.errors import MotorbusError, OutcomeUnknown, VerificationFailed
 from motorbus.families.stepper.driver.selecting import clear, save
 from motorbus.families.stepper.driver.writing import Proof, Written, write_project
@@ -71,7 +71,7 @@ def test_at_every_exchange_of_a_write(kind: dict[str, Any]) -> None:
     for moment in moments(length_of(kind), 9, KINDS.index(kind) / len(KINDS)):
         there = lived(kind)
         cut_at(there, moment)
-        told = there.run(outcome(write_project(there.device, program(PICK))))
+        told = there.run(catch(write_project(there.device, program(PICK))))
         seen.add(judged(there, told))
         again = there.device.write_project(program(PICK))
         assert again.saved or again.proof is Proof.UNCHANGED
@@ -88,7 +88,7 @@ def test_while_what_was_left_is_saved(view: str, boot: int) -> None:
         there = lived(kind)
         there.device.write_project(program(PICK), save=False)
         cut_at(there, moment)
-        judged(there, there.run(outcome(save(there.device, 2))))
+        judged(there, there.run(catch(save(there.device, 2))))
         there.bus.close()
 
 
@@ -97,7 +97,7 @@ def test_while_a_project_is_cleared(cut: str) -> None:
     for moment in moments(0.85, 16):
         there = lived({"save_cut": cut})
         cut_at(there, moment)
-        told = there.run(outcome(clear(there.device, 2)))
+        told = there.run(catch(clear(there.device, 2)))
         held = stored(there.simulated, 2)
         assert held == Project() or (isinstance(told, MotorbusError) and held == LONGER)
         there.device.clear(2)

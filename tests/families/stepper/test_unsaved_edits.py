@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.core.operation import INTENT, Journal
+from motorbus.core.operation import INTENT, JournalEntry
 from motorbus.errors import OutcomeUnknown, RequestError
 from motorbus.families.stepper.driver.writing import Proof
 from tests.families.stepper.bench import Tampering, bench
@@ -142,7 +142,7 @@ def test_a_flag_that_may_be_that_of_the_device_is_told_to_be_so() -> None:
 
 def test_what_is_lent_to_a_motion_that_was_cut_off_is_not_kept_as_a_backup() -> None:
     line = Line1()
-    line.journal(Journal("jog", INTENT, {"node": 1, "image": line.before.hex(), "order": "little"}))
+    line.journal(JournalEntry("jog", INTENT, {"node": 1, "image": line.before.hex(), "order": "little"}))
     told = line.run(lambda device: device.backup())
     assert isinstance(told, RequestError)
     assert line.sent == []

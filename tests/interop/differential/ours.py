@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from motorbus.core.operation import Alone, Answer, CanFrame, Due, Exchange, Step
+from motorbus.core.operation import CanFrame, Exchange, Exclusive, Expected, Response, Step
 from motorbus.errors import DeviceError, MotorbusError
 from motorbus.families.feetech import FAMILY as FEETECH
 from motorbus.families.feetech import wire
@@ -23,8 +23,8 @@ from tests.support.world import Tries
 def decoded(case: Case) -> Outcome:
     """A FEETECH stream. The value is shaped as the lines of `sdk_decoder.py` are."""
     request = case.request
-    exchange: Exchange[Answer] = Exchange(
-        request.packet(), tuple(Due(node, node, length) for node, length in request.due())
+    exchange: Exchange[Response] = Exchange(
+        request.packet(), tuple(Expected(node, node, length) for node, length in request.due())
     )
     answer, fault = Tries(FEETECH, 1_000_000, echo=False).answered(exchange, [case.stream])
     if answer is None:
@@ -70,7 +70,7 @@ def _run(steps: Any, tries: Tries, frames: Iterator[Sequence[tuple[int, bytes]]]
             step = operation.send(given)
         except StopIteration as end:
             return end.value
-        if isinstance(step, Alone):
+        if isinstance(step, Exclusive):
             given = _run(step.operation, tries, _again(come, frames))
             continue
         assert isinstance(step, Exchange)

@@ -11,7 +11,7 @@ from functools import cache
 from random import Random
 from typing import Final
 
-from motorbus.core.operation import CanFrame, Due, Exchange
+from motorbus.core.operation import CanFrame, Exchange, Expected
 from motorbus.families.kst import FAMILY, wire
 from motorbus.link.memory import MemoryLink
 from tests.interop.differential.cases import Frame, SdoCase, SdoRequest
@@ -49,7 +49,7 @@ def packet(request: SdoRequest) -> CanFrame:
     return wire.encode_download(request.node, request.index, request.subindex, request.data, sized=True)
 
 
-def _due(request: SdoRequest) -> Due:
+def _due(request: SdoRequest) -> Expected:
     made = wire.upload_due if request.kind == "upload" else wire.download_due
     return made(request.node, request.index, request.subindex)
 

@@ -11,7 +11,7 @@ from functools import cache
 from random import Random
 from typing import Final
 
-from motorbus.core.operation import Due, Exchange
+from motorbus.core.operation import Exchange, Expected
 from motorbus.families.feetech import FAMILY, wire
 from motorbus.families.feetech.simulator import MODELS
 from motorbus.families.feetech.table import CONTROL, TABLES
@@ -38,7 +38,7 @@ def _session(name: str) -> Iterator[Case]:
     trace = bus.trace.subscribe()
     for request in _requests(name):
         exchange: Exchange[object] = Exchange(
-            request.packet(), tuple(Due(node, node, length) for node, length in request.due())
+            request.packet(), tuple(Expected(node, node, length) for node, length in request.due())
         )
         bus.run(exchange)
         sent, *arrived = trace

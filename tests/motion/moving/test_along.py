@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motorbus.core.operation import Operation
+from motorbus.core.operation import Procedure
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.motion.machine import AxisSpec
 from motorbus.motion.moving.along import Led, Paced, judged
@@ -150,7 +150,7 @@ class Orders:
         self.goals: dict[float, float] = {}
         order = Stream._order
 
-        def noted(stream: Stream, at: float) -> Operation[None]:
+        def noted(stream: Stream, at: float) -> Procedure[None]:
             course = stream._course
             if isinstance(course, Led):
                 self.goals[at] = course.positions(at)["a1"]

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Notice
+from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Notification
 from motorbus.errors import RequestError
 from motorbus.families.kst import wire
 
@@ -19,13 +19,13 @@ NODES = st.sampled_from(wire.NODES)
 def test_a_report_comes_out_as_it_went_in(node: int, raw: int, form: str, extended: bool) -> None:
     frame = wire.encode_report(node, raw, form=form, extended=extended)
     assert frame.id == {"sdo": 0x580, "pdo": 0x180}[form] + node
-    assert wire.decode_notice(frame) == Notice(node, "report", frame.data)
+    assert wire.decode_notice(frame) == Notification(node, "report", frame.data)
     assert wire.decode_report(frame.data) == raw
 
 
 @given(NODES, st.binary(min_size=4, max_size=4))
 def test_an_alarm_comes_out_as_it_went_in(node: int, data: bytes) -> None:
-    assert wire.decode_notice(wire.encode_alarm(node, data)) == Notice(node, "alarm", data)
+    assert wire.decode_notice(wire.encode_alarm(node, data)) == Notification(node, "alarm", data)
 
 
 def test_the_usual_alarm_is_low_voltage() -> None:
@@ -67,7 +67,7 @@ def test_every_identifier_by_its_length() -> None:
         for length in range(9):
             node, data = identifier & 0x7F, bytes(length)
             kind = bases.get(identifier - node, "") if node else ""
-            expected = Notice(node, kind, data) if kind and lengths[kind] == length else None
+            expected = Notification(node, kind, data) if kind and lengths[kind] == length else None
             assert wire.decode_notice(CanFrame(identifier, data)) == expected
 
 
@@ -78,7 +78,7 @@ def test_a_report_ends_with_two_zeros(more: bytes) -> None:
 
 def test_what_the_adapter_reports_is_of_no_node() -> None:
     data = bytes(8)
-    assert wire.decode_notice(CanFrame(ERROR_FLAG | 0x88, data)) == Notice(0, "bus error", data)
+    assert wire.decode_notice(CanFrame(ERROR_FLAG | 0x88, data)) == Notification(0, "bus error", data)
     assert wire.decode_notice(CanFrame(REMOTE_FLAG | 0x701, b"\0")) is None
 
 

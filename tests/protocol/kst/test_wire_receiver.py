@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Event, Noise, Notice, Reply
+from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Event, Noise, Notification, Reply
 from motorbus.families.kst import wire
 from tests.protocol.kst.test_wire import FRAMES, NODES
 
@@ -80,13 +80,13 @@ def test_every_first_byte_of_four_bytes_from_a_node() -> None:
     for low in range(256):
         for high in (0, 3, 0xFC):
             data = bytes((low, high, 0, 0))
-            assert heard(CanFrame(0x585, data)) == Notice(5, "report", data)
+            assert heard(CanFrame(0x585, data)) == Notification(5, "report", data)
 
 
 @given(NODES, st.integers(-0x8000, 0x7FFF))
 def test_a_report_is_never_a_reply(node: int, raw: int) -> None:
     frame = wire.encode_report(node, raw)
-    assert isinstance(heard(frame), Notice)
+    assert isinstance(heard(frame), Notification)
     assert wire.decode_reply(frame.data) is None
 
 
@@ -103,7 +103,7 @@ def test_only_an_expected_id_format_is_heard(extended: bool, formats: frozenset[
     reply = wire.encode_upload_reply(5, 0x6002, 0, b"\0\0", extended=extended)
     report = wire.encode_report(5, 0, extended=extended)
     alarm = wire.encode_alarm(5, extended=extended)
-    for frame, kind in ((reply, Reply), (report, Notice), (alarm, Notice)):
+    for frame, kind in ((reply, Reply), (report, Notification), (alarm, Notification)):
         event = heard(frame, formats)
         assert isinstance(event, kind if extended in formats else Noise)
         assert not isinstance(event, Noise) or event.fault == "foreign"
@@ -124,7 +124,7 @@ def test_a_remote_frame_is_foreign() -> None:
 @pytest.mark.parametrize("extended", [False, True])
 def test_an_error_frame_is_a_notice_in_every_format(extended: bool) -> None:
     frame = CanFrame(ERROR_FLAG | 0x80, bytes(8), extended)
-    assert heard(frame) == Notice(0, "bus error", bytes(8))
+    assert heard(frame) == Notification(0, "bus error", bytes(8))
 
 
 def test_our_own_requests_are_foreign() -> None:

@@ -6,7 +6,7 @@ from collections import Counter
 
 import pytest
 
-from motorbus.core.operation import CanFrame, Noise, Notice, Reply
+from motorbus.core.operation import CanFrame, Noise, Notification, Reply
 from motorbus.families.kst import wire
 from tests.protocol.kst.vectors import (
     ALL,
@@ -147,7 +147,7 @@ def test_a_reply_is_received_on_the_lane_of_its_node(vector: Vector) -> None:
 
 @pytest.mark.parametrize("vector", NOTICES, ids=name_of)
 def test_what_comes_unasked_is_a_notice(vector: Vector) -> None:
-    expected = Notice(vector.expected["node"], vector.kind, vector.frame.data)
+    expected = Notification(vector.expected["node"], vector.kind, vector.frame.data)
     assert wire.FrameReceiver().feed(vector.frame) == [expected]
     if vector.kind == "report":
         assert wire.decode_report(vector.frame.data) == vector.expected["raw"]

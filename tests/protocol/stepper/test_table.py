@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motorbus.core.entry import Access, Storage
-from motorbus.core.operation import Effect, Timeout
+from motorbus.core.operation import Effect, TimeoutClass
 from motorbus.core.units import QUANTITIES
 from motorbus.errors import RequestError
 from motorbus.families.stepper import table, wire
@@ -297,7 +297,7 @@ def test_what_must_not_be_said_twice() -> None:
     assert once == {
         "start_project", "run_once", "home", "jog_forward", "jog_reverse", "save_project", "clear_project",
     }  # fmt: skip
-    slow = {name for name, order in table.ORDERS.items() if order.timeout is Timeout.STORE}
+    slow = {name for name, order in table.ORDERS.items() if order.timeout is TimeoutClass.STORE}
     assert slow == {"save_project", "clear_project"}
     assert table.REPLY < table.DUMP_BEGINS < table.DUMP_ENDS < table.STORE
 

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.operation import CanFrame, Event, Noise, Notice, Reply
+from motorbus.core.operation import CanFrame, Event, Noise, Notification, Reply
 from motorbus.families.stepper import wire
 from tests.protocol.stepper.vectors import DUMP_B, REPLIES, behaviour
 
 STREAMS = behaviour("streams")
-KINDS = {"reply": Reply, "notice": Notice, "noise": Noise}
+KINDS = {"reply": Reply, "notice": Notification, "noise": Noise}
 PIECES = st.sampled_from([vector.data for vector in REPLIES if len(vector.data) == 6] + [DUMP_B, wire.NOTICE])
 
 
@@ -66,8 +66,8 @@ def test_a_pause_ends_what_has_begun(pause: float, whole: bool) -> None:
 
 def test_a_pause_between_two_things_is_nothing() -> None:
     receiver = wire.Receiver()
-    assert receiver.feed(wire.NOTICE, 0.0) == [Notice(1, "completed", wire.NOTICE)]
-    assert receiver.feed(wire.NOTICE, 3600.0) == [Notice(1, "completed", wire.NOTICE)]
+    assert receiver.feed(wire.NOTICE, 0.0) == [Notification(1, "completed", wire.NOTICE)]
+    assert receiver.feed(wire.NOTICE, 3600.0) == [Notification(1, "completed", wire.NOTICE)]
 
 
 def test_no_bytes_are_no_sign_of_life() -> None:
@@ -82,9 +82,9 @@ def test_a_notice_in_the_payload_of_a_dump_is_none() -> None:
     assert wire.HEADER in DUMP_B[2:]
     receiver = wire.Receiver()
     assert [type(event) for event in receiver.feed(wire.NOTICE + DUMP_B + wire.NOTICE)] == [
-        Notice,
+        Notification,
         Reply,
-        Notice,
+        Notification,
     ]
 
 
@@ -99,7 +99,7 @@ def test_a_damaged_dump_is_never_searched() -> None:
 
 
 def test_the_node_is_told_in_a_notice() -> None:
-    assert wire.Receiver(7).feed(wire.NOTICE) == [Notice(7, "completed", wire.NOTICE)]
+    assert wire.Receiver(7).feed(wire.NOTICE) == [Notification(7, "completed", wire.NOTICE)]
 
 
 def test_a_can_frame_is_foreign() -> None:
@@ -127,4 +127,4 @@ def test_what_is_in_step_stays_in_step(pieces: list[bytes]) -> None:
     receiver = wire.Receiver()
     events = receiver.feed(b"".join(pieces))
     assert [event.data for event in events] == pieces
-    assert {type(event) for event in events} <= {Reply, Notice}
+    assert {type(event) for event in events} <= {Reply, Notification}

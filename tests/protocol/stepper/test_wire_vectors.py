@@ -7,7 +7,7 @@ from hashlib import sha256
 
 import pytest
 
-from motorbus.core.operation import Noise, Notice, Reply
+from motorbus.core.operation import Noise, Notification, Reply
 from motorbus.families.stepper import wire
 from tests.protocol.stepper.vectors import (
     ALL,
@@ -130,7 +130,7 @@ def test_what_a_device_says_is_received_whole_and_byte_by_byte(vector: Vector) -
             for event in receiver.feed(vector.data[at : at + size])
         ]
         if vector in NOTICES:
-            assert events == [Notice(1, "completed", vector.data)]
+            assert events == [Notification(1, "completed", vector.data)]
         else:
             assert events == [Reply(0, wire.key_of(vector.data), vector.data)]
         assert receiver.held == 0

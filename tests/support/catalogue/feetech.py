@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from typing import Any, NamedTuple
 
-from motorbus.core.operation import Answer, Due, Exchange, Reply, Timeout
+from motorbus.core.operation import Exchange, Expected, Reply, Response, TimeoutClass
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import Servo, wire
 from motorbus.families.feetech.driver.exchanges import (
@@ -48,7 +48,7 @@ def reading(count: int) -> Kind:
         raw = rig.stir()
         memory = rig.servos[1].memory
         block = read_block(Servo(rig.bus, 1), 56, count, bytes)
-        plain: Exchange[Answer] = Exchange(block.request, block.replies, repeatable=True)
+        plain: Exchange[Response] = Exchange(block.request, block.replies, repeatable=True)
         told = rig.bus.run(plain).replies[0].data
         assert told[4] == 0, "an alarm that nobody has"
         assert told[5:-1] == (rig.code(raw) + memory.read(58, FEEDBACK)[: max(0, count - 2)])[:count]
@@ -131,8 +131,8 @@ def sync_write(rig: Rig) -> None:
 def sync_read(rig: Rig) -> None:
     """A node may be missing; one that is there is right."""
     raw = rig.stir()
-    dues = tuple(Due(node, node, 8) for node in GROUP)
-    answer: Answer = rig.bus.run(Exchange[Answer](wire.sync_read(56, 2, GROUP), dues, repeatable=True))
+    dues = tuple(Expected(node, node, 8) for node in GROUP)
+    answer: Response = rig.bus.run(Exchange[Response](wire.sync_read(56, 2, GROUP), dues, repeatable=True))
     told = {reply.data[2]: reply.data[5:7] for reply in answer.replies}
     assert told == dict.fromkeys(set(GROUP) - set(answer.missing), rig.code(raw))
 
@@ -140,7 +140,7 @@ def sync_read(rig: Rig) -> None:
 def restore(rig: Rig) -> None:
     """RESET, known as factory restore: what was set is as shipped."""
     memory = rig.servos[1].memory
-    exchange = acknowledged(Servo(rig.bus, 1), wire.factory_restore(1), timeout=Timeout.STORE)
+    exchange = acknowledged(Servo(rig.bus, 1), wire.factory_restore(1), timeout=TimeoutClass.STORE)
     shipped = memory.layout.factory[13]
     _written(rig, exchange, lambda: memory.live[13], shipped)
 
@@ -157,7 +157,7 @@ def calibration(position: int | None) -> Kind:
     def act(rig: Rig) -> None:
         servo = rig.servos[1]
         request = wire.calibrate(1, b"" if position is None else rig.code(position))
-        exchange = acknowledged(Servo(rig.bus, 1), request, timeout=Timeout.STORE)
+        exchange = acknowledged(Servo(rig.bus, 1), request, timeout=TimeoutClass.STORE)
         _written(rig, exchange, lambda: servo.raw_position, 2048 if position is None else position)
 
     return Kind(act, 6 if position is None else 8, 6, lambda rig: _stand(rig, 1000), sure=False)
@@ -174,7 +174,7 @@ def _stand(rig: Rig, raw: int) -> None:
 def clear_turns(rig: Rig) -> None:
     """CLEAR TURNS 0x0A: it tells a position within one turn."""
     servo = rig.servos[1]
-    exchange = acknowledged(Servo(rig.bus, 1), wire.clear_turns(1), timeout=Timeout.STORE)
+    exchange = acknowledged(Servo(rig.bus, 1), wire.clear_turns(1), timeout=TimeoutClass.STORE)
     _written(rig, exchange, lambda: servo.raw_position, servo.raw_position % 4096)
 
 
@@ -222,7 +222,7 @@ def limp_unanswered(number: int, whom: Collection[int]) -> Kind:
 def ask_to_hold(rig: Rig) -> None:
     """READ of all that decides what holds a servo."""
     raw = rig.stir()
-    answer: Answer = rig.bus.run(ask(1))
+    answer: Response = rig.bus.run(ask(1))
     assert [reply.data[5:-1] for reply in answer.replies] == [_image(rig, raw)]
 
 
@@ -234,7 +234,7 @@ def hold(rig: Rig) -> None:
     """What it is told then: to be where it is. Success means that this is its goal."""
     raw, memory = rig.stir(), rig.servos[1].memory
     told = Reply(1, 1, wire.encode_status(1, 0, _image(rig, raw)))
-    (exchange,) = holds({1: Answer((told,), (), rig.link.now())}, (1,))
+    (exchange,) = holds({1: Response((told,), (), rig.link.now())}, (1,))
     assert exchange.request == wire.write(1, GOAL, rig.code(raw))
     _written(rig, exchange, lambda: memory.read(GOAL, 2), rig.code(raw))
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from motorbus.core.entry import changed
-from motorbus.core.operation import Answer, Runnable
+from motorbus.core.operation import Response, Runnable
 from motorbus.errors import DeviceError, MotorbusError, NoReply
 from motorbus.families.kst import (
     FAMILY,
@@ -226,7 +226,7 @@ def stopping(rig: KstRig) -> None:
     """What an emergency stop says to a servo: where are you, and stay there. Success means that this is its target."""
     raw = rig.stir()
     (ask,) = stop({NODE: None}, rig.dialect).exchanges
-    answer: Answer = rig.run(ask)
+    answer: Response = rig.run(ask)
     (hold,) = stop({NODE: answer}, rig.dialect).exchanges
     _written(rig, lambda: rig.run(hold), "goal_position", raw)
 

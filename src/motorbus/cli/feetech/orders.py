@@ -16,7 +16,7 @@ from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.output import Output
 from motorbus.cli.parameters import DryRun, Flag
 from motorbus.cli.target import Target, check_names, device, face, opened, table_of, target
-from motorbus.core.operation import Pause
+from motorbus.core.operation import Sleep
 from motorbus.errors import RequestError
 from motorbus.families.feetech import driver
 
@@ -145,7 +145,7 @@ def action(
 async def _action_all(bus: Bus) -> None:
     everyone = driver.action_all()
     await everyone
-    await Pause(
+    await Sleep(
         bus.family.air_time(everyone, bus.rate)
     )  # nobody answers: let it leave before the port is closed
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from motorbus.cli.several import carried_out, or_all_stop
-from motorbus.core.operation import ANY, Answer, Exchange, Rank, Together
+from motorbus.core.operation import ANY, Exchange, Gather, Priority, Response
 from motorbus.families.feetech import driver, wire
 from motorbus.families.feetech.driver.arrival import arrive
 from motorbus.families.feetech.driver.bound import ask_bound
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
     from motorbus.bus.blocking import Bus
     from motorbus.cli.dry import DryBus
-    from motorbus.core.operation import Operation
 
 
 def move_together(
@@ -53,21 +52,23 @@ async def _move_together(
         await ask_bound(servo, servo.table)
         block = move_block(servo, servo.table, goal, velocity, acceleration)
         blocks.append(block._replace(under=servo.settings))
-    written = written_all(list(sync_writes(servos, blocks)))
     if not wait:
-        await written
+        await written_all(list(sync_writes(servos, blocks)))
         return
-    arrivals = []
+    orders = []
     for servo, goal in zip(servos, goals, strict=True):
         assert servo.table is not None
-        order = way(servo, servo.table, goal, velocity, acceleration)
+        orders.append(way(servo, servo.table, goal, velocity, acceleration))
+    await stops(_gone(servos, blocks, orders), *servos)
+
+
+async def _gone(servos: Sequence[driver.Servo], blocks: Sequence[Any], orders: Sequence[Any]) -> None:
+    await written_all(list(sync_writes(servos, blocks)))
+    arrivals = []
+    for servo, order in zip(servos, orders, strict=True):
+        assert servo.table is not None
         arrivals.append(or_all_stop(arrive(servo, servo.table, order)))
-    await stops(_gone(written, arrivals), *servos)
-
-
-async def _gone(written: Operation[None], arrivals: Sequence[Operation[None]]) -> None:
-    await written
-    await Together(arrivals)
+    await Gather(arrivals)
 
 
 def ping_everyone(bus: Bus) -> list[int]:
@@ -75,7 +76,7 @@ def ping_everyone(bus: Bus) -> list[int]:
 
     request = wire.encode_instruction(wire.BROADCAST, wire.Instruction.PING, broadcast=True)
 
-    def read(answer: Answer) -> list[int]:
+    def read(answer: Response) -> list[int]:
         return sorted({reply.data[2] for reply in answer.replies})
 
-    return bus.run(Exchange(request, ANY, read, rank=Rank.POLL))
+    return bus.run(Exchange(request, ANY, read, rank=Priority.POLL))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from motorbus.cli.several import carried_out, or_all_stop
 from motorbus.core.interrupted import Moving, stopped_if_interrupted
-from motorbus.core.operation import Together
+from motorbus.core.operation import Gather
 from motorbus.families.kst import driver
 from motorbus.families.kst.driver.arrival import Move, arrive
 from motorbus.families.kst.driver.motion import TOLERANCE, counts, goal_of, send_goal
@@ -45,7 +45,7 @@ async def _gone(servos: Sequence[driver.Servo], goals: Sequence[Goal]) -> None:
     await or_all_stop(_sent(servos[1:], goals[1:]))
     moves = [Move(goal.value, TOLERANCE, None) for goal in goals]
     pairs = zip(servos, moves, strict=True)
-    await Together([or_all_stop(arrive(servo, move)) for servo, move in pairs])
+    await Gather([or_all_stop(arrive(servo, move)) for servo, move in pairs])
 
 
 async def _sent(servos: Sequence[driver.Servo], goals: Sequence[Goal]) -> None:

@@ -16,7 +16,7 @@ from motorbus.cli.stepper.events import say
 from motorbus.cli.stepper.files import NAME
 from motorbus.cli.target import face, opened, target
 from motorbus.cli.wording import in_words_of_the_shell
-from motorbus.core.operation import Alone, Progress, discard
+from motorbus.core.operation import Exclusive, Progress, discard
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.stepper import FAMILY, Controller
 from motorbus.families.stepper.driver import Node
@@ -70,7 +70,7 @@ async def unless_lent(one: Node, name: str, orders: Runnable[None]) -> None:
         finally:
             discard(orders)
 
-    return await Alone(both())
+    return await Exclusive(both())
 
 
 def carried_out(

@@ -25,7 +25,7 @@ from motorbus.families.stepper.driver import Node, commands, reading
 from motorbus.families.stepper.table import check
 
 if TYPE_CHECKING:
-    from motorbus.core.operation import Operation
+    from motorbus.core.operation import Procedure
 
 
 @app.command(
@@ -68,7 +68,7 @@ def select_project(
     return Exit.OK
 
 
-def _selected(project: int, steps: int, one: Node) -> Operation[None]:
+def _selected(project: int, steps: int, one: Node) -> Procedure[None]:
     return unless_lent(one, "select_project", commands.select_project(one, project, steps))
 
 

@@ -22,7 +22,7 @@ from motorbus.core.family import (
     Simulator,
     Stop,
 )
-from motorbus.core.operation import Answer, Exchange, Operation, Runnable
+from motorbus.core.operation import Exchange, Procedure, Response, Runnable
 from motorbus.errors import RequestError
 from motorbus.families.feetech import driver, wire
 from motorbus.families.feetech.driver import (
@@ -198,13 +198,13 @@ class Feetech:
     def probe(self, node: int, attempt: int) -> Exchange[bool]:
         return line.probe(node, attempt)
 
-    def stop(self, nodes: Mapping[int, Answer | None]) -> Stop:
+    def stop(self, nodes: Mapping[int, Response | None]) -> Stop:
         return line.stop(nodes, self._hold)
 
     def identify(self, node: int) -> Runnable[Identity]:
         return driver.identify(Node(node))
 
-    def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Operation[list[Found]]:
+    def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Procedure[list[Found]]:
         return scan(ids, rates, polls=driver.GLANCE)
 
     def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:

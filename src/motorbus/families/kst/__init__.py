@@ -22,7 +22,7 @@ from motorbus.core.family import (
     Simulator,
     Stop,
 )
-from motorbus.core.operation import Answer, Exchange, Operation, Runnable
+from motorbus.core.operation import Exchange, Procedure, Response, Runnable
 from motorbus.errors import RequestError
 from motorbus.families.kst import driver, wire
 from motorbus.families.kst.driver import (
@@ -187,13 +187,13 @@ class Kst:
     def probe(self, node: int, attempt: int) -> Exchange[bool]:
         return line.probe(Node(node, self._dialect), attempt)
 
-    def stop(self, nodes: Mapping[int, Answer | None]) -> Stop:
+    def stop(self, nodes: Mapping[int, Response | None]) -> Stop:
         return line.stop(nodes, self._dialect)
 
     def identify(self, node: int) -> Runnable[Identity]:
         return driver.identify(Node(node, self._dialect))
 
-    def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Operation[list[Found]]:
+    def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Procedure[list[Found]]:
         return scan(ids, rates, self._dialect)
 
     def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:

@@ -38,7 +38,7 @@ from motorbus.core.family import (
     Simulator,
     Stop,
 )
-from motorbus.core.operation import Answer, Exchange, Operation, Runnable
+from motorbus.core.operation import Exchange, Procedure, Response, Runnable
 from motorbus.errors import RequestError
 from motorbus.families.stepper import driver, wire
 from motorbus.families.stepper.driver import (
@@ -194,13 +194,13 @@ class Stepper:
     def probe(self, node: int, attempt: int) -> Exchange[bool]:
         return presence.probe(self._node(node), attempt)
 
-    def stop(self, nodes: Mapping[int, Answer | None]) -> Stop:
+    def stop(self, nodes: Mapping[int, Response | None]) -> Stop:
         return stopping.stop_all(nodes, self._motor)
 
     def identify(self, node: int) -> Runnable[Identity]:
         return driver.identify(self._node(node))
 
-    def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Operation[list[Found]]:
+    def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Procedure[list[Found]]:
         return driver.scan(ids, rates, self._motor)
 
     def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from motorbus.bus.base import BaseBus
 from motorbus.bus.blocking import Bus
 from motorbus.core.family import Positions, Quality, Train
-from motorbus.core.operation import Exchange, Pause, Together, outcome
+from motorbus.core.operation import Exchange, Gather, Sleep, catch
 from motorbus.errors import (
     Faulted,
     LimitExceeded,
@@ -154,7 +154,7 @@ class Part:
         told: list[Any] = []
         wanted = (*orders, *self.reads)
         if self.abreast:
-            told = await Together([_kept(exchange) for exchange in wanted])
+            told = await Gather([_kept(exchange) for exchange in wanted])
         else:
             for exchange in wanted:
                 try:
@@ -178,11 +178,11 @@ class Part:
             now = link.now()
         self.began = now - self.origin
 
-    def _wait(self, moment: float) -> Iterator[Pause]:
+    def _wait(self, moment: float) -> Iterator[Sleep]:
         link = self.link
         pause = moment - link.now() - (SPIN if self.exactly else 0.0)
         if pause > 0:
-            yield Pause(pause)
+            yield Sleep(pause)
         if self.exactly:
             while link.now() < moment:
                 pass
@@ -200,7 +200,7 @@ class Part:
         except Overloaded as error:
             for place in led:
                 if place.node == error.node:
-                    failure = await outcome(single.stop(place.axis))
+                    failure = await catch(single.stop(place.axis))
                     if isinstance(failure, MotorbusError):
                         error.add_note(f"and it did not accept the stop that followed: {failure}")
             raise
@@ -359,7 +359,7 @@ async def _begun(train: Train, command: Command, watch: Watch | None) -> list[fl
         await command.watched(ready())
         if watch is not None:
             await watch.begin(command.axes)
-        return await Together([axis.able["position"](axis.device) for axis in command.axes])
+        return await Gather([axis.able["position"](axis.device) for axis in command.axes])
     except BaseException:
         for axis in command.held():  # they may have torque, and go nowhere
             axis.arrives()
@@ -374,7 +374,7 @@ async def train_of(bus: BaseBus, axes: Sequence[AxisVerbs]) -> Train:
 
 async def _kept(exchange: Exchange[Any]) -> Any:
     """Its value, or the error by which it was lost; every other error is raised when all have ended."""
-    found = await outcome(exchange)
+    found = await catch(exchange)
     if isinstance(found, MotorbusError) and not isinstance(found, LOST):
         raise found
     return found

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 from motorbus.bus.blocking import Bus, exchange_on
-from motorbus.core.operation import Exchange, Report
+from motorbus.core.operation import Emit, Exchange
 from motorbus.errors import Faulted, Interrupted, LinkLost, MotorbusError, Overloaded, RequestError
 from motorbus.motion import limits
 from motorbus.motion.abreast import Abreast, settled
@@ -391,4 +391,4 @@ class Rounds:
 
 async def _reported(events: Iterable[Clamped]) -> None:
     for event in events:
-        await Report(event)
+        await Emit(event)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, Final
 
-from motorbus.core.operation import Exchange, Together, outcome
+from motorbus.core.operation import Exchange, Gather, catch
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown, WireError
 
 LOST: Final = (NoReply, WireError, OutcomeUnknown)
@@ -18,7 +18,7 @@ LOST: Final = (NoReply, WireError, OutcomeUnknown)
 
 async def forgiven(exchanges: Iterable[Exchange[Any]]) -> list[Any]:
     """What came of each; one that was lost is an error among the values, the first error of another kind is raised."""
-    told = await Together([outcome(one) for one in exchanges])
+    told = await Gather([catch(one) for one in exchanges])
     for one in told:
         if isinstance(one, MotorbusError) and not isinstance(one, LOST):
             raise one

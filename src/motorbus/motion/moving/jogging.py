@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import copysign, isfinite
 from typing import TYPE_CHECKING
 
-from motorbus.core.operation import Report
+from motorbus.core.operation import Emit
 from motorbus.errors import RequestError
 from motorbus.motion import limits, reckoning
 from motorbus.motion.clamping import Clamped, Policy, check_policy, kept
@@ -35,7 +35,7 @@ async def jog(axis: AxisVerbs, velocity: float, seconds: float, *, policy: Polic
     clamped = await _clamped(axis, way) if policy == "clamp" else None
     if clamped is None:
         return await move_by(axis, way, velocity=abs(velocity))
-    await Report(clamped)
+    await Emit(clamped)
     if clamped.given == clamped.asked - way:
         return 0.0
     moved = await move_axis(axis, clamped.given, velocity=abs(velocity))

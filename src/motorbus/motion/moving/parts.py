@@ -10,7 +10,7 @@ from inspect import CORO_CLOSED, getcoroutinestate
 from typing import TYPE_CHECKING, Any, Final
 
 from motorbus.core.family import Positions
-from motorbus.core.operation import Operation, Pause, Progress, Report, Together, afterwards, outcome
+from motorbus.core.operation import Emit, Gather, Procedure, Progress, Sleep, catch, with_cleanup
 from motorbus.core.timing import Turned
 from motorbus.errors import MotorbusError, NoReply, RequestError
 from motorbus.motion import capabilities as single
@@ -52,12 +52,12 @@ async def part(journey: Journey, party: str, axes: Sequence[AxisVerbs]) -> Gone:
     led = "train" in axes[0].able
     work: LedPart | OwnPart = LedPart(journey, party, axes) if led else OwnPart(journey, party, axes[0])
     journey.commands.append(work.command)
-    await afterwards(_failing(journey, axes, work.run()), lambda: _ended(journey, work))
+    await with_cleanup(_failing(journey, axes, work.run()), lambda: _ended(journey, work))
     assert work.gone is not None
     return work.gone
 
 
-async def _failing(journey: Journey, axes: Sequence[AxisVerbs], work: Operation[None]) -> None:
+async def _failing(journey: Journey, axes: Sequence[AxisVerbs], work: Procedure[None]) -> None:
     """Let the other parts know when this one fails; whose device it was is told by the name of the axis."""
     try:
         await work
@@ -141,7 +141,7 @@ class LedPart:
 
     async def _again(self, train: Any) -> None:
         """Ask where they are: others may have needed long, and no goal leaves by what was so a while ago."""
-        await Together([outcome(one) for one in train.positions])
+        await Gather([catch(one) for one in train.positions])
 
     async def _train(self) -> Any:
         """Those who are led, with all known of them that a cycle needs."""
@@ -157,7 +157,7 @@ class LedPart:
     async def _looked(self, train: Any) -> tuple[float, dict[str, Fact]]:
         """At which rate they can be led (Hz), where they stand, and how far and how finely their devices go."""
         angles = await self._angles(train)
-        found = await Together([limits.of_device(axis) for axis in self._axes])
+        found = await Gather([limits.of_device(axis) for axis in self._axes])
         devices = {axis.spec.node: device for axis, device in zip(self._axes, found, strict=True)}
         possible = {node: _inside(angles[node], device) for node, device in devices.items()}
         steps = grains(train, possible)
@@ -240,7 +240,7 @@ class OwnPart:
             self.gone = self._stayed(stood)
             return
         turned = self._turned(way)
-        told = await Together([turned, self._watched(turned)])
+        told = await Gather([turned, self._watched(turned)])
         assert told[0] is not None
         self.gone = self._arrived(stood, told[0])
 
@@ -264,12 +264,12 @@ class OwnPart:
             raise
         return turned
 
-    async def _watched(self, turned: Operation[Turned]) -> None:
+    async def _watched(self, turned: Procedure[Turned]) -> None:
         """While it is under way: stop it when another part fails, and tell how far all of it is."""
         journey, timing = self._journey, self._timing
         reported = -SHOWN
         while getcoroutinestate(turned) != CORO_CLOSED:  # however that came to its end
-            now = await Pause(LOOK)
+            now = await Sleep(LOOK)
             if timing.moment is None:
                 continue
             if (lost := self._overtaken()) is not None:
@@ -280,7 +280,7 @@ class OwnPart:
             since = now - timing.moment
             if journey.reports(timing.party) and reported + SHOWN <= since <= timing.duration:
                 reported = since
-                await Report(Progress(round(1000 * since), round(1000 * timing.duration), "moving"))
+                await Emit(Progress(round(1000 * since), round(1000 * timing.duration), "moving"))
 
     def _overtaken(self) -> MotorbusError | None:
         """The error when somebody else has stopped it. Its driver looks for that more seldom, and stops it itself."""

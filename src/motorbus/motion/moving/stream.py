@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from motorbus.bus.base import BaseBus
 from motorbus.core.family import Positions, Train
-from motorbus.core.operation import Operation, Pause, Progress, Report, Together
+from motorbus.core.operation import Emit, Gather, Procedure, Progress, Sleep
 from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, Refused, RequestError
 from motorbus.motion import limits
 from motorbus.motion.command import Command
@@ -198,13 +198,13 @@ class Stream:
         """
         self._start = start
         self._lead = lead
-        await Together([self._ending(self._tell()), self._ending(self._look())])
+        await Gather([self._ending(self._tell()), self._ending(self._look())])
         await self._settle()
         tracks = {name: _track(*rows) for name, rows in self._tracks.items()}
         cycles = Cycles(1 / self._grid.period, self._cycles, self._skipped, self._lost)
         return Streamed(tracks, cycles, self._first)
 
-    async def _ending(self, work: Operation[None]) -> None:
+    async def _ending(self, work: Procedure[None]) -> None:
         """When one of the two ends, however that comes, the other one ends too."""
         try:
             await work
@@ -223,7 +223,7 @@ class Stream:
             at = self._course.duration if last else (slot + 1) * self._grid.period
             await self._order(at)
             if slot == 0:
-                self._first = await Pause(0) - self._start
+                self._first = await Sleep(0) - self._start
             self._cycles += 1
             if last:
                 return
@@ -249,10 +249,10 @@ class Stream:
     async def _until(self, slot: int) -> None:
         """Wait for a slot. Nobody may wait between this and what is sent, or others go first."""
         due = self._start - self._lead + slot * self._grid.period
-        await Pause(max(0.0, due - await Pause(0)))
+        await Sleep(max(0.0, due - await Sleep(0)))
 
     async def _next(self, slot: int) -> int:
-        return self._grid.after(slot, await Pause(0) + self._lead - self._start)
+        return self._grid.after(slot, await Sleep(0) + self._lead - self._start)
 
     async def _order(self, at: float) -> None:
         try:
@@ -260,14 +260,14 @@ class Stream:
         except Refused as error:
             if error.reason in ("step", "velocity") and error.node in self._axes:
                 raise await self._stalled(self._axes[error.node]) from error
-            if error.reason == "stale" and (gap := self._gaps.lately(await Pause(0))):
+            if error.reason == "stale" and (gap := self._gaps.lately(await Sleep(0))):
                 raise held_up(gap) from error
             raise
         except Interrupted:
             if self._watch.fault is None:  # else who looks is about to raise that
                 raise
         else:
-            self._gaps.left(await Pause(0))
+            self._gaps.left(await Sleep(0))
 
     def _goals(self, at: float) -> dict[int, float]:
         """The goals (rad of the device) for a moment of the course, by id."""
@@ -278,14 +278,14 @@ class Stream:
         """Read the positions, and keep what was heard."""
         told = await forgiven(self._train.positions)
         heard = {node for one in told if isinstance(one, Positions) for node in self._keep(one)}
-        now = await Pause(0)
+        now = await Sleep(0)
         for node in self._axes.keys() - heard:
             self._lost += 1
             self._check_silent(node, now)
 
     async def _ask(self) -> None:
         """How one of them fares, when it is his turn and there is room before the next slot."""
-        now = await Pause(0)
+        now = await Sleep(0)
         since = now - self._start
         slack = self._grid.period - (since + self._lead) % self._grid.period
         goals = self._goals(min(since, self._course.duration))
@@ -310,7 +310,7 @@ class Stream:
         if self._reports and since >= self._reported:
             self._reported = since + SHOWN
             done, total = round(1000 * since), round(1000 * self._course.duration)
-            await Report(Progress(done, total, "moving"))
+            await Emit(Progress(done, total, "moving"))
 
     # -- the end of it -------------------------------------------------------------------------------------------------
 
@@ -318,11 +318,11 @@ class Stream:
         """Read positions until all are where they should be, and have come to rest."""
         period = max(self._grid.period, 0.005)
         end = self._start + self._course.duration
-        await Pause(max(0.0, end - await Pause(0)))
+        await Sleep(max(0.0, end - await Sleep(0)))
         exact = False
         while True:
             await self._read()
-            now = await Pause(0)
+            now = await Sleep(0)
             exact = exact or all(self._off(axis) <= STILL for axis in self._axes.values())
             if exact and all(self._arrived(axis, now - end) for axis in self._axes.values()):
                 break
@@ -334,10 +334,10 @@ class Stream:
             if not exact:
                 await self._order(self._course.duration)  # the last goal may have been lost on the wire
                 exact = True
-            await Pause(period)
+            await Sleep(period)
         if self._reports:
             total = round(1000 * self._course.duration)
-            await Report(Progress(total, total, "moving"))
+            await Emit(Progress(total, total, "moving"))
 
     def _arrived(self, axis: AxisVerbs, since: float) -> bool:
         """Whether it was seen in position after the end, twice at the same place; when time is up, once."""
@@ -363,7 +363,7 @@ class Stream:
 
     async def _stalled(self, axis: AxisVerbs) -> MotorbusError:
         """The error for one that does not follow; raises what is the matter with it, if it tells that."""
-        gap = self._gaps.lately(await Pause(0))
+        gap = self._gaps.lately(await Sleep(0))
         await self._watch.examine(axis)
         if gap:
             return held_up(gap)

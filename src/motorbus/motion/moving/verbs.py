@@ -11,7 +11,7 @@ from math import copysign, isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
 from motorbus.core.entry import shown
-from motorbus.core.operation import outcome
+from motorbus.core.operation import catch
 from motorbus.errors import RequestError
 from motorbus.motion import limits, reckoning
 from motorbus.motion.abreast import Abreast
@@ -292,7 +292,7 @@ async def _alone(
     axes = {axis.name: axis}
     plan = PointToPoint(axes, {axis.name: goal}, {axis.name: own}, "trapezoid", duration)
     journey = Journey(axes, plan, {axis.spec.bus: 0.0}, **end)
-    told = await outcome(journey.on(axis.spec.bus))
+    told = await catch(journey.on(axis.spec.bus))
     return journey.combine({axis.spec.bus: told})
 
 

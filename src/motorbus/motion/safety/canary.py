@@ -13,7 +13,7 @@ from math import inf
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from motorbus.core.family import Health
-from motorbus.core.operation import Report, outcome
+from motorbus.core.operation import Emit, catch
 from motorbus.errors import Faulted, Refused
 from motorbus.motion.safety.gate import Gate
 
@@ -106,9 +106,9 @@ async def looked_after(axis: AxisVerbs, now: float) -> None:
     """
     if not axis.engaged or "health" not in axis.able or now - axis.canary.at < HEALTH:
         return
-    found = await outcome(axis.able["health"](axis.device))
+    found = await catch(axis.able["health"](axis.device))
     if isinstance(found, Health) and looked_at(axis, found) is not None:
-        await Report(FaultNoted(axis.name, why(axis)))
+        await Emit(FaultNoted(axis.name, why(axis)))
 
 
 async def unbroken(axis: AxisVerbs) -> None:
@@ -129,9 +129,9 @@ async def kept(axis: AxisVerbs) -> None:
     """Of an axis that was told to hold: raise Faulted where its device has not kept its torque."""
     if "health" not in axis.able:
         return
-    found = await outcome(axis.able["health"](axis.device))
+    found = await catch(axis.able["health"](axis.device))
     if isinstance(found, Health) and (error := looked_at(axis, found)) is not None:
-        await Report(FaultNoted(axis.name, why(axis)))
+        await Emit(FaultNoted(axis.name, why(axis)))
         raise error
 
 

@@ -13,13 +13,13 @@ from typing import Any, Final, NamedTuple
 
 from motorbus.core.aimed import Aim
 from motorbus.core.family import Quality
-from motorbus.core.operation import Answer, Exchange, Goal
+from motorbus.core.operation import Exchange, Goal, Response
 from motorbus.motion.safety.guard import Guard, untold
 from motorbus.motion.safety.track import FRESH, TREMBLING, Sample, Track
 
-Heard = tuple[Exchange[Any], Answer]
+Heard = tuple[Exchange[Any], Response]
 """The last exchange that told where a node is, and its answer."""
-Where = Callable[[Exchange[Any], Answer], Mapping[int, float]]
+Where = Callable[[Exchange[Any], Response], Mapping[int, float]]
 """Where those are (rad) whom an answer tells of."""
 
 FLOCKS: Final = 8
@@ -61,7 +61,7 @@ class Flock:
         """
         if len(goals) != len(self._seats):
             return False
-        last: Answer | None = None
+        last: Response | None = None
         places: Mapping[int, float] = {}
         for (node, quantity, to, least, most, stays), (its, guard, track, low, high, near) in zip(
             goals, self._seats, strict=True

@@ -17,7 +17,7 @@ from math import inf, isfinite
 from typing import Any, Final
 
 from motorbus.core.goal import Later, Stays
-from motorbus.core.operation import EVERY_LANE, Answer, Effect, Exchange, Goal, Rank, Runnable, Stops
+from motorbus.core.operation import EVERY_LANE, Effect, Exchange, Goal, Priority, Response, Runnable, Stops
 from motorbus.errors import LimitExceeded, Refused
 from motorbus.motion.safety.flock import Flocks
 from motorbus.motion.safety.guard import ENDLESS, PLACES, Guard, untold
@@ -29,7 +29,7 @@ from motorbus.motion.safety.waiting import Handed, Waiting
 
 ROUNDING = 1e-9  # relative; a limit converted to its unit and back still admits itself
 
-Seen = Mapping[int, "tuple[Exchange[Any], Answer]"]
+Seen = Mapping[int, "tuple[Exchange[Any], Response]"]
 """By node, the last exchange that told where it is, and its answer."""
 
 
@@ -55,7 +55,7 @@ class Gate:
         self._stops: Stops = _none
         self._seen: Seen = {}
         self._now: Callable[[], float] = _never
-        self._answer: Answer | None = None
+        self._answer: Response | None = None
         self._places: Mapping[int, float] = {}
 
     def watch(
@@ -96,7 +96,7 @@ class Gate:
 
         Whoever carries out orders asks for it and carries it out; what came of it the gate sees by itself.
         """
-        if not self.guards or exchange.rank is Rank.STOP:
+        if not self.guards or exchange.rank is Priority.STOP:
             return []
         if exchange.later is not None and exchange.later.begins:
             goals = _goals(self._waiting.of(exchange.later))
@@ -155,7 +155,7 @@ class Gate:
 
     def __call__(self, exchange: Exchange[Any]) -> None:
         later = exchange.later
-        if exchange.rank is Rank.STOP or (later is None and exchange.effect < Effect.TORQUE):
+        if exchange.rank is Priority.STOP or (later is None and exchange.effect < Effect.TORQUE):
             return
         if later is None:
             self._judge(exchange, exchange.goals)
@@ -326,7 +326,7 @@ class Gate:
         # last, so that an interrupt between these lines leaves it to be taken in once more
         guard.answer = answer
 
-    def _told_by(self, exchange: Exchange[Any], answer: Answer) -> Mapping[int, float]:
+    def _told_by(self, exchange: Exchange[Any], answer: Response) -> Mapping[int, float]:
         """Where those are (rad) whom this answer tells of; that of the last one is kept."""
         if answer is not self._answer:
             where = exchange.tells_position

@@ -10,7 +10,7 @@ from math import inf
 from typing import Any, Final, NamedTuple
 
 from motorbus.core.goal import Stays
-from motorbus.core.operation import Answer, Goal, Runnable
+from motorbus.core.operation import Goal, Response, Runnable
 from motorbus.errors import LimitExceeded, Refused
 from motorbus.motion.safety.track import FRESH, Track
 
@@ -98,7 +98,7 @@ class Guard:
         self.show: Final = show
         self._reckons: Final = reckons
         self.track: Final = Track() if measures else None
-        self.answer: Answer | None = None
+        self.answer: Response | None = None
         self._due: float | None = None  # where the ways that it was told lead, while no stop has ended them
         self._low: Final = bounds.low - ROUNDED
         self._high: Final = bounds.high + ROUNDED

@@ -12,7 +12,7 @@ from enum import Enum
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from motorbus.core.family import Quality
-from motorbus.core.operation import Pause, Runnable, outcome
+from motorbus.core.operation import Runnable, Sleep, catch
 from motorbus.errors import MotorbusError
 from motorbus.motion.capabilities import stop
 from motorbus.motion.moving.forgiving import LOST
@@ -121,11 +121,11 @@ async def watched(
     It is asked three times at least, whatever the patience. Its silence is no error.
     """
     judge, track = Standstill(), Track()
-    begun = await Pause(0)
+    begun = await Sleep(0)
     asked = 0
     while True:
-        told = await outcome(ask())
-        now = await Pause(0)
+        told = await catch(ask())
+        now = await Sleep(0)
         asked += 1
         if isinstance(told, LOST):
             judge.lost()
@@ -135,6 +135,6 @@ async def watched(
             break
         if now - begun >= patience and asked >= READS:
             break
-        await Pause(PAUSE)
+        await Sleep(PAUSE)
     sample = track.sample
     return judge.rest, None if sample is None else sample.value

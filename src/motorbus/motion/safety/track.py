@@ -13,7 +13,7 @@ from math import isfinite
 from typing import Final, NamedTuple
 
 from motorbus.core.family import Quality
-from motorbus.core.operation import Pause, Runnable
+from motorbus.core.operation import Runnable, Sleep
 from motorbus.errors import WireError
 
 FASTEST: Final = 20.0
@@ -127,7 +127,7 @@ async def believed(track: Track, ask: Callable[[], Runnable[float]]) -> float:
     found: list[float] = []
     while len(found) < READINGS:
         found.append(await ask())
-        if track.take(found[-1], await Pause(0)).quality is not Quality.SUSPECT:
+        if track.take(found[-1], await Sleep(0)).quality is not Quality.SUSPECT:
             return found[-1]
     raise WireError(
         f"its readings do not agree: {', '.join(f'{one:.4g}' for one in found)} rad of its device",

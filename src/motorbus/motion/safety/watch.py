@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final
 
 from motorbus.bus.base import BaseBus
 from motorbus.core.family import Health
-from motorbus.core.operation import Exchange, Pause, Report, outcome
+from motorbus.core.operation import Emit, Exchange, Sleep, catch
 from motorbus.errors import Faulted, MotorbusError, NoReply, Overloaded, WireError
 from motorbus.motion.safety import canary
 from motorbus.motion.safety.canary import HEALTH
@@ -67,8 +67,8 @@ class Watch:
             self.dismiss(node)
             self._strains[node] = Strain() if axis.spec.guard else None
             self._turns.appendleft(node)
-            told = await outcome(axis.able["health"](axis.device))
-            await self._took(node, told, NOBODY, await Pause(0))
+            told = await catch(axis.able["health"](axis.device))
+            await self._took(node, told, NOBODY, await Sleep(0))
 
     def dismiss(self, node: int) -> None:
         """It is led no more, and asked no more."""
@@ -150,11 +150,11 @@ class Watch:
         places: Mapping[int, float] = NOBODY,
     ) -> None:
         """Ask who is due, if anybody is, and judge the answer; raises as `take`."""
-        wanted = self.due(await Pause(0), slack)
+        wanted = self.due(await Sleep(0), slack)
         if wanted is not None:
             node = self._turns[0]  # whose turn it is when the answer comes may be another's
-            told = await outcome(wanted)
-            await self._took(node, told, goals, await Pause(0), places)
+            told = await catch(wanted)
+            await self._took(node, told, goals, await Sleep(0), places)
 
     async def examine(self, axis: AxisVerbs) -> None:
         """Ask this one at once, for it does not do as it was told. Raises as `take` what is the matter with it."""
@@ -162,8 +162,8 @@ class Watch:
         if node in self._strains:
             self._turns.remove(node)
             self._turns.appendleft(node)
-            told = await outcome(axis.able["health"](axis.device))
-            await self._took(node, told, NOBODY, await Pause(0))
+            told = await catch(axis.able["health"](axis.device))
+            await self._took(node, told, NOBODY, await Sleep(0))
 
     async def _took(
         self,
@@ -177,7 +177,7 @@ class Watch:
             self.take(node, told, goals, now, places)
         except Faulted:
             axis = self._axes[node]
-            await Report(canary.FaultNoted(axis.name, canary.why(axis)))
+            await Emit(canary.FaultNoted(axis.name, canary.why(axis)))
             raise
 
     # -- turns -----------------------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 from motorbus.core.entry import Table
 from motorbus.core.family import State
-from motorbus.core.operation import Pause
+from motorbus.core.operation import Sleep
 from motorbus.errors import MotionError, Stalled
 from motorbus.families.feetech.driver.blocked import Blocked, blocked
 from motorbus.families.feetech.driver.feedback import state_exchange
@@ -67,7 +67,7 @@ async def arrive(node: Node, table: Table, move: Move) -> None:
     """Poll until the move is over. Raises Stalled, or MotionError when the time is up."""
     look = state_exchange(node, table)
     if move.turn is not None:
-        await Pause(POLL)  # a goal that is whole turns away looks like this place until it moves
+        await Sleep(POLL)  # a goal that is whole turns away looks like this place until it moves
     state = await look
     begun = progressed = state.at
     mark = place = _place(state, move, move.start)
@@ -80,7 +80,7 @@ async def arrive(node: Node, table: Table, move: Move) -> None:
             raise _stalled(node, place, move, why)
         if state.at - begun > allowance:
             raise _late(node, place, move, allowance)
-        await Pause(POLL)
+        await Sleep(POLL)
         state = await look
         place = _place(state, move, place if move.start is not None else None)
 

@@ -16,7 +16,7 @@ from typing import Final, NamedTuple, TypeVar
 
 from motorbus.core.entry import Table, Value
 from motorbus.core.goal import Later
-from motorbus.core.operation import Alone, afterwards, outcome
+from motorbus.core.operation import Exclusive, catch, with_cleanup
 from motorbus.errors import DeviceError, MotorbusError, RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import Block, acknowledged
@@ -61,7 +61,7 @@ async def reg_write_all(
     if errors:
         raise next(iter(errors.values()))
     shares = [_share(node, orders) for node, orders in zip(nodes, values.values(), strict=True)]
-    await Alone(_all_or_nothing(shares, despite_alarms=despite_alarms, replaces=replaces))
+    await Exclusive(_all_or_nothing(shares, despite_alarms=despite_alarms, replaces=replaces))
 
 
 def _share(node: Node, orders: Mapping[str, Value]) -> _Share:
@@ -77,7 +77,7 @@ async def _all_or_nothing(shares: Sequence[_Share], *, despite_alarms: bool, rep
     if not replaces:
         for node, table, _ in shares:
             await _nothing_waits(node, table)
-    await afterwards(
+    await with_cleanup(
         _released(shares, handed, trouble, despite_alarms), lambda: _taken_back(handed, trouble, replaces)
     )
 
@@ -124,7 +124,7 @@ async def _taken_back(handed: Sequence[_Share], trouble: list[BaseException], re
     left = []
     for share in handed:
         _withdraw(share.node)
-        failure = await outcome(_harmless(share)) if replaces else None
+        failure = await catch(_harmless(share)) if replaces else None
         if isinstance(failure, MotorbusError) or not replaces:
             left.append(str(share.node.node))
     if left:

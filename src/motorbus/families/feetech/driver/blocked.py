@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 from motorbus.core.entry import Table
 from motorbus.core.family import State
-from motorbus.core.operation import outcome
+from motorbus.core.operation import catch
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech.driver.alarm import bounds_of, in_words
 from motorbus.families.feetech.driver.identity import prepare, writable
@@ -58,10 +58,10 @@ async def blocked(node: Node, table: Table, state: State) -> Blocked:
 
     Never raises on account of the servo: what it does not answer is left out.
     """
-    settings = await outcome(blockers(node))
+    settings = await catch(blockers(node))
     told: tuple[str, ...] = state.alarm
     if told:
-        bounds = await outcome(bounds_of(node, table))
+        bounds = await catch(bounds_of(node, table))
         told = told if isinstance(bounds, MotorbusError) else in_words(state, bounds)
     return Blocked(told, () if isinstance(settings, MotorbusError) else settings)
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from motorbus.core.entry import Entry, Table
-from motorbus.core.operation import Report
+from motorbus.core.operation import Emit
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.exchanges import Block, read_block
 from motorbus.families.feetech.driver.node import Node
@@ -19,7 +19,7 @@ from motorbus.families.feetech.table import Mode
 
 
 class Powerless(NamedTuple):
-    """An event for `Report`: this servo had a bound of 0 A, so that it could not move; it gets `current` (A) now."""
+    """An event for `Emit`: this servo had a bound of 0 A, so that it could not move; it gets `current` (A) now."""
 
     node: int
     current: float
@@ -42,7 +42,7 @@ async def ask_bound(node: Node, table: Table, current: float | None = None) -> N
     node.bound = await read_block(node, row.address, row.size, row.decode)
     if not node.bound:
         raw = raw_bound(node, row, None)
-        await Report(Powerless(node.node, float(row.to_value(raw))))
+        await Emit(Powerless(node.node, float(row.to_value(raw))))
 
 
 def raw_bound(node: Node, row: Entry, current: float | None) -> int:

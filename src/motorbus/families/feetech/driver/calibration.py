@@ -18,7 +18,7 @@ import math
 from typing import Final, NamedTuple
 
 from motorbus.core.entry import Entry, Table, is_number, shown
-from motorbus.core.operation import Effect, Rank, Timeout
+from motorbus.core.operation import Effect, Priority, TimeoutClass
 from motorbus.errors import DeviceError, MotorbusError, RequestError, VerificationFailed
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver import eeprom
@@ -247,8 +247,10 @@ async def _pose(node: Node, position: Entry, offset: Entry) -> Pose:
     def told(data: bytes) -> int:
         return _offset_told(node, offset, data)
 
-    held = await read_block(node, offset.address, offset.size, told, timeout=Timeout.STORE)
-    here = await read_block(node, position.address, position.size, position.decode, timeout=Timeout.STORE)
+    held = await read_block(node, offset.address, offset.size, told, timeout=TimeoutClass.STORE)
+    here = await read_block(
+        node, position.address, position.size, position.decode, timeout=TimeoutClass.STORE
+    )
     return Pose(here, held)
 
 
@@ -313,7 +315,7 @@ async def _ordered(node: Node, job: _Job, plan: _Plan) -> MotorbusError | None:
         block = Block(0, b"", Effect.PERSISTENT)
     doubt = None
     try:
-        await acknowledged(node, request, block, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
+        await acknowledged(node, request, block, rank=Priority.CONFIGURATION, timeout=TimeoutClass.STORE)
     except DOUBTS as error:
         doubt = error
     if plan.way is Middle.SWITCH:

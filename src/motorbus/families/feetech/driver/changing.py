@@ -10,12 +10,12 @@ from __future__ import annotations
 from motorbus.core.operation import (
     ASKED,
     INTENT,
-    Alone,
-    Journal,
-    Report,
-    Tune,
-    afterwards,
-    outcome,
+    Emit,
+    Exclusive,
+    JournalEntry,
+    SetBitrate,
+    catch,
+    with_cleanup,
 )
 from motorbus.errors import MotorbusError, RequestError, VerificationFailed
 from motorbus.families.feetech.driver.identity import learn
@@ -41,7 +41,7 @@ async def guarded(job: Job, node: Node) -> None:
     """
     done: list[str] = []
     try:
-        await Alone(_once_more(job, node, done))
+        await Exclusive(_once_more(job, node, done))
     except BaseException as error:
         for end in done:  # an interruption that came when all was over
             error.add_note(_became(job, end))
@@ -51,8 +51,8 @@ async def guarded(job: Job, node: Node) -> None:
 
 
 async def _once_more(job: Job, node: Node, done: list[str]) -> None:
-    await Report(Journal(job.verb, ASKED, {}))
-    await afterwards(_unchanged(job), lambda: Tune(job.old.rate))
+    await Emit(JournalEntry(job.verb, ASKED, {}))
+    await with_cleanup(_unchanged(job), lambda: SetBitrate(job.old.rate))
     learn(node, job.image)
     await changed(job, node, Course(job))
     done.append("new")
@@ -71,7 +71,7 @@ async def _unchanged(job: Job) -> None:
     shipped = Place(SHIPPED_ID, job.old.rate)
     if job.verb == SET_ID and SHIPPED_ID not in (job.old.id, job.new.id, *job.others):
         refuse_taken(shipped, await whoever(shipped.id))
-    await Tune(job.new.rate)
+    await SetBitrate(job.new.rate)
     refuse_taken(job.new, await whoever(job.new.id))
 
 
@@ -83,7 +83,7 @@ async def changed(job: Job, node: Node, course: Course) -> None:
     """
     ends: list[str | MotorbusError] = []
     try:
-        await afterwards(_attempt(job, node, course, ends), lambda: _settled(job, course, ends))
+        await with_cleanup(_attempt(job, node, course, ends), lambda: _settled(job, course, ends))
     except BaseException as error:
         if isinstance(error, MotorbusError) and ends == ["new"]:
             return
@@ -106,7 +106,7 @@ async def _attempt(job: Job, node: Node, course: Course, ends: list[str | Motorb
     await followed(job, there, job.new, course)
     await locked(job, there)
     if job.old.rate != job.new.rate:
-        await Tune(job.old.rate)
+        await SetBitrate(job.old.rate)
     if await look(job.old.id) != b"":
         raise VerificationFailed(
             f"a servo answers as {job.old.id} after node {job.old.id} became {called(job, job.new)}",
@@ -124,7 +124,7 @@ async def _begun(course: Course) -> None:
     try:
         await course.reach(INTENT)
     except MotorbusError:
-        closed = await outcome(course.end("old"))  # the record may be on the disk all the same
+        closed = await catch(course.end("old"))  # the record may be on the disk all the same
         if closed is None or isinstance(closed, RequestError):  # that of another change says so
             course.reached.clear()
         raise
@@ -135,6 +135,6 @@ async def _settled(job: Job, course: Course, ends: list[str | MotorbusError]) ->
 
     async def recover() -> None:
         if course.reached and not ends:
-            ends.append(await outcome(recovered(job, course)))
+            ends.append(await catch(recovered(job, course)))
 
-    await afterwards(recover(), lambda: Tune(job.old.rate))
+    await with_cleanup(recover(), lambda: SetBitrate(job.old.rate))

@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from motorbus.core.entry import Table
-from motorbus.core.operation import Effect, Exchange, Rank, Timeout, afterwards, outcome
+from motorbus.core.operation import Effect, Exchange, Priority, TimeoutClass, catch, with_cleanup
 from motorbus.errors import RequestError, VerificationFailed
 from motorbus.families.feetech.driver import eeprom
 from motorbus.families.feetech.driver.exchanges import PRESENT, Block, confirmed, read_block
@@ -205,7 +205,7 @@ def _widest(node: Node, table: Table) -> str:
 async def _recounted(node: Node, table: Table, on: bool, limits: tuple[int, int], image: bytes) -> None:
     row, low, high = (table[name] for name in ("phase", "min_position_limit", "max_position_limit"))
     seen = image[low.address : row.address + row.size]
-    again = await read_block(node, low.address, len(seen), bytes, timeout=Timeout.STORE)
+    again = await read_block(node, low.address, len(seen), bytes, timeout=TimeoutClass.STORE)
     if again != seen:
         raise _unsteady(node, low.address, seen, again)
     phase = image[row.address]
@@ -219,7 +219,7 @@ async def _changed(node: Node, lock: int, changes: Sequence[_Change]) -> None:
     """All of these while the lock is open, each read back; or none of them."""
     begun: list[_Change] = []
     trouble: list[BaseException] = []
-    await afterwards(
+    await with_cleanup(
         _attempt(node, lock, changes, begun, trouble), lambda: _put_back(node, lock, begun, trouble)
     )
 
@@ -245,7 +245,7 @@ async def _put_back(node: Node, lock: int, begun: list[_Change], trouble: Sequen
         return
     restored = True
     for change in reversed(begun):
-        restored &= await outcome(_restored(node, lock, change)) is None
+        restored &= await catch(_restored(node, lock, change)) is None
     if restored:
         told = "its limits and its phase register are as they were"
     else:
@@ -259,7 +259,7 @@ async def _restored(node: Node, lock: int, change: _Change) -> None:
     """Open the lock again, for whoever has lost its supply has closed it, let it go limp once more, for it may have
     begun with torque on, and write what was there."""
     opened = Block(lock, b"\0", Effect.PERSISTENT)
-    await confirmed(node, opened, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
+    await confirmed(node, opened, rank=Priority.CONFIGURATION, timeout=TimeoutClass.STORE)
     await disable_torque(node)
     await eeprom.stored(node, Block(change.address, change.before, Effect.PERSISTENT))
 

@@ -28,15 +28,15 @@ from typing import Final, NamedTuple, TypeVar
 from motorbus.core.entry import Entry, Storage, Table
 from motorbus.core.goal import Later
 from motorbus.core.operation import (
-    Alone,
     Effect,
-    Operation,
-    Rank,
-    Report,
+    Emit,
+    Exclusive,
+    Priority,
+    Procedure,
     Stops,
-    Timeout,
-    afterwards,
-    outcome,
+    TimeoutClass,
+    catch,
+    with_cleanup,
 )
 from motorbus.errors import MotorbusError, OutcomeUnknown, RequestError
 from motorbus.families.feetech import wire
@@ -57,7 +57,7 @@ T = TypeVar("T")
 
 
 class TorqueAfterWrite(NamedTuple):
-    """An event for `Report`: a servo that had torque before a write to EEPROM has it again, or not, and why."""
+    """An event for `Emit`: a servo that had torque before a write to EEPROM has it again, or not, and why."""
 
     node: int
     on: bool
@@ -86,7 +86,7 @@ class Torque:
         """Torque off again, and remember how many stops have left for this servo. Refused when others left since."""
         self._node = node.node
         block = limp(node.node)._replace(refusal=self._count)
-        await confirmed(node, block, rank=Rank.CONFIGURATION)
+        await confirmed(node, block, rank=Priority.CONFIGURATION)
 
     def _count(self, stops: Stops) -> MotorbusError | None:
         if self._stops < 0:
@@ -132,7 +132,7 @@ async def store(
 
     With `torque` the servo gets back the torque that this takes from it, and `TorqueAfterWrite` is reported.
     """
-    return await Alone(_stored_unlike(node, table, blocks, always, torque))
+    return await Exclusive(_stored_unlike(node, table, blocks, always, torque))
 
 
 async def _stored_unlike(
@@ -143,7 +143,7 @@ async def _stored_unlike(
     for block in blocks:
         changes += await _unlike(node, table, block, always)
     if not changes:
-        if await read_block(node, lock, 1, bytes, timeout=Timeout.STORE) == _OPEN:
+        if await read_block(node, lock, 1, bytes, timeout=TimeoutClass.STORE) == _OPEN:
             await _locked(node, lock, (), (), Torque())
         return False
     begun: list[Change] = []
@@ -167,7 +167,7 @@ async def _unlike(node: Node, table: Table, block: Block, always: bool) -> list[
     rows = sorted(rows_in(table, block), key=lambda row: row.address)
     if not any(row.storage is Storage.EEPROM for row in rows):
         return [Change(block, b"")]
-    found = await read_block(node, block.address, len(block.data), bytes, timeout=Timeout.STORE)
+    found = await read_block(node, block.address, len(block.data), bytes, timeout=TimeoutClass.STORE)
     if always:
         return [Change(block, found)]
     runs: list[range] = []
@@ -189,22 +189,22 @@ async def _unlike(node: Node, table: Table, block: Block, always: bool) -> list[
     ]
 
 
-async def unlocked(node: Node, table: Table, work: Callable[[], Operation[T]]) -> T:
+async def unlocked(node: Node, table: Table, work: Callable[[], Procedure[T]]) -> T:
     """Carry out `work` on a limp servo whose lock is open, with nobody else on the bus; the lock is closed again.
 
     Its settings are forgotten before anybody else has the bus again, so what others made by them meanwhile is refused.
     """
-    return await Alone(_guarded(node, table, work, (), Torque()))
+    return await Exclusive(_guarded(node, table, work, (), Torque()))
 
 
 async def _guarded(
-    node: Node, table: Table, work: Callable[[], Operation[T]], begun: Sequence[Change], torque: Torque
+    node: Node, table: Table, work: Callable[[], Procedure[T]], begun: Sequence[Change], torque: Torque
 ) -> T:
     lock, pending = table["lock"].address, table["reg_write_pending"].address
     trouble: list[BaseException] = []
     doubted, node.unsure = node.unsure, set()
     try:
-        done = await afterwards(
+        done = await with_cleanup(
             _opened(node, lock, pending, work, trouble, torque),
             lambda: _locked(node, lock, trouble, begun, torque),
         )
@@ -230,7 +230,7 @@ async def _opened(
     node: Node,
     lock: int,
     pending: int,
-    work: Callable[[], Operation[T]],
+    work: Callable[[], Procedure[T]],
     trouble: list[BaseException],
     torque: Torque,
 ) -> T:
@@ -254,17 +254,17 @@ async def _opened(
 
 async def _harmless(node: Node, pending: int) -> None:
     """See that no REG WRITE waits that would do more than switch torque off."""
-    if await read_block(node, pending, 1, bytes, timeout=Timeout.STORE) != _IDLE:
+    if await read_block(node, pending, 1, bytes, timeout=TimeoutClass.STORE) != _IDLE:
         request = wire.reg_write(node.node, LIMP.address, LIMP.data)
         block = Block(LIMP.address, LIMP.data)
-        await acknowledged(node, request, block, rank=Rank.CONFIGURATION, later=Later(node.node))
+        await acknowledged(node, request, block, rank=Priority.CONFIGURATION, later=Later(node.node))
 
 
 async def still_open(node: Node, lock: int) -> None:
     """A servo that has lost its supply meanwhile comes back with its lock closed: it then takes every write, reads back
     right, and keeps none. Raises OutcomeUnknown, also when that cannot be found out."""
     try:
-        found = await read_block(node, lock, 1, bytes, timeout=Timeout.STORE)
+        found = await read_block(node, lock, 1, bytes, timeout=TimeoutClass.STORE)
     except DOUBTS as error:
         raise unread(node, error) from error
     if found != _OPEN:
@@ -286,11 +286,11 @@ async def stored(node: Node, block: Block) -> None:
     await _put(node, block)
     if block.address <= _STATUS_RETURN_LEVEL < block.address + len(block.data):
         node.forget_settings()  # from now on it may acknowledge differently
-    await verified(node, block, timeout=Timeout.STORE)
+    await verified(node, block, timeout=TimeoutClass.STORE)
 
 
 async def _put(node: Node, block: Block) -> None:
-    await confirmed(node, block, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
+    await confirmed(node, block, rank=Priority.CONFIGURATION, timeout=TimeoutClass.STORE)
 
 
 async def _locked(
@@ -303,10 +303,10 @@ async def _locked(
         if torque.was_on:
             await _still_ours(node, lock, torque)
         is_off = torque.was_on and not torque.stays_off  # `taken` has just been acknowledged
-        if (is_off or await outcome(disable_torque(node)) is None) and begun:
-            await outcome(_taken_back(node, lock, begun))
+        if (is_off or await catch(disable_torque(node)) is None) and begun:
+            await catch(_taken_back(node, lock, begun))
     for _ in range(_ATTEMPTS):
-        failure = await outcome(_closed(node, lock))
+        failure = await catch(_closed(node, lock))
         if failure is None:
             await _torque_restored(node, trouble, torque)
             return
@@ -323,12 +323,12 @@ async def _locked(
 
 async def _still_ours(node: Node, lock: int, torque: Torque) -> None:
     """After a failure: may the torque be given back? Not after a stop of another caller, nor after a restart."""
-    stopped = await outcome(torque.taken(node))
+    stopped = await catch(torque.taken(node))
     if stopped is not None:
         torque.stays_off = torque.stays_off or stopped.summary
     if torque.opened:
         torque.opened = False  # this may run again after an interrupt, when the lock is closed
-        found = await outcome(read_block(node, lock, 1, bytes, timeout=Timeout.STORE))
+        found = await catch(read_block(node, lock, 1, bytes, timeout=TimeoutClass.STORE))
         if found != _OPEN:
             torque.stays_off = torque.stays_off or "it has restarted, or does not answer"
 
@@ -339,19 +339,19 @@ async def _torque_restored(node: Node, trouble: Sequence[BaseException], torque:
         return
     why = torque.stays_off
     if not why:
-        failure = await outcome(torque_on_unless(node, torque.refusal))
+        failure = await catch(torque_on_unless(node, torque.refusal))
         why = "" if failure is None else failure.summary
     event = TorqueAfterWrite(node.node, not why, why)
     if trouble:
         trouble[0].add_note(str(event))
     else:
-        await Report(event)
+        await Emit(event)
 
 
 async def _taken_back(node: Node, lock: int, begun: Sequence[Change]) -> None:
     """Where the lock has closed by itself, registers that hold for now what they do not keep become what they were:
     or whoever applies the same again, another program as well, would find it there and write nothing."""
-    if await read_block(node, lock, 1, bytes, timeout=Timeout.STORE) == _OPEN:
+    if await read_block(node, lock, 1, bytes, timeout=TimeoutClass.STORE) == _OPEN:
         return
     for change in reversed([one for one in begun if one.before]):
         await _put(node, change.block._replace(data=change.before, effect=Effect.PERSISTENT))
@@ -359,7 +359,7 @@ async def _taken_back(node: Node, lock: int, begun: Sequence[Change]) -> None:
 
 async def _closed(node: Node, lock: int) -> None:
     await _put(node, _lock(lock, 1))
-    await verified(node, _lock(lock, 1), timeout=Timeout.STORE)
+    await verified(node, _lock(lock, 1), timeout=TimeoutClass.STORE)
 
 
 def _lock(address: int, value: int) -> Block:

@@ -15,15 +15,15 @@ from typing import Final, NamedTuple, TypeVar
 from motorbus import errors
 from motorbus.core.goal import Later
 from motorbus.core.operation import (
-    Answer,
-    Due,
     Effect,
     Exchange,
+    Expected,
     Goal,
-    Rank,
+    Priority,
     Refusal,
+    Response,
     Stops,
-    Timeout,
+    TimeoutClass,
     Whole,
 )
 from motorbus.errors import (
@@ -77,8 +77,8 @@ def read_block(
     count: int,
     take: Callable[[bytes], T],
     *,
-    rank: Rank = Rank.POLL,
-    timeout: Timeout = Timeout.REPLY,
+    rank: Priority = Priority.POLL,
+    timeout: TimeoutClass = TimeoutClass.REPLY,
     whole: Callable[[int], Whole[T] | None] = lambda _: None,
 ) -> Exchange[T]:
     """READ `count` bytes from `address` on; the value is what `take` makes of them.
@@ -87,7 +87,7 @@ def read_block(
     One that is kept says by `whole` what a packet with so many bytes of data comes to; see `Exchange`.
     """
 
-    def read(answer: Answer) -> T:
+    def read(answer: Response) -> T:
         frame = answer.replies[0].data
         node.heard(frame[4], answer.at)
         return take(frame[5 : 5 + count])
@@ -109,23 +109,23 @@ def read_block(
     return exchange(count, another(address, count))
 
 
-def _question(node: Node, address: int, count: int) -> tuple[bytes, tuple[Due, ...]]:
+def _question(node: Node, address: int, count: int) -> tuple[bytes, tuple[Expected, ...]]:
     """The packet that reads this, and the reply that is due; made once for each servo, for they never change."""
     made = node.questions.get((address, count))
     if made is None:
-        due = Due(node.node, node.node, wire.OVERHEAD + count)
+        due = Expected(node.node, node.node, wire.OVERHEAD + count)
         made = node.questions[address, count] = wire.read(node.node, address, count), (due,)
     return made
 
 
 def told_by(
     nodes: Mapping[int, Node], address: int, count: int
-) -> bool | Callable[[Answer], Mapping[int, float]]:
+) -> bool | Callable[[Response], Mapping[int, float]]:
     """What a read of these registers of these servos says of where they are; see `Exchange.tells_position`."""
     return address == PRESENT and count > 1 and partial(places, nodes)
 
 
-def places(nodes: Mapping[int, Node], answer: Answer) -> dict[int, float]:
+def places(nodes: Mapping[int, Node], answer: Response) -> dict[int, float]:
     """Where those are who are known well enough to tell (rad), by the settings that they have now."""
     found = {}
     for reply in answer.replies:
@@ -147,8 +147,8 @@ def acknowledged(
     request: bytes,
     block: Block | None = None,
     *,
-    rank: Rank = Rank.CONTROL,
-    timeout: Timeout = Timeout.REPLY,
+    rank: Priority = Priority.CONTROL,
+    timeout: TimeoutClass = TimeoutClass.REPLY,
     refusal: Refusal | None = None,
     after: Callable[[], None] = lambda: None,
     later: Later | None = None,
@@ -158,7 +158,7 @@ def acknowledged(
     It is not sent once the settings of the servo are others than when it was made, unless `refusal` judges that.
     """
 
-    def read(answer: Answer) -> None:
+    def read(answer: Response) -> None:
         for reply in answer.replies:
             node.heard(reply.data[4], answer.at)
         if later is not None:
@@ -168,7 +168,7 @@ def acknowledged(
     answers = node.settings is None or node.settings.answers_writes
     return Exchange(
         request,
-        (Due(node.node, node.node, ACKNOWLEDGED),) if answers else (),
+        (Expected(node.node, node.node, ACKNOWLEDGED),) if answers else (),
         read,
         rank=rank,
         effect=block.effect if block else Effect.NONE,
@@ -228,14 +228,14 @@ def unanswered(
     effect: Effect,
     goals: tuple[Goal, ...] = (),
     *,
-    rank: Rank = Rank.CONTROL,
+    rank: Priority = Priority.CONTROL,
     refusal: Refusal | None = None,
     after: Callable[[], None] = lambda: None,
     later: Later | None = None,
 ) -> Exchange[None]:
     """A request to several servos, which none of them answers."""
 
-    def read(_: Answer) -> None:
+    def read(_: Response) -> None:
         if later is not None:
             later.done = True
         after()
@@ -244,7 +244,7 @@ def unanswered(
 
 
 def write_block(
-    node: Node, block: Block, *, rank: Rank = Rank.CONTROL, timeout: Timeout = Timeout.REPLY
+    node: Node, block: Block, *, rank: Priority = Priority.CONTROL, timeout: TimeoutClass = TimeoutClass.REPLY
 ) -> Exchange[None]:
     """WRITE adjoining registers. The acknowledgement proves receipt, not more."""
     return acknowledged(
@@ -253,7 +253,7 @@ def write_block(
 
 
 async def confirmed(
-    node: Node, block: Block, *, rank: Rank = Rank.CONTROL, timeout: Timeout = Timeout.REPLY
+    node: Node, block: Block, *, rank: Priority = Priority.CONTROL, timeout: TimeoutClass = TimeoutClass.REPLY
 ) -> None:
     """WRITE; when no acknowledgement is due, or none came, find out by reading back.
 
@@ -273,7 +273,11 @@ async def confirmed(
 
 
 async def verified(
-    node: Node, block: Block, doubt: MotorbusError | None = None, *, timeout: Timeout = Timeout.REPLY
+    node: Node,
+    block: Block,
+    doubt: MotorbusError | None = None,
+    *,
+    timeout: TimeoutClass = TimeoutClass.REPLY,
 ) -> None:
     """Read back what was written. Raises VerificationFailed when it differs, OutcomeUnknown when nobody answers.
 

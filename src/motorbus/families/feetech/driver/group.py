@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple, TypeVar
 
 from motorbus.core.entry import Table, Value, shown
-from motorbus.core.operation import Answer, Due, Exchange, Goal, Whole, outcome
+from motorbus.core.operation import Exchange, Expected, Goal, Response, Whole, catch
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import (
@@ -111,7 +111,7 @@ def block_of_each(
 ) -> Exchange[dict[int, bytes]]:
     """SYNC READ one block of each; the value holds the bytes of those who answered. `kept`: it is run again."""
 
-    def read(answer: Answer) -> dict[int, bytes]:
+    def read(answer: Response) -> dict[int, bytes]:
         return {id: data[:count] for id, data in _heard(by_id, answer)}
 
     def whole(size: int) -> Whole[dict[int, bytes]] | None:
@@ -125,8 +125,8 @@ def sync_exchange(
     nodes: Sequence[Node],
     address: int,
     count: int,
-    read: Callable[[Answer], T],
-    places: Callable[[Answer], Mapping[int, float]] | None = None,
+    read: Callable[[Response], T],
+    places: Callable[[Response], Mapping[int, float]] | None = None,
     whole: Callable[[int], Whole[T] | None] = lambda _: None,
 ) -> Exchange[T]:
     """SYNC READ one block of each of these, in this order; its other form reads a byte more (see `read_block`), where
@@ -141,7 +141,7 @@ def sync_exchange(
     def exchange(count: int, other: int | None) -> Exchange[T]:
         return Exchange(
             wire.sync_read(address, count, ids),
-            tuple(Due(id, id, wire.OVERHEAD + count) for id in ids),
+            tuple(Expected(id, id, wire.OVERHEAD + count) for id in ids),
             read,
             repeatable=True,
             tells_position=places or told_by(by_id, address, count),
@@ -162,11 +162,11 @@ async def collected(
     predecessor in the list is silent is not documented.
     """
     able = [node for node in nodes if node.control.sync_read]
-    heard = await outcome(block_of_each(able, address, count)) if able else {}
+    heard = await catch(block_of_each(able, address, count)) if able else {}
     found = {} if isinstance(heard, MotorbusError) else heard
     for node in nodes:
         if node.node not in found:
-            data = await outcome(read_block(node, address, count, bytes))
+            data = await catch(read_block(node, address, count, bytes))
             if isinstance(data, MotorbusError):
                 errors[node.node] = data
             else:
@@ -203,7 +203,7 @@ def distinct(ids: Iterable[int | Node]) -> list[Node]:
     )
 
 
-def _heard(by_id: Mapping[int, Node], answer: Answer) -> Iterator[tuple[int, bytes]]:
+def _heard(by_id: Mapping[int, Node], answer: Response) -> Iterator[tuple[int, bytes]]:
     for reply in answer.replies:
         frame = reply.data
         by_id[frame[2]].heard(frame[4], answer.at)

@@ -13,7 +13,7 @@ from typing import Final
 
 from motorbus.core import units
 from motorbus.core.goal import Goal, Stays
-from motorbus.core.operation import Answer, Due, Exchange, Rank
+from motorbus.core.operation import Exchange, Expected, Priority, Response
 from motorbus.errors import RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import PRESENT, Block
@@ -50,7 +50,7 @@ def held_ids(said: str | Iterable[int]) -> frozenset[int]:
     return frozenset(found)
 
 
-def holds(nodes: Mapping[int, Answer | None], hold: Collection[int]) -> list[Exchange[Answer]]:
+def holds(nodes: Mapping[int, Response | None], hold: Collection[int]) -> list[Exchange[Response]]:
     """What holds these: who has just told all that matters is held, each other one is asked for it."""
     found = []
     for number in sorted(hold):
@@ -59,12 +59,12 @@ def holds(nodes: Mapping[int, Answer | None], hold: Collection[int]) -> list[Exc
     return found
 
 
-def ask(node: int) -> Exchange[Answer]:
+def ask(node: int) -> Exchange[Response]:
     """READ of all that decides what holds this servo."""
     return Exchange(
         wire.read(node, 0, COUNT),
-        (Due(node, node, wire.OVERHEAD + COUNT),),
-        rank=Rank.STOP,
+        (Expected(node, node, wire.OVERHEAD + COUNT),),
+        rank=Priority.STOP,
         repeatable=True,
         tells_position=True,
     )
@@ -96,7 +96,7 @@ def resting(number: int, image: bytes) -> Block:
     return Block(row.address, row.encode(raw), row.effect, (goal,))
 
 
-def _image(node: int, answer: Answer | None) -> bytes | None:
+def _image(node: int, answer: Response | None) -> bytes | None:
     """Registers 0 to 57 of this servo, where that is what it answered last."""
     for reply in answer.replies if answer is not None else ():
         if reply.data[2] == node and len(reply.data) == wire.OVERHEAD + COUNT:
@@ -104,11 +104,11 @@ def _image(node: int, answer: Answer | None) -> bytes | None:
     return None
 
 
-def _order(node: int, block: Block) -> Exchange[Answer]:
+def _order(node: int, block: Block) -> Exchange[Response]:
     return Exchange(
         wire.write(node, block.address, block.data),
-        (Due(node, node, wire.OVERHEAD),),
-        rank=Rank.STOP,
+        (Expected(node, node, wire.OVERHEAD),),
+        rank=Priority.STOP,
         effect=block.effect,
         goals=block.goals,
         repeatable=True,

@@ -13,7 +13,7 @@ from typing import Final
 
 from motorbus.core.entry import Access, Entry, Table, changed
 from motorbus.core.family import Identity
-from motorbus.core.operation import Due, Exchange, Rank, Timeout
+from motorbus.core.operation import Exchange, Expected, Priority, TimeoutClass
 from motorbus.errors import DeviceError, NoReply
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import ACKNOWLEDGED, acknowledged, read_block
@@ -55,10 +55,10 @@ def ping_exchange(node: Node, *, scanning: bool = False) -> Exchange[None]:
     exchange = acknowledged(node, wire.ping(node.node))
     return Exchange(
         exchange.request,
-        (Due(node.node, node.node, ACKNOWLEDGED),),  # PING is answered at every status return level
+        (Expected(node.node, node.node, ACKNOWLEDGED),),  # PING is answered at every status return level
         exchange.read,
-        rank=Rank.CONFIGURATION if scanning else Rank.POLL,
-        timeout=Timeout.SCAN if scanning else Timeout.REPLY,
+        rank=Priority.CONFIGURATION if scanning else Priority.POLL,
+        timeout=TimeoutClass.SCAN if scanning else TimeoutClass.REPLY,
         repeatable=True,
     )
 

@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 
 from motorbus.core.entry import Table
 from motorbus.core.family import Readdressed
-from motorbus.core.operation import OUTCOME, REACHED, Effect, Journal, Report
+from motorbus.core.operation import OUTCOME, REACHED, Effect, Emit, JournalEntry
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.exchanges import Block
 from motorbus.families.feetech.driver.identity import identity_of
@@ -169,23 +169,23 @@ class Course:
         if not self.reached:
             await self._readdressed()
         self.reached.append(word)
-        await Report(Journal(self.job.verb, word, facts))
+        await Emit(JournalEntry(self.job.verb, word, facts))
 
     async def resume(self, state: str) -> None:
         """The same for whoever takes it up again, maybe on a bus whose journal knows nothing of it: all is told."""
         facts = {**self.job.facts(), REACHED: list(self.reached)}
         await self._readdressed()
         self.reached.append(state)
-        await Report(Journal(self.job.verb, state, facts))
+        await Emit(JournalEntry(self.job.verb, state, facts))
 
     async def _readdressed(self) -> None:
         if self.job.new.id != self.job.old.id:
-            await Report(Readdressed(self.job.old.id, self.job.new.id))
+            await Emit(Readdressed(self.job.old.id, self.job.new.id))
 
     async def end(self, outcome: str) -> None:
         """Record how it ended: "new" or "old"."""
         self.reached.append(OUTCOME)
-        await Report(Journal(self.job.verb, OUTCOME, {"outcome": outcome, **self.job.name()}))
+        await Emit(JournalEntry(self.job.verb, OUTCOME, {"outcome": outcome, **self.job.name()}))
 
     @property
     def following(self) -> bool:

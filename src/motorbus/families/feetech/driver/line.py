@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from motorbus.core.family import Stop
 from motorbus.core.goal import torque_off
-from motorbus.core.operation import ANY, Answer, Due, Exchange, Rank, Timeout
+from motorbus.core.operation import ANY, Exchange, Expected, Priority, Response, TimeoutClass
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.holding import PROMISE, holds
 from motorbus.families.feetech.driver.motion import Promise
@@ -60,9 +60,9 @@ def turnaround(exchange: Exchange[Any]) -> float:
     """s that servos may think: once about the request, and a return delay before each reply."""
     if exchange.replies is ANY:
         return COLLISION
-    if exchange.timeout is Timeout.SCAN:
+    if exchange.timeout is TimeoutClass.SCAN:
         return SCAN
-    thinking = PROCESSING if exchange.timeout is Timeout.REPLY else STORE
+    thinking = PROCESSING if exchange.timeout is TimeoutClass.REPLY else STORE
     return thinking + RETURN_DELAY * len(exchange.replies)
 
 
@@ -77,7 +77,11 @@ def quiet_time(rate: int) -> float:
 def echo_test() -> Exchange[None]:
     """READ of one byte, the id of node 1: the echo has eight bytes and an answer seven."""
     return Exchange(
-        wire.read(1, ID, 1), (Due(1, 1, wire.OVERHEAD + 1),), _nothing, timeout=Timeout.SCAN, repeatable=True
+        wire.read(1, ID, 1),
+        (Expected(1, 1, wire.OVERHEAD + 1),),
+        _nothing,
+        timeout=TimeoutClass.SCAN,
+        repeatable=True,
     )
 
 
@@ -90,15 +94,15 @@ def probe(node: int, attempt: int) -> Exchange[bool]:
 def _probe(node: int, count: int) -> Exchange[bool]:
     """Kept, for there are few: of a servo that stays silent many are looked at each time."""
 
-    def read(answer: Answer) -> bool:
+    def read(answer: Response) -> bool:
         return bool(answer.replies) and answer.replies[0].data[5] == node
 
     return Exchange(
-        wire.read(node, ID, count), (Due(node, node, wire.OVERHEAD + count),), read, repeatable=True
+        wire.read(node, ID, count), (Expected(node, node, wire.OVERHEAD + count),), read, repeatable=True
     )
 
 
-def stop(nodes: Mapping[int, Answer | None], hold: Collection[int] = ()) -> Stop:
+def stop(nodes: Mapping[int, Response | None], hold: Collection[int] = ()) -> Stop:
     """Torque off for everyone at once, then for each node until it acknowledges: an arm goes limp.
 
     Those of `hold` keep their torque and are held where they are, known or not: see `holding`.
@@ -111,39 +115,39 @@ def stop(nodes: Mapping[int, Answer | None], hold: Collection[int] = ()) -> Stop
     return Stop(frames, f"{Promise.TORQUE_OFF_ACCEPTED.value}; {PROMISE}")
 
 
-def _everyone() -> Exchange[Answer]:
+def _everyone() -> Exchange[Response]:
     return Exchange(
         wire.write(wire.BROADCAST, LIMP.address, LIMP.data),
         (),
-        rank=Rank.STOP,
+        rank=Priority.STOP,
         effect=LIMP.effect,
         repeatable=True,
     )
 
 
-def _at_once(nodes: Sequence[int]) -> Iterator[Exchange[Answer]]:
+def _at_once(nodes: Sequence[int]) -> Iterator[Exchange[Response]]:
     """Torque off to these and to nobody else, as many frames as that takes; nobody answers."""
     for start in range(0, len(nodes), AT_ONCE):
         ids = nodes[start : start + AT_ONCE]
         yield Exchange(
             wire.sync_write(LIMP.address, [(node, LIMP.data) for node in ids]),
             (),
-            rank=Rank.STOP,
+            rank=Priority.STOP,
             effect=LIMP.effect,
             goals=tuple(map(torque_off, ids)),
             repeatable=True,
         )
 
 
-def _limp(node: int) -> Exchange[Answer]:
+def _limp(node: int) -> Exchange[Response]:
     return Exchange(
         wire.write(node, LIMP.address, LIMP.data),
-        (Due(node, node, wire.OVERHEAD),),
-        rank=Rank.STOP,
+        (Expected(node, node, wire.OVERHEAD),),
+        rank=Priority.STOP,
         effect=LIMP.effect,
         repeatable=True,
     )
 
 
-def _nothing(_: Answer) -> None:
+def _nothing(_: Response) -> None:
     return None

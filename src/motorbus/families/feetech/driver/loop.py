@@ -12,7 +12,7 @@ from typing import Final, Literal
 
 from motorbus.core.entry import Entry, shown
 from motorbus.core.family import Positions
-from motorbus.core.operation import UNLIKE, Answer, Exchange, Unlike, Whole, outcome
+from motorbus.core.operation import UNLIKE, Exchange, Response, Unlike, Whole, catch
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, places, read_block, settings_of_now
 from motorbus.families.feetech.driver.gauge import Packets, measure
@@ -70,7 +70,7 @@ async def read_positions(servos: Sequence[Node], *, rate: int = RATE, air: float
     values: dict[int, float] = {}
     at = float("-inf")
     for exchange in position_reads(servos, rate=rate, air=air):
-        found = await outcome(exchange)
+        found = await catch(exchange)
         if isinstance(found, DOUBTS):
             continue
         if isinstance(found, MotorbusError):
@@ -162,12 +162,12 @@ class _Gauges:
     def __init__(self, gauges: Mapping[int, _Gauge]) -> None:
         self._gauges = gauges
         self._seen: object = None  # `CHANGES.now` when all had the settings by which they were read last
-        self._last: tuple[Answer | float, dict[int, float]] | None = (
+        self._last: tuple[Response | float, dict[int, float]] | None = (
             None  # which one or when, and what it said
         )
         self._places = partial(places, {id: gauge.node for id, gauge in gauges.items()})
 
-    def read(self, answer: Answer) -> Positions:
+    def read(self, answer: Response) -> Positions:
         """Where they are. Raises RequestError as `_Gauge.value`."""
         found: dict[int, float] = {}
         gauges, at = self._gauges, answer.at
@@ -179,7 +179,7 @@ class _Gauges:
         self._last = answer, found.copy()  # what is given away may be changed by who gets it
         return Positions(found, answer.missing, at)
 
-    def places(self, answer: Answer) -> Mapping[int, float]:
+    def places(self, answer: Response) -> Mapping[int, float]:
         """The same as `Exchange.tells_position` says it: by the settings that they have now, where those are known."""
         last = self._last
         if last is not None and (last[0] is answer or last[0] is answer.at) and self._settled():

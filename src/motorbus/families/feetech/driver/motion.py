@@ -14,7 +14,7 @@ from typing import Final, TypeVar
 
 from motorbus.core.entry import Table, is_number, shown
 from motorbus.core.interrupted import Moving, stopped_if_interrupted
-from motorbus.core.operation import Effect, Pause, Runnable, outcome
+from motorbus.core.operation import Effect, Runnable, Sleep, catch
 from motorbus.errors import LimitExceeded, MotorbusError, RequestError, VerificationFailed
 from motorbus.families.feetech.driver.arrival import Move, arrive
 from motorbus.families.feetech.driver.bound import ask_bound
@@ -140,19 +140,19 @@ async def _stay(node: Node, table: Table) -> Promise:
     three times at most, for a stop is sent whatever happens.
     """
     for again in reversed(range(_TRIES)):
-        asked = await Pause(0.0)
-        here = await outcome(held(node, table))
+        asked = await Sleep(0.0)
+        here = await catch(held(node, table))
         told = node.at
         doubtful = isinstance(here, RequestError) or (isinstance(here, Block) and outside(node, table, here))
         if doubtful and await is_limp(node):
             return Promise.LIMP
         if isinstance(here, MotorbusError):
             raise here
-        waited = await Pause(0.0) - told
+        waited = await Sleep(0.0) - told
         if again and (waited > OLD or told - asked > SLEPT):
             continue
         await ordered(node, table, here)
-        if not again or await Pause(0.0) - asked <= SLEPT:
+        if not again or await Sleep(0.0) - asked <= SLEPT:
             await not_turns_away(node, table, here)
             break
     return Promise.OUTSIDE_ACCEPTED if doubtful else Promise.HOLD_ACCEPTED
@@ -232,7 +232,7 @@ async def stops(move: Runnable[T], *nodes: Node) -> T:
 
 
 async def _stopped(node: Node) -> Promise | None:
-    if await outcome(is_limp(node)) is True:
+    if await catch(is_limp(node)) is True:
         return None
     return await stop(node)
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from motorbus.core.entry import Entry, Table, Value, is_number, shown
 from motorbus.core.family import Identity
-from motorbus.core.operation import Due, Exchange, Goal
+from motorbus.core.operation import Exchange, Expected, Goal
 from motorbus.errors import RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.table import (
@@ -148,7 +148,7 @@ class Node:
         self.bound: int | None = None
         self.former_limits: tuple[float, float] | None = None
         self.unsure: set[int] = set()
-        self.questions: Final[dict[tuple[int, int], tuple[bytes, tuple[Due, ...]]]] = {}
+        self.questions: Final[dict[tuple[int, int], tuple[bytes, tuple[Expected, ...]]]] = {}
         self.kept: Final[dict[str, tuple[Settings, Exchange[Any]]]] = {}
         self.preparation: Exchange[Identity] | None = None
 

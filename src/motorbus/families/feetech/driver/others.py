@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from motorbus.core.operation import Progress, Report, Timeout, outcome
+from motorbus.core.operation import Emit, Progress, TimeoutClass, catch
 from motorbus.errors import LinkLost, NoReply, RequestError
 from motorbus.families.feetech.driver.exchanges import read_block
 from motorbus.families.feetech.driver.identity import identity_of
@@ -26,12 +26,12 @@ async def others_than(node: Node, asked: Sequence[int], ids: Sequence[int]) -> l
     others = []
     asked = list(dict.fromkeys((*asked, SHIPPED_ID)))
     for done, id in enumerate(asked):
-        await Report(Progress(done + 1, len(asked), f"who else is there? id {id}"))
+        await Emit(Progress(done + 1, len(asked), f"who else is there? id {id}"))
         if id == node.node:
             continue
-        head = await outcome(_head(id))
+        head = await catch(_head(id))
         if isinstance(head, NoReply):
-            head = await outcome(_head(id))
+            head = await catch(_head(id))
         if isinstance(head, LinkLost):
             raise head
         if isinstance(head, NoReply):
@@ -43,7 +43,7 @@ async def others_than(node: Node, asked: Sequence[int], ids: Sequence[int]) -> l
 
 
 async def _head(id: int) -> bytes:
-    return await read_block(Node(id), 0, _HEAD, bytes, timeout=Timeout.SCAN)
+    return await read_block(Node(id), 0, _HEAD, bytes, timeout=TimeoutClass.SCAN)
 
 
 async def _refuse_second(id: int, head: bytes, ids: Sequence[int]) -> None:

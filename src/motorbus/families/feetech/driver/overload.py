@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 from motorbus.core.entry import Table
 from motorbus.core.family import State
-from motorbus.core.operation import Pause, outcome
+from motorbus.core.operation import Sleep, catch
 from motorbus.errors import DeviceError, MotorbusError, RequestError
 from motorbus.families.feetech.driver.alarm import alarms
 from motorbus.families.feetech.driver.feedback import state_exchange
@@ -51,7 +51,7 @@ async def recover_overload(node: Node, *, rest: float = REST) -> Recovery:
     tripped = tuple(name for name in (await state_exchange(node, table)).alarm if name in TRIPS)
     if tripped:
         await disable_torque(node)
-        await Pause(rest)
+        await Sleep(rest)
         try:
             await enable_torque(node)
             stays = await _tripped(node, table)
@@ -77,7 +77,7 @@ def _check(node: Node, rest: float) -> None:
 
 async def _let_go(node: Node, error: MotorbusError) -> None:
     """Whatever came of switching its torque on, it ends limp."""
-    failure = await outcome(disable_torque(node))
+    failure = await catch(disable_torque(node))
     if failure is not None:
         error.add_note(
             f"node {node.node} may still hold: disable_torque() was not acknowledged ({failure.summary})"

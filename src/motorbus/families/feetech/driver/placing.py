@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from motorbus.core.operation import Effect, Pause, Rank, Timeout, Tune
+from motorbus.core.operation import Effect, Priority, SetBitrate, Sleep, TimeoutClass
 from motorbus.errors import NoReply, OutcomeUnknown, RequestError, WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import Block, confirmed, read_block, unanswered, verified
@@ -45,9 +45,9 @@ async def rewritten(job: Job, node: Node, goal: Place, course: Course, before: b
     await course.reach(WRITING, goal)
     block = job.block(goal)
     request = wire.write(node.node, block.address, block.data)
-    await unanswered(request, block.effect, rank=Rank.CONFIGURATION)
-    await Pause(COMMIT)
-    await Tune(goal.rate)
+    await unanswered(request, block.effect, rank=Priority.CONFIGURATION)
+    await Sleep(COMMIT)
+    await SetBitrate(goal.rate)
     image = await seen(goal.id)
     if not job.is_at(goal, image, before):
         raise _not_there(job, goal, image)
@@ -66,15 +66,15 @@ async def followed(job: Job, node: Node, goal: Place, course: Course) -> None:
         return
     await course.reach(SECOND, goal)
     block = Block(job.second, bytes((goal.id,)), Effect.PERSISTENT)
-    await confirmed(node, block, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
-    await Pause(COMMIT)
-    await verified(node, block, timeout=Timeout.STORE)
+    await confirmed(node, block, rank=Priority.CONFIGURATION, timeout=TimeoutClass.STORE)
+    await Sleep(COMMIT)
+    await verified(node, block, timeout=TimeoutClass.STORE)
     await _still_open(job, node)
 
 
 async def unlocked(job: Job, node: Node) -> None:
     """Open the lock of a servo, and let it go limp: in this order, for one that restarts later has its lock closed."""
-    await confirmed(node, Block(job.lock, OPEN, Effect.PERSISTENT), timeout=Timeout.STORE)
+    await confirmed(node, Block(job.lock, OPEN, Effect.PERSISTENT), timeout=TimeoutClass.STORE)
     await disable_torque(node)
 
 
@@ -92,8 +92,8 @@ async def _still_open(job: Job, node: Node) -> None:
 async def locked(job: Job, node: Node) -> None:
     """Close the lock of a servo, whose settings are known, and see that it is closed."""
     block = Block(job.lock, CLOSED, Effect.PERSISTENT)
-    await confirmed(node, block, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
-    await verified(node, block, timeout=Timeout.STORE)
+    await confirmed(node, block, rank=Priority.CONFIGURATION, timeout=TimeoutClass.STORE)
+    await verified(node, block, timeout=TimeoutClass.STORE)
 
 
 async def look(id: int) -> bytes:
@@ -132,7 +132,7 @@ async def seen(id: int) -> bytes:
         image = await look(id)
         if image != b"":
             return image
-        await Pause(AWAKE)
+        await Sleep(AWAKE)
     return await look(id)
 
 

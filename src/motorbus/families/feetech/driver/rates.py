@@ -13,14 +13,14 @@ from motorbus.core.entry import Table
 from motorbus.core.family import Found
 from motorbus.core.operation import (
     ASKED,
-    Alone,
-    Journal,
-    Pause,
-    Report,
-    Timeout,
-    Tune,
-    afterwards,
-    outcome,
+    Emit,
+    Exclusive,
+    JournalEntry,
+    SetBitrate,
+    Sleep,
+    TimeoutClass,
+    catch,
+    with_cleanup,
 )
 from motorbus.errors import LinkLost, MotorbusError, NoReply, RequestError
 from motorbus.families.feetech import wire
@@ -49,18 +49,18 @@ async def set_baud(node: Node, rate: int, *, among: Sequence[int] = ()) -> Found
     """
     _refuse_unknown(rate)
     asked = [one.node for one in as_nodes(among or range(wire.MAX_ID + 1))]
-    await Report(Journal(SET_BAUD, ASKED, {}))
+    await Emit(JournalEntry(SET_BAUD, ASKED, {}))
     image = await met_alone(node)
     table = await writable(node)
     _refuse_lacking(node, table, rate)
-    present = await Tune(0)
+    present = await SetBitrate(0)
     job = Job(SET_BAUD, Place(node.node, present), Place(node.node, rate), image)
     if rate == present:
-        await Alone(locked(job, node))
+        await Exclusive(locked(job, node))
         return Found(node.node, rate, node.identity)
     await refuse_duplicates(node)
-    await Alone(afterwards(_look_there(job.new), lambda: Tune(present)))
-    await Alone(afterwards(_look_around(job), lambda: Tune(present)))
+    await Exclusive(with_cleanup(_look_there(job.new), lambda: SetBitrate(present)))
+    await Exclusive(with_cleanup(_look_around(job), lambda: SetBitrate(present)))
     others = await others_than(node, asked, (node.node,))
     job = job._replace(others=tuple(others))
     await guarded(job, node)
@@ -89,7 +89,7 @@ def _refuse_lacking(node: Node, table: Table, rate: int) -> None:
 
 async def _look_there(there: Place) -> None:
     """Is the link able to have this rate, and is the id free there?"""
-    await Tune(there.rate)
+    await SetBitrate(there.rate)
     refuse_taken(there, await whoever(there.id))
 
 
@@ -101,13 +101,13 @@ async def _look_around(job: Job) -> None:
     for rate in BAUD_CODES.values():
         if rate in (job.old.rate, job.new.rate):
             continue
-        refusal = await outcome(Tune(rate))
+        refusal = await catch(SetBitrate(rate))
         if isinstance(refusal, LinkLost):
             raise refusal
         if isinstance(refusal, MotorbusError):
             continue
-        await Pause(DRAIN)
-        image = await outcome(_glance(job.old.id))
+        await Sleep(DRAIN)
+        image = await catch(_glance(job.old.id))
         if isinstance(image, LinkLost):
             raise image
         if not isinstance(image, NoReply):
@@ -115,4 +115,4 @@ async def _look_around(job: Job) -> None:
 
 
 async def _glance(id: int) -> bytes:
-    return await read_block(Node(id), 0, IMAGE, bytes, timeout=Timeout.SCAN)
+    return await read_block(Node(id), 0, IMAGE, bytes, timeout=TimeoutClass.SCAN)

@@ -19,16 +19,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 from motorbus.core.operation import (
-    Alone,
     Effect,
-    Pause,
+    Emit,
+    Exclusive,
+    Priority,
     Progress,
-    Rank,
-    Report,
-    Timeout,
-    Tune,
-    afterwards,
-    outcome,
+    SetBitrate,
+    Sleep,
+    TimeoutClass,
+    catch,
+    with_cleanup,
 )
 from motorbus.errors import LinkLost, MotorbusError, NoReply, OutcomeUnknown, RequestError, WireError
 from motorbus.families.feetech import wire
@@ -88,14 +88,14 @@ async def recover(node: Node, change: str, facts: Mapping[str, Any], *, alone: b
     """
     job = job_of(change, facts)
     course = Course(job, facts.get("reached", ()))
-    present = await Tune(0)
+    present = await SetBitrate(0)
 
     async def work() -> str:
         await course.resume(RESUMED)
         return await recovered(job, course, alone=alone)
 
     try:
-        return await Alone(afterwards(work(), lambda: Tune(present)))
+        return await Exclusive(with_cleanup(work(), lambda: SetBitrate(present)))
     except BaseException as error:
         if not isinstance(error, MotorbusError):  # one of ours says itself what to do
             error.add_note("the change may still be unfinished: recover() ends it")
@@ -108,13 +108,13 @@ async def recovered(job: Job, course: Course, *, alone: bool = False) -> str:
     """As `recover`, with the bus for itself; may leave it at another rate."""
     for attempt in range(_REPEATS):
         found = await _found(job, course, alone)
-        ended = await outcome(_ended(job, course, found))
+        ended = await catch(_ended(job, course, found))
         if isinstance(ended, str):
             await course.end(ended)
             return ended
         if attempt == _REPEATS - 1:
             raise ended
-        await Pause(AWAKE)
+        await Sleep(AWAKE)
     raise AssertionError("the loop above ends by itself")
 
 
@@ -122,16 +122,16 @@ async def _ended(job: Job, course: Course, found: Seen) -> str:
     """Bring the servo that was found to one of both places, for good, and lock it."""
     goal = found.place if found.place in (job.old, job.new) else job.old
     ended: list[str] = []
-    await afterwards(
+    await with_cleanup(
         _brought(job, course, found, goal, ended),
-        lambda: _closed(job, found, goal) if not ended else Tune(0),
+        lambda: _closed(job, found, goal) if not ended else SetBitrate(0),
     )
     return "new" if goal == job.new else "old"
 
 
 async def _brought(job: Job, course: Course, found: Seen, goal: Place, ended: list[str]) -> None:
     place = found.place
-    await Tune(place.rate)
+    await SetBitrate(place.rate)
     node = met(place.id, found.image)
     again = place == goal and course.doubtful(goal) and await _may_be_lost(job, node, course)
     follows = job.second is not None and (course.following or found.image[job.second] != goal.id)
@@ -150,12 +150,12 @@ async def _brought(job: Job, course: Course, found: Seen, goal: Place, ended: li
 
 async def _closed(job: Job, found: Seen, goal: Place) -> None:
     """Close the lock of a servo that could not be brought to its goal, wherever it is by now, as far as it answers."""
-    await Pause(COMMIT)  # a lock that closes too early may drop what is being stored
+    await Sleep(COMMIT)  # a lock that closes too early may drop what is being stored
     for place in dict.fromkeys((found.place, goal)):
-        await Tune(place.rate)
-        image = await outcome(look(place.id))
+        await SetBitrate(place.rate)
+        image = await catch(look(place.id))
         if isinstance(image, bytes) and image and job.is_like_it(image):
-            await outcome(locked(job, met(place.id, image)))
+            await catch(locked(job, met(place.id, image)))
 
 
 async def _may_be_lost(job: Job, node: Node, course: Course) -> bool:
@@ -175,8 +175,8 @@ async def _found(job: Job, course: Course, alone: bool) -> Seen:
             raise await _two(job, mine)
         if mine:
             return mine[0]
-        await Report(Progress(round + 1, ROUNDS, f"looking for node {job.old.id}"))
-        await Pause(AWAKE)
+        await Emit(Progress(round + 1, ROUNDS, f"looking for node {job.old.id}"))
+        await Sleep(AWAKE)
     if alone:
         await _refuse_others(job)
     lost = await _lost(job, alone)
@@ -191,7 +191,7 @@ async def _among(job: Job, places: Iterable[Place]) -> list[Seen]:
     """Who of its kind answers at these places; nobody else did before the change began, see `guarded`."""
     found = []
     for place in dict.fromkeys(places):
-        await Tune(place.rate)
+        await SetBitrate(place.rate)
         try:
             image = await look(place.id)
         except WireError as garbled:
@@ -228,35 +228,35 @@ def _others(job: Job, alone: bool) -> set[int]:
 
 async def _glimpsed(job: Job, place: Place) -> Seen | None:
     """One of its kind at a place where nobody answered before; silence is the usual answer and is not waited for."""
-    image = await outcome(_asked(place))
+    image = await catch(_asked(place))
     if isinstance(image, LinkLost):
         raise image
     return Seen(place, image) if isinstance(image, bytes) and job.is_like_it(image) else None
 
 
 async def _asked(place: Place) -> bytes:
-    await Tune(place.rate)  # a rate that this link cannot have is no place to look at
-    return await read_block(Node(place.id), 0, IMAGE, bytes, timeout=Timeout.SCAN)
+    await SetBitrate(place.rate)  # a rate that this link cannot have is no place to look at
+    return await read_block(Node(place.id), 0, IMAGE, bytes, timeout=TimeoutClass.SCAN)
 
 
 async def _hidden(job: Job) -> None:
     """Raise OutcomeUnknown when it seems to have joined another servo at the id as shipped."""
-    await Tune(job.old.rate)
-    found = await outcome(duplicates(Node(SHIPPED_ID), _GLANCE))
+    await SetBitrate(job.old.rate)
+    found = await catch(duplicates(Node(SHIPPED_ID), _GLANCE))
     if not isinstance(found, MotorbusError) and found.suspected:
         raise _several(job, Place(SHIPPED_ID, job.old.rate))
 
 
 async def _called_back(job: Job, course: Course) -> Seen:
     """Give a servo that answers to no id its old one by broadcast; nobody else is there to hear it."""
-    await Tune(job.old.rate)
+    await SetBitrate(job.old.rate)
     limp = wire.write(wire.BROADCAST, LIMP.address, LIMP.data)
-    await unanswered(limp, LIMP.effect, rank=Rank.STOP)
+    await unanswered(limp, LIMP.effect, rank=Priority.STOP)
     await course.reach(WRITING, job.old)
     for block in (Block(job.lock, OPEN, Effect.PERSISTENT), job.block(job.old)):
         request = wire.write(wire.BROADCAST, block.address, block.data)
-        await unanswered(request, block.effect, rank=Rank.CONFIGURATION)
-        await Pause(COMMIT)
+        await unanswered(request, block.effect, rank=Priority.CONFIGURATION)
+        await Sleep(COMMIT)
     found = await _among(job, (job.old,))
     if not found:
         raise NoReply(
@@ -270,10 +270,10 @@ async def _called_back(job: Job, course: Course) -> Seen:
 
 async def _refuse_others(job: Job) -> None:
     """Raise RequestError when somebody answers who cannot be the servo, or more than one does."""
-    await Tune(job.old.rate)
+    await SetBitrate(job.old.rate)
     there = []
     for id in range(wire.MAX_ID + 1):
-        answer = await outcome(read_block(Node(id), 0, IMAGE, bytes, timeout=Timeout.SCAN))
+        answer = await catch(read_block(Node(id), 0, IMAGE, bytes, timeout=TimeoutClass.SCAN))
         if isinstance(answer, LinkLost):
             raise answer
         if not isinstance(answer, NoReply):
@@ -312,8 +312,8 @@ def _nowhere(job: Job) -> NoReply:
 async def _two(job: Job, found: Sequence[Seen]) -> MotorbusError:
     """Both places are taken by servos of its kind: lock both, for one of them may be open, and say so."""
     for one in found:
-        await Tune(one.place.rate)
-        await outcome(locked(job, met(one.place.id, one.image)))
+        await SetBitrate(one.place.rate)
+        await catch(locked(job, met(one.place.id, one.image)))
     where = " and ".join(f"{one.place.id} at {one.place.rate} bit/s" for one in found)
     return OutcomeUnknown(
         f"servos answer as {where}: which of them is the one that was to change is not known",

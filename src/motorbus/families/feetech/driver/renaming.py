@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from motorbus.core.family import Found
-from motorbus.core.operation import ASKED, Alone, Journal, Report, Tune
+from motorbus.core.operation import ASKED, Emit, Exclusive, JournalEntry, SetBitrate
 from motorbus.errors import WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.changing import guarded
@@ -39,14 +39,14 @@ async def set_id(node: Node, new: int, *, among: Sequence[int] = ()) -> Found:
     """
     checked_id(new)
     asked = [one.node for one in as_nodes(among or range(wire.MAX_ID + 1))]
-    await Report(Journal(SET_ID, ASKED, {}))
+    await Emit(JournalEntry(SET_ID, ASKED, {}))
     image = await met_alone(node)
     assert node.identity is not None
     found = replace(node.identity, node=new)
-    rate = await Tune(0)
+    rate = await SetBitrate(0)
     job = Job(SET_ID, Place(node.node, rate), Place(new, rate), image)
     if new == node.node:
-        await Alone(locked(job, node))
+        await Exclusive(locked(job, node))
         return Found(new, rate, found)
     await refuse_duplicates(node)
     refuse_taken(Place(new, rate), await whoever(new))

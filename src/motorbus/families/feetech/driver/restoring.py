@@ -15,7 +15,7 @@ from typing import Final
 
 from motorbus.core.entry import Table
 from motorbus.core.family import Found
-from motorbus.core.operation import Alone, Effect, Pause, Rank, Timeout, Tune, afterwards
+from motorbus.core.operation import Effect, Exclusive, Priority, SetBitrate, Sleep, TimeoutClass, with_cleanup
 from motorbus.errors import NoReply, OutcomeUnknown, WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, acknowledged
@@ -38,7 +38,7 @@ async def factory_restore(node: Node) -> Found:
     """
     table = await writable(node)
     try:
-        return await Alone(_restored(node, factory_rates(table)))
+        return await Exclusive(_restored(node, factory_rates(table)))
     finally:
         node.forget_settings()
 
@@ -50,17 +50,17 @@ def factory_rates(table: Table) -> tuple[int, ...]:
 
 
 async def _restored(node: Node, factory: Sequence[int]) -> Found:
-    present = await Tune(0)
+    present = await SetBitrate(0)
     ids = tuple(dict.fromkeys((node.node, _SHIPPED_ID)))
     places = dict.fromkeys(dict.fromkeys((present, *factory)), ids)
-    taken = await afterwards(_taken(node, present, places), lambda: Tune(present))
+    taken = await with_cleanup(_taken(node, present, places), lambda: SetBitrate(present))
     await disable_torque(node)
     doubt: BaseException | None = None
     try:
         await _reset(node)
     except DOUBTS as error:
         doubt = error
-    await Pause(DEAF)
+    await Sleep(DEAF)
     found = await _found(present, places, taken)
     if found is None:
         raise _gone(node, taken) from doubt
@@ -74,7 +74,7 @@ async def _taken(node: Node, present: int, places: Mapping[int, Sequence[int]]) 
     taken = set()
     for rate, ids in places.items():
         if rate != present:
-            await Tune(rate)
+            await SetBitrate(rate)
         for id in ids:
             if (id, rate) != (node.node, present) and await _there(id):
                 taken.add((id, rate))
@@ -102,7 +102,7 @@ async def _found(
 async def _reset(node: Node) -> None:
     block = Block(0, b"", Effect.PERSISTENT, repeatable=False)
     request = wire.factory_restore(node.node)
-    await acknowledged(node, request, block, rank=Rank.CONFIGURATION, timeout=Timeout.STORE)
+    await acknowledged(node, request, block, rank=Priority.CONFIGURATION, timeout=TimeoutClass.STORE)
 
 
 def _gone(node: Node, taken: set[tuple[int, int]]) -> NoReply:

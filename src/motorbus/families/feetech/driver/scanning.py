@@ -13,13 +13,13 @@ from typing import Final, NamedTuple
 
 from motorbus.core.family import Found, Identity
 from motorbus.core.operation import (
-    Alone,
-    Pause,
+    Emit,
+    Exclusive,
     Progress,
-    Report,
-    Tune,
-    afterwards,
-    outcome,
+    SetBitrate,
+    Sleep,
+    catch,
+    with_cleanup,
 )
 from motorbus.errors import LinkLost, MotorbusError, NoReply, WireError
 from motorbus.families.feetech import wire
@@ -49,22 +49,22 @@ async def scan(ids: Sequence[int] = (), rates: Sequence[int] = (), *, polls: int
     answers are garbled in any case, and it counts as found, without an identity, when they stay so. Writes nothing.
     """
     asked = [node.node for node in as_nodes(ids or range(wire.MAX_ID + 1))]
-    present = await Tune(0)
+    present = await SetBitrate(0)
     if not rates:
         return await _at_one_rate(asked, present, 0, 1, polls)
-    return await Alone(afterwards(_at_all_rates(asked, rates, polls), lambda: Tune(present)))
+    return await Exclusive(with_cleanup(_at_all_rates(asked, rates, polls), lambda: SetBitrate(present)))
 
 
 async def _at_all_rates(ids: Sequence[int], rates: Sequence[int], polls: int) -> list[Found]:
     found: list[Found] = []
     for index, rate in enumerate(rates):
-        refusal = await outcome(Tune(rate))
+        refusal = await catch(SetBitrate(rate))
         if isinstance(refusal, LinkLost):
             raise refusal
         if isinstance(refusal, MotorbusError):
-            await Report(Skipped(rate, refusal.summary))
+            await Emit(Skipped(rate, refusal.summary))
             continue
-        await Pause(DRAIN)
+        await Sleep(DRAIN)
         found += await _at_one_rate(ids, rate, index, len(rates), polls)
     return found
 
@@ -78,11 +78,11 @@ async def _at_one_rate(ids: Sequence[int], rate: int, index: int, of: int, polls
         for done, id in enumerate(ids):
             if id not in there and await _answers(id, garbled):
                 there.append(id)
-                await Report(Found(id, rate, None))
-            await Report(Progress(begun + done + 1, 2 * of * len(ids), f"id {id} at {rate} bit/s"))
+                await Emit(Found(id, rate, None))
+            await Emit(Progress(begun + done + 1, 2 * of * len(ids), f"id {id} at {rate} bit/s"))
     found: list[Found] = []
     for id in sorted({*there, *garbled}):
-        identity = await outcome(identify(Node(id)))
+        identity = await catch(identify(Node(id)))
         if isinstance(identity, WireError):
             garbled.add(id)
         shared = await _shared(id, max(polls, GLANCE) if id in garbled else polls)
@@ -105,12 +105,12 @@ async def _answers(id: int, garbled: set[int]) -> bool:
 
 async def _shared(id: int, polls: int) -> bool:
     """Do two servos seem to have this id? Says so if they do."""
-    seen = await outcome(_asked(id, polls))
+    seen = await catch(_asked(id, polls))
     if isinstance(seen, LinkLost):
         raise seen
     if not isinstance(seen, Suspicion) or not seen.suspected:
         return False
-    await Report(seen)
+    await Emit(seen)
     return True
 
 

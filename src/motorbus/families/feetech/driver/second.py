@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from motorbus.core.entry import Entry, Table
 from motorbus.core.family import Readdressed
-from motorbus.core.operation import Effect, Report, Tune
+from motorbus.core.operation import Effect, Emit, SetBitrate
 from motorbus.errors import RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver import eeprom
@@ -55,9 +55,9 @@ async def set_second_id(node: Node, new: int, *, force: bool = False, among: Seq
         return new
     await refuse_duplicates(node)
     if new != node.node and not force:
-        refuse_taken(Place(new, await Tune(0)), await whoever(new))
+        refuse_taken(Place(new, await SetBitrate(0)), await whoever(new))
     await others_than(node, asked, (node.node,) if force else (new, node.node))
-    await Report(Readdressed(node.node, new))
+    await Emit(Readdressed(node.node, new))
     await eeprom.store(node, table, [Block(row.address, row.encode(new), Effect.PERSISTENT)])
     return new
 

@@ -12,7 +12,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Answer, Due, Exchange, Progress, Report, Timeout, Tune, outcome
+from motorbus.core.operation import (
+    Emit,
+    Exchange,
+    Expected,
+    Progress,
+    Response,
+    SetBitrate,
+    TimeoutClass,
+    catch,
+)
 from motorbus.errors import MotorbusError, NoReply, RequestError, WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import PRESENT, read_block
@@ -86,12 +95,12 @@ async def duplicates(node: Node, polls: int = POLLS, *, quiet: bool = False) -> 
         raise RequestError(
             f"{polls} polls", expected=f"1 to {MOST}", advice="nothing was sent", node=node.node
         )
-    seen = Suspicion(node.node, await Tune(0), 0)
+    seen = Suspicion(node.node, await SetBitrate(0), 0)
     first = b""
     silence: MotorbusError | None = None
     for number in range(polls):
         block = BLOCKS[number // 2 % len(BLOCKS)]
-        answers = await outcome((_alone if number % 2 == 0 else read_twice)(node, *block))
+        answers = await catch((_alone if number % 2 == 0 else read_twice)(node, *block))
         if isinstance(answers, NoReply):
             silence = silence or answers  # the first one says what may be the cause, too
         if block[0] == 0 and not first and not isinstance(answers, MotorbusError):
@@ -102,7 +111,7 @@ async def duplicates(node: Node, polls: int = POLLS, *, quiet: bool = False) -> 
             seen = seen._replace(**{told: getattr(seen, told) + 1})
         seen = seen._replace(polls=number + 1)
         if not quiet:
-            await Report(Progress(number + 1, polls, f"does one servo answer as {node.node}?"))
+            await Emit(Progress(number + 1, polls, f"does one servo answer as {node.node}?"))
         if seen.signs >= ENOUGH:
             break
     if silence is not None and seen.silent == seen.polls:
@@ -125,7 +134,7 @@ def _told(answers: Sequence[bytes] | MotorbusError, first: bytes | None) -> str:
 
 async def _in_step(node: Node) -> str:
     """Ask something that no late answer can be taken for, so that none is heard twice; "garbled" when that is."""
-    found = await outcome(read_block(node, _ID, 1, bytes))
+    found = await catch(read_block(node, _ID, 1, bytes))
     return "garbled" if isinstance(found, WireError) else ""
 
 
@@ -144,20 +153,20 @@ async def refuse_duplicates(node: Node, polls: int = POLLS) -> None:
 
 def _alone(node: Node, address: int, count: int) -> Exchange[tuple[bytes, ...]]:
     """One read, tried once; surplus bytes and wrong ones make it fail."""
-    return read_block(node, address, count, lambda data: (data,), timeout=Timeout.SCAN)
+    return read_block(node, address, count, lambda data: (data,), timeout=TimeoutClass.SCAN)
 
 
 async def read_twice(node: Node, address: int, count: int) -> tuple[bytes, ...]:
     """The same with the line kept open as long as a second answer could take."""
-    due = Due(node.node, node.node, wire.OVERHEAD + count)
+    due = Expected(node.node, node.node, wire.OVERHEAD + count)
 
-    def read(answer: Answer) -> tuple[bytes, ...]:
+    def read(answer: Response) -> tuple[bytes, ...]:
         for reply in answer.replies:
             node.heard(reply.data[4], answer.at)
         return tuple(reply.data[5 : 5 + count] for reply in answer.replies)
 
     answers = await Exchange(
-        wire.read(node.node, address, count), (due, due), read, timeout=Timeout.SCAN, repeatable=True
+        wire.read(node.node, address, count), (due, due), read, timeout=TimeoutClass.SCAN, repeatable=True
     )
     if not answers:
         raise NoReply(f"node {node.node} did not answer", node=node.node)

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 from motorbus.core.entry import Coding, shown
 from motorbus.core.family import Quality, State
-from motorbus.core.operation import UNLIKE, Answer, Exchange, Unlike, Whole
+from motorbus.core.operation import UNLIKE, Exchange, Response, Unlike, Whole
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.exchanges import PRESENT
 from motorbus.families.feetech.driver.feedback import FEEDBACK, state_of
@@ -48,7 +48,7 @@ def sync_read_states(servos: Sequence[Node], *, rate: int = RATE, air: float = A
     """
     nodes = {node.node: node for node in _askable(servos, FEEDBACK, rate, air)}
 
-    def read(answer: Answer) -> States:
+    def read(answer: Response) -> States:
         found = {}
         for reply in answer.replies:
             frame = reply.data

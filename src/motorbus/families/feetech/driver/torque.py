@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 from motorbus.core.goal import torque_off
-from motorbus.core.operation import Effect, Exchange, Rank, afterwards, outcome
+from motorbus.core.operation import Effect, Exchange, Priority, catch, with_cleanup
 from motorbus.errors import MotorbusError, VerificationFailed
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, unanswered, verified, write_block
@@ -34,7 +34,7 @@ async def disable_torque(node: Node) -> None:
     """
     doubt: MotorbusError | None = None
     for _ in range(_TRIES):
-        exchange = write_block(node, limp(node.node), rank=Rank.STOP)
+        exchange = write_block(node, limp(node.node), rank=Priority.STOP)
         try:
             await exchange
             if not exchange.replies:
@@ -49,7 +49,7 @@ async def disable_torque(node: Node) -> None:
 
 def disable_torque_everyone() -> Exchange[None]:
     """Torque off for every servo on the line, in one broadcast; no servo acknowledges it."""
-    return unanswered(wire.write(wire.BROADCAST, LIMP.address, LIMP.data), LIMP.effect, rank=Rank.STOP)
+    return unanswered(wire.write(wire.BROADCAST, LIMP.address, LIMP.data), LIMP.effect, rank=Priority.STOP)
 
 
 async def disable_torque_all(ids: Iterable[int | Node]) -> dict[int, MotorbusError]:
@@ -61,19 +61,19 @@ async def disable_torque_all(ids: Iterable[int | Node]) -> dict[int, MotorbusErr
     nodes = as_nodes(ids)
     errors: dict[int, MotorbusError] = {}
     waiting = list(nodes)
-    await afterwards(_at_once(nodes), lambda: _one_by_one(waiting, errors))
+    await with_cleanup(_at_once(nodes), lambda: _one_by_one(waiting, errors))
     return errors
 
 
 async def _at_once(nodes: Sequence[Node]) -> None:
     for exchange in all_limp(nodes):
-        await outcome(exchange)  # whoever did not hear is visited
+        await catch(exchange)  # whoever did not hear is visited
 
 
 async def _one_by_one(waiting: list[Node], errors: dict[int, MotorbusError]) -> None:
     """Visit those who wait, and begin again where it was when interrupted."""
     while waiting:
-        failure = await outcome(disable_torque(waiting[0]))
+        failure = await catch(disable_torque(waiting[0]))
         if failure is not None:
             errors[waiting[0].node] = failure
         del waiting[0]
@@ -85,4 +85,4 @@ def all_limp(nodes: Sequence[Node]) -> Iterator[Exchange[None]]:
     for start in range(0, len(nodes), capacity):
         ids = [node.node for node in nodes[start : start + capacity]]
         request = wire.sync_write(LIMP.address, [(number, LIMP.data) for number in ids])
-        yield unanswered(request, LIMP.effect, tuple(map(torque_off, ids)), rank=Rank.STOP)
+        yield unanswered(request, LIMP.effect, tuple(map(torque_off, ids)), rank=Priority.STOP)

@@ -13,7 +13,7 @@ from typing import Final
 
 from motorbus.core.entry import is_number, shown
 from motorbus.core.family import Positions
-from motorbus.core.operation import Effect, Exchange, outcome
+from motorbus.core.operation import Effect, Exchange, catch
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import changed_since, confirmed, unanswered
@@ -115,7 +115,7 @@ class Train:
             _check_speed(self._servo(id), speed)
         errors = []
         for id, node in self._servos.items():
-            failure = await outcome(_begin(node, speeds.get(id)))
+            failure = await catch(_begin(node, speeds.get(id)))
             if failure is not None:
                 errors.append(failure)
         raise_first(errors)

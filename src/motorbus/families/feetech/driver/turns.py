@@ -10,7 +10,7 @@ measured on an STS3215 with firmware 3.10 (ignored).
 from __future__ import annotations
 
 from motorbus.core.entry import Entry
-from motorbus.core.operation import Alone, Effect, Rank, Timeout
+from motorbus.core.operation import Effect, Exclusive, Priority, TimeoutClass
 from motorbus.errors import DeviceError, MotorbusError, RequestError, VerificationFailed
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import DOUBTS, PRESENT, Block, acknowledged, read_block
@@ -31,7 +31,7 @@ async def clear_turns(node: Node) -> float:
     table = await writable(node)
     if not CONTROL[table.name].clear_turns:
         raise _unknown(node, table.name)
-    return await Alone(_cleared(node, table["present_position"], CONTROL[table.name].turn))
+    return await Exclusive(_cleared(node, table["present_position"], CONTROL[table.name].turn))
 
 
 async def _cleared(node: Node, position: Entry, turn: int) -> float:
@@ -41,7 +41,7 @@ async def _cleared(node: Node, position: Entry, turn: int) -> float:
     doubt: MotorbusError | None = None
     try:
         await acknowledged(
-            node, wire.clear_turns(node.node), order, rank=Rank.CONFIGURATION, timeout=Timeout.STORE
+            node, wire.clear_turns(node.node), order, rank=Priority.CONFIGURATION, timeout=TimeoutClass.STORE
         )
     except DOUBTS as error:
         doubt = error
@@ -55,7 +55,7 @@ async def _cleared(node: Node, position: Entry, turn: int) -> float:
             raise _still(node, here, turn)
         return float(node.value(position, here))
 
-    return await read_block(node, PRESENT, position.size, told, timeout=Timeout.STORE)
+    return await read_block(node, PRESENT, position.size, told, timeout=TimeoutClass.STORE)
 
 
 def _still(node: Node, here: int, turn: int) -> VerificationFailed:

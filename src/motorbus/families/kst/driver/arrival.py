@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Pause
+from motorbus.core.operation import Sleep
 from motorbus.errors import MotionError, Stalled
 from motorbus.families.kst.driver.exchanges import decided, upload_row
 from motorbus.families.kst.driver.node import Node
@@ -50,7 +50,7 @@ async def arrive(node: Node, move: Move) -> None:
             raise _stalled(node, here, move)
         if node.at - begun > allowance:
             raise _late(node, here, move, allowance)
-        await Pause(POLL)
+        await Sleep(POLL)
         here = await look
         looks = looks + 1 if _near(here, move) else 0
 

@@ -15,14 +15,14 @@ from motorbus.core.family import Readdressed
 from motorbus.core.operation import (
     ANY,
     EVERY_LANE,
-    Alone,
-    Answer,
     Effect,
+    Emit,
     Exchange,
+    Exclusive,
     Goal,
-    Rank,
-    Report,
-    Timeout,
+    Priority,
+    Response,
+    TimeoutClass,
 )
 from motorbus.errors import RequestError
 from motorbus.families.kst import wire
@@ -43,7 +43,7 @@ async def broadcast_read(name: str, dialect: Dialect = PLAIN) -> dict[int, Value
     row = dialect.profile.table[name]
     if not row.readable:
         raise RequestError(f"{name} can only be written", advice="nothing was sent")
-    return await Alone(_read(row, dialect))
+    return await Exclusive(_read(row, dialect))
 
 
 async def _read(row: Entry, dialect: Dialect) -> dict[int, Value]:
@@ -51,12 +51,12 @@ async def _read(row: Entry, dialect: Dialect) -> dict[int, Value]:
     found: dict[int, Value] = {}
     for extended in sorted(dialect.formats):
         frame = wire.encode_upload(wire.EVERYONE, row.address, row.subindex or 0, extended=extended)
-        answer = await Exchange[Answer](frame, ANY, lane=EVERY_LANE)
+        answer = await Exchange[Response](frame, ANY, lane=EVERY_LANE)
         found |= _values(row, answer, dialect)
     return found
 
 
-def _values(row: Entry, answer: Answer, dialect: Dialect) -> dict[int, Value]:
+def _values(row: Entry, answer: Response, dialect: Dialect) -> dict[int, Value]:
     told: dict[int, set[bytes]] = {}
     for reply in answer.replies:
         one = wire.decode_reply(reply.data)
@@ -88,17 +88,17 @@ async def broadcast_position(to: float, nodes: Sequence[int], dialect: Dialect =
     raw = counts(Node(there[0], dialect), to)
     value, low, high = (float(row.to_value(number)) for number in (raw, row.low, row.high))
     goals = tuple(Goal(node, "position", value, low, high) for node in there)
-    return await Alone(_moved(dialect, row, raw, goals))
+    return await Exclusive(_moved(dialect, row, raw, goals))
 
 
 async def _moved(dialect: Dialect, row: Entry, raw: int, goals: tuple[Goal, ...]) -> tuple[int, ...]:
     if dialect.must_start:
         for extended in sorted(dialect.formats):
             frame = wire.encode_start(dialect.nmt, wire.EVERYONE, True, extended=extended)
-            await Exchange[Answer](
-                frame, (), lane=EVERY_LANE, rank=Rank.CONTROL, effect=Effect.MOTION, goals=goals
+            await Exchange[Response](
+                frame, (), lane=EVERY_LANE, rank=Priority.CONTROL, effect=Effect.MOTION, goals=goals
             )
-            await Report(Started(wire.EVERYONE, frame))
+            await Emit(Started(wire.EVERYONE, frame))
     return await _written(dialect, row, raw, goals)
 
 
@@ -106,13 +106,13 @@ async def broadcast_save(dialect: Dialect = PLAIN) -> tuple[int, ...]:
     """Let everyone save; returns who acknowledged, which by the manual is nobody. The bus is then left alone until the
     flash of all has been written."""
     row = dialect.profile.table["store"]
-    return await Alone(_written(dialect, row, SAVE, timeout=Timeout.STORE))
+    return await Exclusive(_written(dialect, row, SAVE, timeout=TimeoutClass.STORE))
 
 
 async def broadcast_bit_rate(rate: int, dialect: Dialect = PLAIN) -> tuple[int, ...]:
     """Give everyone another bit rate (bit/s), in force after a save and a restart; returns who acknowledged."""
     row = dialect.profile.table["bit_rate_code"]
-    return await Alone(_written(dialect, row, code_of(rate)))
+    return await Exclusive(_written(dialect, row, code_of(rate)))
 
 
 async def broadcast_node_id(new: int, dialect: Dialect = PLAIN, *, force: bool = False) -> tuple[int, ...]:
@@ -125,11 +125,11 @@ async def broadcast_node_id(new: int, dialect: Dialect = PLAIN, *, force: bool =
             cause="servos with one id answer together, and cannot be given different ids any more but one at a time",
             advice="connect one servo and use provision(); force=True does it all the same; nothing was sent",
         )
-    return await Alone(_readdressed(dialect, new))
+    return await Exclusive(_readdressed(dialect, new))
 
 
 async def _readdressed(dialect: Dialect, new: int) -> tuple[int, ...]:
-    await Report(Readdressed(None, new))
+    await Emit(Readdressed(None, new))
     return await _written(dialect, dialect.profile.table["node_id"], new)
 
 
@@ -139,7 +139,7 @@ async def _written(
     raw: int,
     goals: tuple[Goal, ...] = (),
     *,
-    timeout: Timeout = Timeout.REPLY,
+    timeout: TimeoutClass = TimeoutClass.REPLY,
 ) -> tuple[int, ...]:
     acknowledged: list[int] = []
     for extended in sorted(dialect.formats):
@@ -152,8 +152,8 @@ async def _written(
 
 
 def _write(
-    dialect: Dialect, row: Entry, data: bytes, goals: tuple[Goal, ...], timeout: Timeout, extended: bool
-) -> Exchange[Answer]:
+    dialect: Dialect, row: Entry, data: bytes, goals: tuple[Goal, ...], timeout: TimeoutClass, extended: bool
+) -> Exchange[Response]:
     frame = wire.encode_download(
         wire.EVERYONE,
         row.address,
@@ -162,5 +162,5 @@ def _write(
         sized=dialect.sized == "yes",
         extended=extended,
     )
-    rank = Rank.CONTROL if row.effect is Effect.MOTION else Rank.CONFIGURATION
+    rank = Priority.CONTROL if row.effect is Effect.MOTION else Priority.CONFIGURATION
     return Exchange(frame, ANY, lane=EVERY_LANE, rank=rank, effect=row.effect, goals=goals, timeout=timeout)

@@ -7,7 +7,7 @@ back, saved and read back again (`keeping.py`). Source of each object: its row i
 from __future__ import annotations
 
 from motorbus.core.entry import Entry
-from motorbus.core.operation import Alone, Rank
+from motorbus.core.operation import Exclusive, Priority
 from motorbus.errors import RequestError
 from motorbus.families.kst.driver.exchanges import decided, order, upload_row
 from motorbus.families.kst.driver.feedback import position_exchange
@@ -54,7 +54,7 @@ async def set_mid_point(node: Node) -> float:
     """
     row = _row(node, "mid_point", "mid point")
     await decided(node)
-    return await Alone(_mid_point(node, row))
+    return await Exclusive(_mid_point(node, row))
 
 
 async def _mid_point(node: Node, row: Entry) -> float:
@@ -63,7 +63,7 @@ async def _mid_point(node: Node, row: Entry) -> float:
         return 0.0
     node.limits = None
     node.unsaved.add(row.name)
-    await order(node, row, node.profile.mid_point_value, rank=Rank.CONFIGURATION)
+    await order(node, row, node.profile.mid_point_value, rank=Priority.CONFIGURATION)
     await save(node)
     await settled(node)
     node.unsaved.discard(row.name)
@@ -115,7 +115,7 @@ async def set_reversed(node: Node, on: bool) -> None:
     """
     row = _row(node, "function_enable", "reverse bit")
     await decided(node)
-    await Alone(_turned(node, row, on))
+    await Exclusive(_turned(node, row, on))
 
 
 async def _turned(node: Node, row: Entry, on: bool) -> None:

@@ -13,7 +13,7 @@ from math import inf
 from typing import Final
 
 from motorbus.core import units
-from motorbus.core.operation import CanFrame, Data, Event, Notice, Reply
+from motorbus.core.operation import CanFrame, Data, Event, Notification, Reply
 from motorbus.errors import RequestError
 from motorbus.families.kst import wire
 from motorbus.families.kst.table import PROFILES, Profile
@@ -55,13 +55,13 @@ class Memory:
         """
         if isinstance(event, Reply):
             self.extended.setdefault(event.lane, extended)
-        if isinstance(event, Notice) and event.kind == "bus error":
+        if isinstance(event, Notification) and event.kind == "bus error":
             self.errors += 1
             return
         self.frames += 1
-        if isinstance(event, Notice) and event.kind == "alarm":
+        if isinstance(event, Notification) and event.kind == "alarm":
             self.alarms[event.node] = (alarm_names(event.data), None)
-        if isinstance(event, Notice) and event.kind == "heartbeat" and wire.says_boot(event.data):
+        if isinstance(event, Notification) and event.kind == "heartbeat" and wire.says_boot(event.data):
             self.boots[event.node] += 1
 
     def alarm(self, node: int, at: float) -> tuple[str, ...]:

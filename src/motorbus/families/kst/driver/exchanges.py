@@ -13,16 +13,16 @@ from typing import Final, TypeVar
 from motorbus.core.entry import Entry
 from motorbus.core.operation import (
     ANY,
-    Alone,
-    Answer,
     CanFrame,
     Effect,
     Exchange,
+    Exclusive,
     Goal,
-    Rank,
+    Priority,
     Refusal,
+    Response,
     Runnable,
-    Timeout,
+    TimeoutClass,
 )
 from motorbus.errors import DeviceError, NoReply, UnexpectedReply
 from motorbus.families.kst import wire
@@ -60,13 +60,13 @@ def upload(
     subindex: int,
     take: Callable[[SdoReply], T],
     *,
-    rank: Rank = Rank.POLL,
-    timeout: Timeout = Timeout.REPLY,
-    tells_position: bool | Callable[[Answer], Mapping[int, float]] = False,
+    rank: Priority = Priority.POLL,
+    timeout: TimeoutClass = TimeoutClass.REPLY,
+    tells_position: bool | Callable[[Response], Mapping[int, float]] = False,
 ) -> Exchange[T]:
     """Read an object; the value is what `take` makes of the reply. A refusal raises DeviceError."""
 
-    def read(answer: Answer) -> T:
+    def read(answer: Response) -> T:
         return take(told(node, answer, index, subindex))
 
     return _upload(node, index, subindex, read, rank, timeout, tells_position)
@@ -76,10 +76,10 @@ def _upload(
     node: Node,
     index: int,
     subindex: int,
-    read: Callable[[Answer], T],
-    rank: Rank = Rank.POLL,
-    timeout: Timeout = Timeout.REPLY,
-    tells_position: bool | Callable[[Answer], Mapping[int, float]] = False,
+    read: Callable[[Response], T],
+    rank: Priority = Priority.POLL,
+    timeout: TimeoutClass = TimeoutClass.REPLY,
+    tells_position: bool | Callable[[Response], Mapping[int, float]] = False,
 ) -> Exchange[T]:
     return Exchange(
         wire.encode_upload(node.node, index, subindex, extended=node.dialect.extended(node.node)),
@@ -103,14 +103,14 @@ def upload_row(
     index, subindex = row.address, row.subindex or 0
     head, end = wire.usual_head(index, subindex, row.size), 4 + row.size
 
-    def read(answer: Answer) -> T:
+    def read(answer: Response) -> T:
         data = answer.replies[0].data
         if data[:4] == head and len(data) == wire.LENGTH:
             node.at = answer.at
             return take(row.decode(data[4:end]))
         return take(row.decode(sized(node, row, told(node, answer, index, subindex))))
 
-    def places(answer: Answer) -> dict[int, float]:
+    def places(answer: Response) -> dict[int, float]:
         reply = wire.decode_reply(answer.replies[0].data)
         if reply is None or reply.kind != "upload":  # a refusal tells nothing
             return {}
@@ -147,7 +147,7 @@ def download(
     *,
     states_length: bool,
     goals: tuple[Goal, ...] = (),
-    rank: Rank = Rank.CONTROL,
+    rank: Priority = Priority.CONTROL,
     refusal: Refusal | None = None,
 ) -> Exchange[None]:
     """Write a row once, in one of the two forms; the acknowledgement proves receipt, not more.
@@ -156,7 +156,7 @@ def download(
     """
     index, subindex = row.address, row.subindex or 0
 
-    def read(answer: Answer) -> None:
+    def read(answer: Response) -> None:
         told(node, answer, index, subindex)
 
     return Exchange(
@@ -180,7 +180,7 @@ def download(
 
 
 async def order(
-    node: Node, row: Entry, raw: int, goals: tuple[Goal, ...] = (), *, rank: Rank = Rank.CONTROL
+    node: Node, row: Entry, raw: int, goals: tuple[Goal, ...] = (), *, rank: Priority = Priority.CONTROL
 ) -> None:
     """Write a row. Raises DeviceError when the node refuses it, OutcomeUnknown when it never acknowledges."""
     await decided(node)
@@ -195,7 +195,7 @@ async def order(
         node.dialect.learn_sized(node.node)
 
 
-def told(node: Node, answer: Answer, index: int, subindex: int) -> SdoReply:
+def told(node: Node, answer: Response, index: int, subindex: int) -> SdoReply:
     """What the one reply of an answer says. Raises DeviceError for a refusal."""
     node.at = answer.at
     reply = wire.decode_reply(answer.replies[0].data)
@@ -264,7 +264,7 @@ async def decided(node: Node) -> None:
         return
     for extended in (False, True) * 2:
         frame = wire.encode_upload(node.node, NODE_ID, extended=extended)
-        if await listening(node, frame, _somebody, timeout=Timeout.REPLY, rank=Rank.POLL):
+        if await listening(node, frame, _somebody, timeout=TimeoutClass.REPLY, rank=Priority.POLL):
             node.dialect.learn_format(node.node, extended)
             return
     raise NoReply(
@@ -283,7 +283,7 @@ def _somebody(replies: list[SdoReply], at: float) -> bool:
 def answers(node: Node) -> Exchange[None]:
     """Ask for the node id; a refusal is an answer, silence raises NoReply."""
 
-    def read(answer: Answer) -> None:
+    def read(answer: Response) -> None:
         node.at = answer.at
 
     return Exchange(
@@ -308,7 +308,7 @@ async def whole(node: Node, row: Entry) -> bytes:
     first = await _begin(node, row)
     if first.kind == "upload":
         return first.data
-    return await Alone(_segments(node, row))
+    return await Exclusive(_segments(node, row))
 
 
 def _begin(node: Node, row: Entry) -> Exchange[SdoReply]:
@@ -342,7 +342,7 @@ async def _segments(node: Node, row: Entry) -> bytes:
 
 
 def _segment(node: Node, toggle: int) -> Exchange[SdoReply]:
-    def read(answer: Answer) -> SdoReply:
+    def read(answer: Response) -> SdoReply:
         return told(node, answer, 0, 0)
 
     return Exchange(
@@ -368,13 +368,13 @@ def listening(
     frame: CanFrame,
     take: Callable[[list[SdoReply], float], T],
     *,
-    timeout: Timeout,
+    timeout: TimeoutClass,
     effect: Effect = Effect.NONE,
-    rank: Rank = Rank.CONFIGURATION,
+    rank: Priority = Priority.CONFIGURATION,
 ) -> Exchange[T]:
     """Send a frame and take whatever comes from this node until the time is up; silence is an answer too."""
 
-    def read(answer: Answer) -> T:
+    def read(answer: Response) -> T:
         replies = [wire.decode_reply(reply.data) for reply in answer.replies]
         return take([reply for reply in replies if reply is not None], answer.at)
 

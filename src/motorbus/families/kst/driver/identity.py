@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from motorbus.core.entry import Entry
 from motorbus.core.family import Identity, Readdressed
-from motorbus.core.operation import Alone, Rank, Report, outcome
+from motorbus.core.operation import Emit, Exclusive, Priority, catch
 from motorbus.errors import DeviceError, MotorbusError, NoReply, RequestError, VerificationFailed
 from motorbus.families.kst import table
 from motorbus.families.kst.driver.exchanges import (
@@ -85,7 +85,7 @@ async def set_node_id(node: Node, new: int) -> None:
     VerificationFailed when it reads back neither. To swap two ids, give one of them a third one first.
     """
     checked_id(new)
-    if not await Alone(single(node)):
+    if not await Exclusive(single(node)):
         await answers(node)  # which tells best that nobody is there
     await _free(Node(new, node.dialect), node)
     await write_node_id(node, new)
@@ -108,8 +108,8 @@ async def _free(new: Node, old: Node) -> None:
 async def write_node_id(node: Node, new: int) -> None:
     """As `set_node_id`, for who has looked already whether the servo is alone with its id."""
     row = node.table["node_id"]
-    await Report(Readdressed(node.node, new))
-    await order(node, row, new, rank=Rank.CONFIGURATION)
+    await Emit(Readdressed(node.node, new))
+    await order(node, row, new, rank=Priority.CONFIGURATION)
     found = await _if_told(node, row)
     if found not in (
         None,
@@ -149,7 +149,7 @@ async def set_bit_rate(node: Node, rate: int) -> None:
 
     Raises RequestError for a rate it cannot have (nothing is sent).
     """
-    await order(node, node.table["bit_rate_code"], code_of(rate), rank=Rank.CONFIGURATION)
+    await order(node, node.table["bit_rate_code"], code_of(rate), rank=Priority.CONFIGURATION)
 
 
 def code_of(rate: int) -> int:
@@ -167,7 +167,7 @@ def code_of(rate: int) -> int:
 async def _if_told(node: Node, row: Entry) -> int | None:
     """The raw value, or None when the servo refuses to tell."""
     await decided(node)
-    found = await outcome(upload_row(node, row, int))
+    found = await catch(upload_row(node, row, int))
     if isinstance(found, DeviceError):
         return None
     if isinstance(found, MotorbusError):

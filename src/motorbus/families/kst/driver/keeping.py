@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from motorbus.core.entry import Entry
-from motorbus.core.operation import Alone, Effect, Exchange, Pause, Rank, Timeout
+from motorbus.core.operation import Effect, Exchange, Exclusive, Priority, Sleep, TimeoutClass
 from motorbus.errors import NoReply, VerificationFailed, WireError, unread
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.exchanges import STORE, decided, listening, order, refused, upload_row
@@ -56,7 +56,7 @@ def save_exchange(node: Node) -> Exchange[None]:
         sized=node.dialect.states_length(node.node),
         extended=node.dialect.extended(node.node),
     )
-    return listening(node, frame, take, timeout=Timeout.STORE, effect=Effect.PERSISTENT)
+    return listening(node, frame, take, timeout=TimeoutClass.STORE, effect=Effect.PERSISTENT)
 
 
 async def keep(node: Node, orders: Sequence[tuple[Entry, int]]) -> None:
@@ -70,7 +70,7 @@ async def keep(node: Node, orders: Sequence[tuple[Entry, int]]) -> None:
     """
     node.limits = None
     try:
-        await Alone(_kept(node, orders))
+        await Exclusive(_kept(node, orders))
     finally:
         node.limits = None
 
@@ -101,13 +101,13 @@ async def settled(node: Node) -> None:
     """Wait on where this servo's make needs longer than the bus waits after a save anyway."""
     rest = node.profile.mid_point_wait - node.profile.flash_wait
     if rest > 0:
-        await Pause(rest)
+        await Sleep(rest)
 
 
 async def verified(node: Node, row: Entry, raw: int) -> None:
     """Write a row and read it back, three times at most; what cannot be read is written once."""
     for attempt in range(TRIES):
-        await order(node, row, raw, rank=Rank.CONFIGURATION)
+        await order(node, row, raw, rank=Priority.CONFIGURATION)
         if not row.readable:
             return
         try:

@@ -13,12 +13,12 @@ from motorbus.core.family import Stop
 from motorbus.core.operation import (
     ANY,
     EVERY_LANE,
-    Answer,
     CanFrame,
     Effect,
     Exchange,
-    Rank,
-    Timeout,
+    Priority,
+    Response,
+    TimeoutClass,
 )
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.dialect import Dialect
@@ -68,11 +68,11 @@ def air_time(exchange: Exchange[Any], rate: int) -> float:
 
 def turnaround(exchange: Exchange[Any], flash_wait: float) -> float:
     """s that servos may think; after a save, the listening time and the write to flash."""
-    if exchange.timeout is Timeout.STORE:
+    if exchange.timeout is TimeoutClass.STORE:
         return LISTEN + flash_wait
     if exchange.lane == EVERY_LANE:
         return EVERYONE
-    return SCAN if exchange.timeout is Timeout.SCAN else REPLY
+    return SCAN if exchange.timeout is TimeoutClass.SCAN else REPLY
 
 
 def quiet_time(rate: int) -> float:
@@ -89,7 +89,7 @@ def probe(node: Node, attempt: int) -> Exchange[bool]:
     turn, kind = divmod(attempt, 3)
     index, subindex = ((NODE_ID, 0), (FIRMWARE, 0), (NODE_ID, 1 + turn % 254))[kind]
 
-    def read(answer: Answer) -> bool:
+    def read(answer: Response) -> bool:
         reply = wire.decode_reply(answer.replies[0].data) if answer.replies else None
         if reply is None or (reply.index, reply.subindex) != (index, subindex):
             return False
@@ -106,12 +106,12 @@ def probe(node: Node, attempt: int) -> Exchange[bool]:
     )
 
 
-def stop(nodes: Mapping[int, Answer | None], dialect: Dialect) -> Stop:
+def stop(nodes: Mapping[int, Response | None], dialect: Dialect) -> Stop:
     """Each node whose position is known holds there; each other one is asked for it, and can be held then.
 
     A node of which nobody knows the id format is addressed in both.
     """
-    exchanges: list[Exchange[Answer]] = []
+    exchanges: list[Exchange[Response]] = []
     for node in (Node(number, dialect) for number in sorted(nodes)):
         here = _told(nodes[node.node])
         undecided = dialect.undecided(node.node)
@@ -121,26 +121,26 @@ def stop(nodes: Mapping[int, Answer | None], dialect: Dialect) -> Stop:
     return Stop(tuple(exchanges), Promise.HOLD_REQUESTED.value)
 
 
-def _ask(node: Node, extended: bool) -> Exchange[Answer]:
+def _ask(node: Node, extended: bool) -> Exchange[Response]:
     return Exchange(
         wire.encode_upload(node.node, POSITION, extended=extended),
         (wire.upload_due(node.node, POSITION),),
         _unrefused(node, POSITION),
         lane=node.node,
-        rank=Rank.STOP,
+        rank=Priority.STOP,
         repeatable=True,
         tells_position=True,
     )
 
 
-def _holds(node: Node, here: bytes, extended: bool) -> tuple[Exchange[Answer], ...]:
+def _holds(node: Node, here: bytes, extended: bool) -> tuple[Exchange[Response], ...]:
     """Hold here. Beyond the range, where that may be refused, the end of the range is ordered first."""
     raw = int.from_bytes(here, "little", signed=True)
     end = max(-node.profile.limit, min(raw, node.profile.limit))
     return tuple(_hold(node, place, extended) for place in dict.fromkeys((end, raw)))
 
 
-def _hold(node: Node, raw: int, extended: bool) -> Exchange[Answer]:
+def _hold(node: Node, raw: int, extended: bool) -> Exchange[Response]:
     states_length = node.dialect.states_length(node.node)
     here = raw.to_bytes(2, "little", signed=True)
     return Exchange(
@@ -148,13 +148,13 @@ def _hold(node: Node, raw: int, extended: bool) -> Exchange[Answer]:
         (wire.download_due(node.node, GOAL),),
         _unrefused(node, GOAL),
         lane=node.node,
-        rank=Rank.STOP,
+        rank=Priority.STOP,
         effect=Effect.MOTION,
         repeatable=True,
     )
 
 
-def _told(answer: Answer | None) -> bytes | None:
+def _told(answer: Response | None) -> bytes | None:
     """The two bytes of the position in an answer; None when it was refused."""
     if answer is None or not answer.replies:
         return None
@@ -169,7 +169,7 @@ def _unrefused(node: Node, index: int) -> Any:
     One that may mean "state the length" is heeded by the next round.
     """
 
-    def read(answer: Answer) -> Answer:
+    def read(answer: Response) -> Response:
         reply = wire.decode_reply(answer.replies[0].data) if answer.replies else None
         if reply is not None and reply.kind == "abort":
             if index == GOAL and node.dialect.sized == "auto" and meant(reply.code) in UNSIZED_REFUSED:

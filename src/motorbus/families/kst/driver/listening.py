@@ -10,7 +10,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import Final
 
-from motorbus.core.operation import Listen, Notice, Together, Tune
+from motorbus.core.operation import Gather, Notification, SetBitrate, WaitFor
 from motorbus.families.kst.driver.dialect import Dialect
 
 GLANCE: Final = 0.25
@@ -30,19 +30,19 @@ async def heard(dialect: Dialect, rate: int, seconds: float) -> Heard:
 
     The link stays at that rate, listening, for the caller to tune again whatever happens.
     """
-    await Tune(rate, listen_only=True)
+    await SetBitrate(rate, listen_only=True)
     memory = dialect.memory
     before = (memory.frames, memory.errors) if memory else (0, 0)
-    whole, broken = await Together([Listen(_is_frame, seconds), Listen(_is_error, seconds)])
+    whole, broken = await Gather([WaitFor(_is_frame, seconds), WaitFor(_is_error, seconds)])
     after = (memory.frames, memory.errors) if memory else (0, 0)
     if whole is not None or after[0] > before[0]:
         return Heard.TRAFFIC
     return Heard.ERRORS if broken is not None or after[1] > before[1] else Heard.SILENCE
 
 
-def _is_frame(notice: Notice) -> bool:
+def _is_frame(notice: Notification) -> bool:
     return not _is_error(notice)
 
 
-def _is_error(notice: Notice) -> bool:
+def _is_error(notice: Notification) -> bool:
     return notice.kind == "bus error"

@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 from motorbus.core.entry import Entry, changed
 from motorbus.core.goal import Goal, Stays, torque_on
 from motorbus.core.interrupted import Moving, stopped_if_interrupted
-from motorbus.core.operation import CanFrame, Effect, Exchange, Rank, Report
+from motorbus.core.operation import CanFrame, Effect, Emit, Exchange, Priority
 from motorbus.errors import DeviceError, LimitExceeded, RequestError
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.arrival import Move, arrive
@@ -112,7 +112,7 @@ async def started(node: Node, goal: Goal | None = None) -> None:
     exchange = start_exchange(node, True, goal)
     assert isinstance(exchange.request, CanFrame)
     await exchange
-    await Report(Started(node.node, exchange.request))
+    await Emit(Started(node.node, exchange.request))
 
 
 def start_exchange(node: Node, on: bool, goal: Goal | None = None) -> Exchange[None]:
@@ -122,7 +122,9 @@ def start_exchange(node: Node, on: bool, goal: Goal | None = None) -> Exchange[N
     frame = wire.encode_start(form, node.node, on, extended=node.dialect.extended(node.node))
     effect = Effect.NONE if form != "standard" else Effect.MOTION if goal else Effect.TORQUE
     goals = () if form != "standard" or not on else (goal or torque_on(node.node),)
-    return Exchange(frame, (), lambda _: None, lane=node.node, rank=Rank.CONTROL, effect=effect, goals=goals)
+    return Exchange(
+        frame, (), lambda _: None, lane=node.node, rank=Priority.CONTROL, effect=effect, goals=goals
+    )
 
 
 async def stop(node: Node) -> Promise:

@@ -12,12 +12,12 @@ from typing import Final, NamedTuple
 
 from motorbus.core.operation import (
     Exchange,
-    Listen,
-    Notice,
-    Rank,
-    Timeout,
-    Together,
-    Tune,
+    Gather,
+    Notification,
+    Priority,
+    SetBitrate,
+    TimeoutClass,
+    WaitFor,
 )
 from motorbus.errors import LinkError, LinkLost, NoReply, RequestError, WireError
 from motorbus.families.kst import wire
@@ -67,12 +67,12 @@ def glance(node: Node, index: int = NODE_ID) -> Exchange[Presence]:
         return Presence(at, len(mine), told[0] if told else None)
 
     frame = wire.encode_upload(node.node, index, extended=node.dialect.extended(node.node))
-    return listening(node, frame, take, timeout=Timeout.REPLY, rank=Rank.POLL)
+    return listening(node, frame, take, timeout=TimeoutClass.REPLY, rank=Priority.POLL)
 
 
 async def survey(node: Node) -> Presence:
     """Ask several times and watch for bus errors meanwhile; nobody else must be addressed at the same time."""
-    asked, error = await Together[Presence | Notice | None]([_asked(node), Listen(_is_error, WATCH)])
+    asked, error = await Gather[Presence | Notification | None]([_asked(node), WaitFor(_is_error, WATCH)])
     assert isinstance(asked, Presence)
     return asked._replace(errors=error is not None)
 
@@ -114,7 +114,7 @@ async def glance_at(dialect: Dialect, rate: int) -> None:
             cause="other devices speak on this bus, and a frame at a wrong rate breaks theirs",
             advice="connect this servo alone, and call again; nothing was written",
         )
-    await Tune(rate)
+    await SetBitrate(rate)
 
 
 async def single(node: Node) -> bool:
@@ -140,5 +140,5 @@ def _two(node: Node, found: Presence) -> RequestError:
     )
 
 
-def _is_error(notice: Notice) -> bool:
+def _is_error(notice: Notification) -> bool:
     return notice.kind == "bus error"

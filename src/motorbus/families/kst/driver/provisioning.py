@@ -12,13 +12,13 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 from motorbus.core.operation import (
-    Alone,
-    Pause,
+    Emit,
+    Exclusive,
+    Priority,
     Progress,
-    Rank,
-    Report,
-    Tune,
-    afterwards,
+    SetBitrate,
+    Sleep,
+    with_cleanup,
 )
 from motorbus.errors import NoReply, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.kst.driver.exchanges import order
@@ -98,14 +98,14 @@ async def provision(
     new = node if new_id is None else Node(checked_id(new_id), node.dialect)
     if new_rate is not None:
         code_of(new_rate)
-    rate = await Tune(0)
+    rate = await SetBitrate(0)
     job = Job(node, new, rate, rate if new_rate is None else new_rate)
-    place = await Alone(afterwards(_changed(job), lambda: Tune(rate)))
+    place = await Exclusive(with_cleanup(_changed(job), lambda: SetBitrate(rate)))
     if place is not None:
-        await Report(PowerCycleNeeded(node.node, new.node, job.new_rate))
+        await Emit(PowerCycleNeeded(node.node, new.node, job.new_rate))
         await _waited(job, place, patience)
-    await Report(Progress(STEPS - 1, STEPS, "it is back: verifying"))
-    return await Alone(afterwards(_verified(job, place), lambda: Tune(rate)))
+    await Emit(Progress(STEPS - 1, STEPS, "it is back: verifying"))
+    return await Exclusive(with_cleanup(_verified(job, place), lambda: SetBitrate(rate)))
 
 
 async def set_id(node: Node, new: int, *, patience: float = PATIENCE) -> Provisioned:
@@ -123,7 +123,7 @@ async def set_baud(node: Node, rate: int, *, patience: float = PATIENCE) -> Prov
 
 async def _changed(job: Job) -> Place | None:
     """Write and save; returns where it was found. None when it has everything already, and nothing was written."""
-    await Report(Progress(0, STEPS, "looking who is there"))
+    await Emit(Progress(0, STEPS, "looking who is there"))
     where = await _found(job)
     before = await glance(where.node)
     if (where.node.node, where.rate) == (job.new.node, job.new_rate):
@@ -132,14 +132,14 @@ async def _changed(job: Job) -> Place | None:
         await _alone_here(job, where)
     dialect = job.new.dialect
     dialect.learn_format(job.new.node, dialect.extended(where.node.node))  # it is the same servo
-    await Report(Progress(1, STEPS, f"writing to {hexadecimal(where.node.node)}"))
+    await Emit(Progress(1, STEPS, f"writing to {hexadecimal(where.node.node)}"))
     if where.node.node != job.new.node or before.reads_back not in (None, job.new.node):
         await write_node_id(where.node, job.new.node)
     if where.rate != job.new_rate:
         row = where.node.table["bit_rate_code"]
-        await order(where.node, row, code_of(job.new_rate), rank=Rank.CONFIGURATION)
+        await order(where.node, row, code_of(job.new_rate), rank=Priority.CONFIGURATION)
     seen = await glance(where.node)
-    await Report(Progress(2, STEPS, "saving"))
+    await Emit(Progress(2, STEPS, "saving"))
     await save(where.node)
     return where._replace(reads_back=seen.reads_back)
 
@@ -181,7 +181,7 @@ async def _alone_here(job: Job, where: Place) -> None:
     """A servo that comes back at another rate breaks the frames of those that stay at this one."""
     there: set[int] = set()
     for extended in sorted(job.old.dialect.formats):
-        there |= {reply.lane for reply in (await called(extended, Rank.POLL)).replies}
+        there |= {reply.lane for reply in (await called(extended, Priority.POLL)).replies}
     others = ", ".join(map(hexadecimal, sorted(there - {job.old.node, job.new.node})))
     if others:
         raise RequestError(
@@ -218,7 +218,7 @@ async def _waited(job: Job, place: Place, patience: float) -> None:
             raise _both(job, place) if arrived else _as_it_was(job, place)
         if now.at - begun > patience:
             raise _never_came(job, patience)
-        await Pause(POLL)
+        await Sleep(POLL)
 
 
 async def _arrived(job: Job, place: Place, now: Presence) -> bool:
@@ -236,7 +236,7 @@ async def _seen(job: Job, node: Node, rate: int) -> Presence:
     """One look at this id and rate; at another rate than the bus has, with the bus alone and its rate set again."""
     if rate == job.rate:
         return await glance(node)
-    return await Alone(afterwards(_tuned(node, rate), lambda: Tune(job.rate)))
+    return await Exclusive(with_cleanup(_tuned(node, rate), lambda: SetBitrate(job.rate)))
 
 
 async def _tuned(node: Node, rate: int) -> Presence:
@@ -256,7 +256,7 @@ def _forgot(job: Job, place: Place, now: Presence) -> bool:
 
 async def _verified(job: Job, place: Place | None) -> Provisioned:
     if job.moves_rate:
-        await Tune(job.new_rate)
+        await SetBitrate(job.new_rate)
     if place is not None and await _still_there(job, place):
         raise _both(job, place)
     if (await survey(job.new)).several:
@@ -271,7 +271,7 @@ async def _verified(job: Job, place: Place | None) -> Provisioned:
             advice=f"set_node_id({job.new.node}) and save() put that right; then power-cycle it, and call this again",
             node=job.new.node,
         )
-    await Report(Progress(STEPS, STEPS, "verified after the restart"))
+    await Emit(Progress(STEPS, STEPS, "verified after the restart"))
     return Provisioned(job.new.node, job.new_rate, identity.firmware, resumed=place is None)
 
 

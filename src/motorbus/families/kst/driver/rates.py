@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from motorbus.core.family import Found
-from motorbus.core.operation import Alone, Progress, Report, Tune, afterwards
+from motorbus.core.operation import Emit, Exclusive, Progress, SetBitrate, with_cleanup
 from motorbus.errors import LinkError, LinkLost, RequestError
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.dialect import PLAIN, Dialect
@@ -53,9 +53,9 @@ async def scan_bit_rates(
     for rate in rates:
         code_of(rate)
     above_zero("seconds", seconds, "s")
-    present = await Tune(0)
+    present = await SetBitrate(0)
     search = _searched(dialect, tuple(rates), isolated, seconds)
-    return await Alone(afterwards(search, lambda: Tune(present)))
+    return await Exclusive(with_cleanup(search, lambda: SetBitrate(present)))
 
 
 async def _searched(dialect: Dialect, rates: Sequence[int], isolated: bool, seconds: float) -> BitRates:
@@ -70,11 +70,11 @@ async def _searched(dialect: Dialect, rates: Sequence[int], isolated: bool, seco
             LinkError
         ) as error:  # it cannot listen, or does not have this rate, as slcan does not have 800k
             unable = error
-            await Report(Skipped(rate, error.summary))
+            await Emit(Skipped(rate, error.summary))
             continue
         if verdicts[rate] is Heard.TRAFFIC:
             return BitRates(rate, verdicts)
-        await Report(Progress(number + 1, len(rates), f"{rate} bit/s: {verdicts[rate].value}"))
+        await Emit(Progress(number + 1, len(rates), f"{rate} bit/s: {verdicts[rate].value}"))
     if unable is not None and not verdicts:
         if not isolated:
             raise _cannot_listen(unable) from unable
@@ -86,7 +86,7 @@ async def _asked(dialect: Dialect, verdicts: dict[int, Heard]) -> BitRates:
     """The first rate at which somebody answers, of those at which no errors were heard."""
     for rate in [rate for rate, verdict in verdicts.items() if verdict is Heard.SILENCE]:
         try:
-            await Tune(rate)
+            await SetBitrate(rate)
         except LinkLost:
             raise
         except LinkError:  # an adapter need not have every rate

@@ -16,17 +16,17 @@ from motorbus.core.family import Found, Identity
 from motorbus.core.operation import (
     ANY,
     EVERY_LANE,
-    Alone,
-    Answer,
+    Emit,
     Exchange,
+    Exclusive,
+    Gather,
+    Priority,
     Progress,
-    Rank,
-    Report,
-    Timeout,
-    Together,
-    Tune,
-    afterwards,
-    outcome,
+    Response,
+    SetBitrate,
+    TimeoutClass,
+    catch,
+    with_cleanup,
 )
 from motorbus.errors import LinkError, LinkLost, NoReply, WireError
 from motorbus.families.kst import wire
@@ -75,11 +75,11 @@ async def scan(ids: Sequence[int] = (), rates: Sequence[int] = (), dialect: Dial
     `Suspicion`. Writes nothing.
     """
     asked = checked_ids(ids or wire.NODES)
-    present = await Tune(0)
+    present = await SetBitrate(0)
     if not rates or tuple(rates) == (present,):
         return await at_one_rate(dialect, asked, present, broadcast=not ids)
     everywhere = _at_all_rates(dialect, asked, tuple(rates), present, broadcast=not ids)
-    return await Alone(afterwards(everywhere, lambda: Tune(present)))
+    return await Exclusive(with_cleanup(everywhere, lambda: SetBitrate(present)))
 
 
 async def _at_all_rates(
@@ -88,14 +88,14 @@ async def _at_all_rates(
     found: list[Found] = []
     for index, rate in enumerate(rates):
         if rate != present and await _in_use(dialect, rate):
-            await Report(Skipped(rate, Heard.ERRORS.value))
+            await Emit(Skipped(rate, Heard.ERRORS.value))
             continue
         try:
-            await Tune(rate)
+            await SetBitrate(rate)
         except LinkLost:
             raise
         except LinkError as unable:  # an adapter need not have every rate
-            await Report(Skipped(rate, unable.summary))
+            await Emit(Skipped(rate, unable.summary))
             continue
         careful = rate != present
         part = (index, len(rates))
@@ -131,18 +131,18 @@ async def at_one_rate(
     errors = dialect.memory.errors if dialect.memory else 0
     there = await _called(dialect, asked, rate) if broadcast else []
     if careful and not there and dialect.memory and dialect.memory.errors > errors:
-        await Report(Suspicion(0, rate, BROKEN))
+        await Emit(Suspicion(0, rate, BROKEN))
         return []
     total = PASSES * part[1] * len(asked)
     for number in range(PASSES):
         done = (PASSES * part[0] + number) * len(asked)
         for batch in _batches([node for node in asked if node not in there]):
             looks = [_looked(Node(node, dialect), rate) for node in batch]
-            there += [node for node in await Together(looks) if node is not None]
+            there += [node for node in await Gather(looks) if node is not None]
             done += len(batch)
-            await Report(Progress(done, total, f"ids up to {batch[-1]} at {rate} bit/s"))
+            await Emit(Progress(done, total, f"ids up to {batch[-1]} at {rate} bit/s"))
     if dialect.memory and dialect.memory.errors > errors:
-        await Report(Suspicion(0, rate, _errors(dialect.memory.errors - errors)))
+        await Emit(Suspicion(0, rate, _errors(dialect.memory.errors - errors)))
     if not there and not careful:
         return await _strangers(dialect, asked, rate, broadcast=broadcast)
     if not broadcast:
@@ -160,11 +160,11 @@ async def _strangers(dialect: Dialect, asked: Sequence[int], rate: int, *, broad
     if broadcast:
         await called(extended)
     for batch in _batches([] if heard_of else asked):
-        await Together([outcome(_in_vain(Node(node, dialect), extended)) for node in batch])
+        await Gather([catch(_in_vain(Node(node, dialect), extended)) for node in batch])
     found = [Found(node, rate, None) for node in asked if node in heard_of]
     for one in found:
-        await Report(one)
-        await Report(Suspicion(one.node, rate, OTHER_FORMAT[extended]))
+        await Emit(one)
+        await Emit(Suspicion(one.node, rate, OTHER_FORMAT[extended]))
     return found
 
 
@@ -187,21 +187,21 @@ def _batches(nodes: Sequence[int]) -> Iterator[Sequence[int]]:
 async def _counted(dialect: Dialect, nodes: Sequence[int], rate: int) -> None:
     """Ask each once more, and wait whether a second answer comes; a broadcast has shown that already."""
     for batch in _batches(nodes):
-        looks = await Together([glance(Node(node, dialect)) for node in batch])
+        looks = await Gather([glance(Node(node, dialect)) for node in batch])
         for node, look in zip(batch, looks, strict=True):
             if look.several:
-                await Report(Suspicion(node, rate, TWICE))
+                await Emit(Suspicion(node, rate, TWICE))
 
 
 async def _identified(dialect: Dialect, nodes: Sequence[int], rate: int) -> list[Found]:
     found: list[Found] = []
     for batch in _batches(nodes):
-        told = await Together([outcome(identify(Node(node, dialect))) for node in batch])
-        places = await Together([outcome(position(Node(node, dialect))) for node in batch])
+        told = await Gather([catch(identify(Node(node, dialect))) for node in batch])
+        places = await Gather([catch(position(Node(node, dialect))) for node in batch])
         for node, one, place in zip(batch, told, places, strict=True):
             found.append(Found(node, rate, one if isinstance(one, Identity) else None))
             if isinstance(one, Identity) and isinstance(place, NoReply):
-                await Report(Suspicion(node, rate, TORN))
+                await Emit(Suspicion(node, rate, TORN))
     return found
 
 
@@ -218,14 +218,14 @@ async def _called(dialect: Dialect, asked: Sequence[int], rate: int) -> list[int
             if node not in there:
                 there.append(node)
                 dialect.learn_format(node, extended)
-                await Report(Found(node, rate, None))
+                await Emit(Found(node, rate, None))
             if len(replies) > 1:
-                await Report(Suspicion(node, rate, TWICE))
+                await Emit(Suspicion(node, rate, TWICE))
             await _compared(node, rate, replies[0])
     return there
 
 
-def called(extended: bool, rank: Rank = Rank.CONFIGURATION) -> Exchange[Answer]:
+def called(extended: bool, rank: Priority = Priority.CONFIGURATION) -> Exchange[Response]:
     """Read the node id of everyone at once; the replies come one after the other, by arbitration."""
     return Exchange(
         wire.encode_upload(wire.EVERYONE, NODE_ID, extended=extended),
@@ -236,7 +236,7 @@ def called(extended: bool, rank: Rank = Rank.CONFIGURATION) -> Exchange[Answer]:
     )
 
 
-def _about_ids(answer: Answer) -> Answer:
+def _about_ids(answer: Response) -> Response:
     """Without what came late from something else."""
     told = [(reply, wire.decode_reply(reply.data)) for reply in answer.replies]
     mine = tuple(reply for reply, one in told if one is not None and one.index in (NODE_ID, 0))
@@ -253,7 +253,7 @@ async def _compared(node: int, rate: int, reply: SdoReply | None) -> None:
     """Tell when the id that was read is not the one that answered."""
     if reply is not None and reply.kind == "upload" and reply.data[:1] != bytes((node,)):
         what = f"answers as {node} and reads back the id {reply.data[0]}: written, and not in force before a restart"
-        await Report(Suspicion(node, rate, what))
+        await Emit(Suspicion(node, rate, what))
 
 
 # --- one by one ---------------------------------------------------------------------------------------------
@@ -268,17 +268,17 @@ async def _looked(node: Node, rate: int) -> int | None:
         except NoReply:
             continue
         except WireError as error:
-            await Report(Suspicion(node.node, rate, f"{TWICE} ({error.summary})"))
+            await Emit(Suspicion(node.node, rate, f"{TWICE} ({error.summary})"))
             reply = None
         node.dialect.learn_format(node.node, extended)
-        await Report(Found(node.node, rate, None))
+        await Emit(Found(node.node, rate, None))
         await _compared(node.node, rate, reply)
         return node.node
     return None
 
 
 def _present(node: Node, extended: bool) -> Exchange[SdoReply | None]:
-    def read(answer: Answer) -> SdoReply | None:
+    def read(answer: Response) -> SdoReply | None:
         return wire.decode_reply(answer.replies[0].data)
 
     return Exchange(
@@ -286,7 +286,7 @@ def _present(node: Node, extended: bool) -> Exchange[SdoReply | None]:
         (wire.upload_due(node.node, NODE_ID),),
         read,
         lane=node.node,
-        rank=Rank.CONFIGURATION,
-        timeout=Timeout.SCAN,
+        rank=Priority.CONFIGURATION,
+        timeout=TimeoutClass.SCAN,
         repeatable=True,
     )

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from motorbus.core.entry import is_number, shown
 from motorbus.core.family import Positions
-from motorbus.core.operation import Exchange, Goal, Refusal, Stops, Together
+from motorbus.core.operation import Exchange, Gather, Goal, Refusal, Stops
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.kst.driver.exchanges import answers, decided, download
 from motorbus.families.kst.driver.feedback import position_exchange
@@ -33,7 +33,7 @@ async def train(servos: Sequence[Node], *, rate: int) -> Train:
             "an id is named twice" if servos else "no servo is named",
             advice="name each servo once; nothing was sent",
         )
-    found = await Together([_known(node) for node in servos])
+    found = await Gather([_known(node) for node in servos])
     return Train(dict(zip(servos, found, strict=True)))
 
 
@@ -70,7 +70,7 @@ class Train:
         """
         for id, speed in speeds.items():
             _check_speed(self._lead(id).node, speed)
-        await Together([_begin(lead.node) for lead in self._leads.values()])
+        await Gather([_begin(lead.node) for lead in self._leads.values()])
 
     def _lead(self, id: int) -> _Lead:
         try:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from motorbus.core.operation import Due
+from motorbus.core.operation import Expected
 from motorbus.families.kst.wire.frames import LENGTH, Multiplexer
 
 
@@ -62,16 +62,16 @@ def _refuses(abort: Key, request: Key) -> bool:
     return abort.index == request.index and abort.subindex in (0, request.subindex)
 
 
-def upload_due(node: int, index: int, subindex: int = 0) -> Due:
+def upload_due(node: int, index: int, subindex: int = 0) -> Expected:
     """The reply to `encode_upload`."""
-    return Due(node, Key("upload", index, subindex), LENGTH)
+    return Expected(node, Key("upload", index, subindex), LENGTH)
 
 
-def download_due(node: int, index: int, subindex: int = 0) -> Due:
+def download_due(node: int, index: int, subindex: int = 0) -> Expected:
     """The reply to `encode_download`."""
-    return Due(node, Key("download", index, subindex), LENGTH)
+    return Expected(node, Key("download", index, subindex), LENGTH)
 
 
-def segment_due(node: int, toggle: int) -> Due:
+def segment_due(node: int, toggle: int) -> Expected:
     """The reply to `encode_segment`."""
-    return Due(node, Key("segment", toggle=int(toggle)), LENGTH)
+    return Expected(node, Key("segment", toggle=int(toggle)), LENGTH)

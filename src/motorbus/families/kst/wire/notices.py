@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Notice
+from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Notification
 from motorbus.errors import RequestError
 from motorbus.families.kst.wire.frames import EVERYONE, LENGTH, NODES, REPLY, REQUEST, one
 
@@ -63,7 +63,7 @@ def encode_alarm(node: int, data: bytes = LOW_VOLTAGE, *, extended: bool = False
     return CanFrame(ALARM + one(node), data, extended)
 
 
-def decode_notice(frame: CanFrame) -> Notice | None:
+def decode_notice(frame: CanFrame) -> Notification | None:
     """What came unasked, in either id format; None for every other frame.
 
     Kinds: "report", "alarm", "emergency", "heartbeat", and "bus error" (of node 0) for what the adapter reports. The
@@ -71,10 +71,10 @@ def decode_notice(frame: CanFrame) -> Notice | None:
     """
     identifier, data, _ = frame
     if identifier & ERROR_FLAG:
-        return Notice(EVERYONE, "bus error", data)
+        return Notification(EVERYONE, "bus error", data)
     node = identifier & 0x7F
     kind = _kind(identifier - node, data) if node else ""
-    return Notice(node, kind, data) if kind else None
+    return Notification(node, kind, data) if kind else None
 
 
 def _kind(base: int, data: bytes) -> str:

@@ -24,13 +24,13 @@ from motorbus.core.operation import (
     INTENT,
     OUTCOME,
     REACHED,
-    Alone,
-    Journal,
-    Operation,
-    Pause,
-    Report,
-    afterwards,
-    outcome,
+    Emit,
+    Exclusive,
+    JournalEntry,
+    Procedure,
+    Sleep,
+    catch,
+    with_cleanup,
 )
 from motorbus.errors import LinkError, MotorbusError, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.stepper.driver import reading
@@ -77,8 +77,8 @@ class Accord(NamedTuple):
     all is edited, just before the motion: whatever it raises, nothing was moved.
     """
 
-    settled: Callable[[Project], Operation[Project]]
-    ready: Callable[[Project], Operation[None]]
+    settled: Callable[[Project], Procedure[Project]]
+    ready: Callable[[Project], Procedure[None]]
 
 
 class Loan:
@@ -168,8 +168,8 @@ def _whole(values: Mapping[str, object]) -> dict[str, int]:
 async def borrowed(
     node: Node,
     verb: str,
-    wanted: Callable[[Project], Operation[Project]],
-    motion: Callable[[Project], Operation[T]],
+    wanted: Callable[[Project], Procedure[Project]],
+    motion: Callable[[Project], Procedure[T]],
     *,
     leave: bool = False,
     accord: Accord | None = None,
@@ -186,19 +186,19 @@ async def borrowed(
     after the stop, or when the stop is not accepted: the motor may be turning then, and a note says that project 1 is
     still borrowed.
     """
-    return await Alone(_borrowing(node, verb, wanted, motion, leave, accord))
+    return await Exclusive(_borrowing(node, verb, wanted, motion, leave, accord))
 
 
 async def _borrowing(
     node: Node,
     verb: str,
-    wanted: Callable[[Project], Operation[Project]],
-    motion: Callable[[Project], Operation[T]],
+    wanted: Callable[[Project], Procedure[Project]],
+    motion: Callable[[Project], Procedure[T]],
     leave: bool,
     accord: Accord | None,
 ) -> T:
     await refuse_unless_idle(node, f"{verb}()")
-    await Report(Journal(verb, ASKED, {"node": node.node}))
+    await Emit(JournalEntry(verb, ASKED, {"node": node.node}))
     image = await reading.image(node, PROJECT)
     loan = Loan(verb, image, node.order, await wanted(decode_image(image, node.order)))
     if loan.needed:
@@ -207,7 +207,7 @@ async def _borrowing(
         loan = Loan(verb, image, node.order, await accord.settled(loan.wanted))
         _refuse(node, loan, leave)
     try:
-        value = await afterwards(_lent(node, loan, motion, leave, accord), lambda: _ended(node, loan))
+        value = await with_cleanup(_lent(node, loan, motion, leave, accord), lambda: _ended(node, loan))
     except BaseException as error:
         _annotate(error, loan)
         raise
@@ -229,7 +229,7 @@ def _annotate(error: BaseException, loan: Loan) -> None:
 async def _lent(
     node: Node,
     loan: Loan,
-    motion: Callable[[Project], Operation[T]],
+    motion: Callable[[Project], Procedure[T]],
     leave: bool,
     accord: Accord | None,
 ) -> T:
@@ -239,7 +239,7 @@ async def _lent(
         loan.seen = found.view == "working"
         if not loan.seen:
             raise _unseen(node)
-        await Report(Journal(loan.verb, BORROWED, loan.name(node)))
+        await Emit(JournalEntry(loan.verb, BORROWED, loan.name(node)))
     if accord is not None:
         await accord.ready(loan.wanted)
     loan.restless = loan.cut = True
@@ -253,9 +253,9 @@ async def _recorded(node: Node, loan: Loan) -> None:
     """Record the intent. What cannot be recorded does not begin, and nothing need be given back."""
     loan.open = True
     try:
-        await Report(Journal(loan.verb, INTENT, loan.facts(node)))
+        await Emit(JournalEntry(loan.verb, INTENT, loan.facts(node)))
     except MotorbusError:
-        told = await outcome(_closed(node, loan))  # the record may be on the disk all the same
+        told = await catch(_closed(node, loan))  # the record may be on the disk all the same
         if isinstance(told, RequestError):  # that of another change says so itself
             loan.open = False
         raise
@@ -276,7 +276,7 @@ async def _ended(node: Node, loan: Loan) -> None:
 async def _still_there(node: Node) -> None:
     """Read something: an acknowledgement of 11 bytes may be an echo of what was said, and nobody has heard it."""
     for left in reversed(range(TRIES)):
-        told = await outcome(reading.dump_once(node, PROJECT))
+        told = await catch(reading.dump_once(node, PROJECT))
         if not isinstance(told, MotorbusError):
             return
         if isinstance(told, LinkError):
@@ -306,8 +306,8 @@ async def given_back(node: Node, loan: Loan) -> None:
         rest = slowing(replace(loan.wanted, total_steps=1))
         with suppress(Exception):  # whatever the listener says to that, the project is given back
             if rest >= LONG:
-                await Report(Slowing(rest))
-        await Pause(rest)
+                await Emit(Slowing(rest))
+        await Sleep(rest)
         loan.cut = False
     if not loan.restored:
         unsaved = node.memory.unsaved
@@ -322,14 +322,14 @@ async def given_back(node: Node, loan: Loan) -> None:
 async def _insisted(node: Node, loan: Loan) -> MotorbusError | None:
     told: MotorbusError | None = None
     for _ in range(TRIES):
-        told = await outcome(_restored(node, loan))
+        told = await catch(_restored(node, loan))
         if told is None or isinstance(told, LinkError):
             break
     return told
 
 
 async def _closed(node: Node, loan: Loan) -> None:
-    await Report(Journal(loan.verb, OUTCOME, {"outcome": GIVEN_BACK, **loan.name(node)}))
+    await Emit(JournalEntry(loan.verb, OUTCOME, {"outcome": GIVEN_BACK, **loan.name(node)}))
     loan.open = False
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Final
 
-from motorbus.core.operation import Alone, Pause, Progress, Report
+from motorbus.core.operation import Emit, Exclusive, Progress, Sleep
 from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.costs import Taken, taken
@@ -39,16 +39,16 @@ async def backup(node: Node, projects: Iterable[int] = ALL) -> Backup:
     cut off, for then it would keep what was lent; as `dump` else.
     """
     numbers = _numbers(projects)
-    return await Alone(_read(node, numbers))
+    return await Exclusive(_read(node, numbers))
 
 
 async def _read(node: Node, numbers: tuple[int, ...]) -> Backup:
     await refuse_while_lent(node, "backup", reads=True)
     dumps = {}
     for done, number in enumerate(numbers):
-        await Report(Progress(done, len(numbers), f"reading project {number}"))
+        await Emit(Progress(done, len(numbers), f"reading project {number}"))
         dumps[number] = wire.encode_dump(number, (await taken(node, number)).image)
-    await Report(Progress(len(numbers), len(numbers), "reading projects"))
+    await Emit(Progress(len(numbers), len(numbers), "reading projects"))
     return Backup(dumps=dumps, order=node.order)
 
 
@@ -70,7 +70,7 @@ async def restore(node: Node, backup: Backup, projects: Iterable[int] | None = N
                 expected=error.expected,
                 advice="restore the others; nothing was sent",
             )
-    return await Alone(_restored(node, backup, meant))
+    return await Exclusive(_restored(node, backup, meant))
 
 
 async def _restored(node: Node, backup: Backup, meant: dict[int, Project]) -> tuple[Written, ...]:
@@ -78,7 +78,7 @@ async def _restored(node: Node, backup: Backup, meant: dict[int, Project]) -> tu
     done: list[Written] = []
     try:
         for number, project in meant.items():
-            began = await Pause(0)
+            began = await Sleep(0)
             found = await taken(node, number)
             image = backup.image(number)
             if project.is_cleared:
@@ -99,7 +99,7 @@ async def _emptied(node: Node, found: Taken, number: int, image: bytes, began: f
     if not is_blank(before):
         commands, dumps = await cleared(node, number)
         proof = Proof.CLEARED
-    ended = await Pause(0)
+    ended = await Sleep(0)
     return Written(
         number, tuple(changes(before, Project())) if commands else (), commands, found.dumps + dumps, ended - began,
         bool(commands), proof, unwritable(found.image, image),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Tune
+from motorbus.core.operation import SetBitrate
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.line import BITS
 from motorbus.families.stepper.driver.node import Node
@@ -65,8 +65,8 @@ class Taken(NamedTuple):
 
 
 async def taken(node: Node, project: int) -> Taken:
-    """Read a project until two dumps agree, with a clock. Call it inside `Alone`. Raises as `dump`."""
-    rate = await Tune(0)
+    """Read a project until two dumps agree, with a clock. Call it inside `Exclusive`. Raises as `dump`."""
+    rate = await SetBitrate(0)
     lasted: list[float] = []
     seen = await readings(node, project, lasted)
     image = agreed(node, project, seen)[wire.REPLY_LENGTH :]

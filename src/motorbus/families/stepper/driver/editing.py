@@ -19,11 +19,11 @@ from motorbus.core.entry import Entry, Value
 from motorbus.core.operation import (
     ASKED,
     READABLE,
+    Emit,
     Exchange,
-    Journal,
+    JournalEntry,
+    Priority,
     Progress,
-    Rank,
-    Report,
     Runnable,
 )
 from motorbus.errors import RequestError, VerificationFailed
@@ -111,7 +111,7 @@ async def brought(node: Node, before_image: bytes, after: Project, *, every: boo
     before, and the controller shows what is stored, view "stored": what is edited cannot be seen then, but each field
     of it was acknowledged. On a bus where that has shown, every field is sent at once.
 
-    Edits of another project that were not saved are lost. Call it inside `Alone`, for another caller's selection in
+    Edits of another project that were not saved are lost. Call it inside `Exclusive`, for another caller's selection in
     between would lead these edits elsewhere. Reports `Progress`. Raises RequestError for a number that may not be
     sent, before anything is; VerificationFailed when the read-back is neither; OutcomeUnknown when a command was not
     acknowledged. An error from the middle has a note that says what may be half written.
@@ -155,11 +155,11 @@ async def refuse_while_lent(node: Node, verb: str, *, reads: bool = False) -> No
     """Raise RequestError while project 1 is lent to a motion that was cut off: what was lent would be kept.
 
     Unless it only `reads`, also while something may still turn: what editing does then nobody knows. Call it inside
-    `Alone`: a motion that is not cut off has the bus for itself until it has given project 1 back.
+    `Exclusive`: a motion that is not cut off has the bus for itself until it has given project 1 back.
     """
     if not reads:
         await refuse_unless_idle(node, f"{verb}()")
-    await Report(Journal(verb, ASKED, {"node": node.node, READABLE: reads}))
+    await Emit(JournalEntry(verb, ASKED, {"node": node.node, READABLE: reads}))
 
 
 def held(node: Node, image: bytes, number: int) -> Project:
@@ -242,7 +242,7 @@ def _filled(project: Project) -> int:
 
 def _order(node: Node, edit: Edit) -> Exchange[None]:
     values: dict[str, Any] = dict(edit.values)
-    return command(node, edit.command, nothing, rank=Rank.CONFIGURATION, expert=True, **values)
+    return command(node, edit.command, nothing, rank=Priority.CONFIGURATION, expert=True, **values)
 
 
 async def _told(node: Node, project: int, orders: Sequence[Exchange[None]]) -> None:
@@ -251,12 +251,12 @@ async def _told(node: Node, project: int, orders: Sequence[Exchange[None]]) -> N
     number = 0
     try:
         for number, order in enumerate(orders):
-            await Report(Progress(number, len(orders), f"writing project {project}"))
+            await Emit(Progress(number, len(orders), f"writing project {project}"))
             await order
     except BaseException as error:
         error.add_note(f"{number} of {len(orders)} commands were acknowledged; {_unsaved(project)}")
         raise
-    await Report(Progress(len(orders), len(orders), f"writing project {project}"))
+    await Emit(Progress(len(orders), len(orders), f"writing project {project}"))
 
 
 def _unsaved(project: int) -> str:

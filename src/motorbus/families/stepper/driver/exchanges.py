@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-from motorbus.core.operation import Answer, Due, Exchange, Goal, Rank, Refusal, Timeout
+from motorbus.core.operation import Exchange, Expected, Goal, Priority, Refusal, Response, TimeoutClass
 from motorbus.errors import UnexpectedReply
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.node import Node
@@ -21,7 +21,7 @@ T = TypeVar("T")
 def timed(said: Exchange[object]) -> Exchange[float]:
     """The same exchange, which gives the moment of its reply (s), once that is the right one."""
 
-    def at(answer: Answer) -> float:
+    def at(answer: Response) -> float:
         if said.read is not None:
             said.read(answer)
         return answer.at
@@ -34,8 +34,8 @@ def command(
     name: str,
     read: Callable[[bytes], T],
     *,
-    rank: Rank = Rank.POLL,
-    timeout: Timeout | None = None,
+    rank: Priority = Priority.POLL,
+    timeout: TimeoutClass | None = None,
     goals: tuple[Goal, ...] = (),
     refusal: Refusal | None = None,
     expert: bool = False,
@@ -54,7 +54,7 @@ def command(
     request = wire.encode(name, motor=node.motor, **values)
     right = wire.replies_due(request)
 
-    def judged(answer: Answer) -> T:
+    def judged(answer: Response) -> T:
         reply = answer.replies[0].data
         if reply[: wire.REPLY_LENGTH] not in right and (different := wire.difference(request, reply)):
             raise UnexpectedReply(
@@ -69,7 +69,7 @@ def command(
 
     return Exchange(
         request,
-        (Due(node.node, wire.key_of(next(iter(right))), wire.reply_length(order.command)),),
+        (Expected(node.node, wire.key_of(next(iter(right))), wire.reply_length(order.command)),),
         judged,
         rank=rank,
         effect=order.effect,

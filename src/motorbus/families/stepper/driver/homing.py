@@ -12,7 +12,7 @@ from __future__ import annotations
 from math import floor, inf, tau
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Pause, Progress, Report
+from motorbus.core.operation import Emit, Progress, Sleep
 from motorbus.errors import NotHomed
 from motorbus.families.stepper.driver import commands, goals
 from motorbus.families.stepper.driver.borrowing import borrowed
@@ -109,18 +109,18 @@ async def _refuse_active(node: Node) -> None:
 
 async def _until_active(node: Node, project: Project, deadline: float, watch: Watch) -> Homed:
     await commands.motion(node, "home", goals.of_jog(node, project, -1), watch.refusal)
-    began = now = told = await Pause(0)
+    began = now = told = await Sleep(0)
     row = 0
     while now - began < deadline:
         row = row + 1 if await read_input(node, HOME_INPUT) else 0
         watch.check()
-        now = await Pause(0)
+        now = await Sleep(0)
         if row >= READS:
             velocity = project.step(1).speed * tau / 60
             return Homed(node.node, now - began, velocity, Promise.STOP_ACCEPTED)
         if now - told >= TOLD:
             told = now
-            await Report(Progress(round(1000 * (now - began)), round(1000 * deadline), "homing"))
+            await Emit(Progress(round(1000 * (now - began)), round(1000 * deadline), "homing"))
     raise NotHomed(
         f"input {HOME_INPUT} was not active within {deadline:g} s, so homing was stopped",
         expected=f"input {HOME_INPUT} active",

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from math import inf
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Pause, Report
+from motorbus.core.operation import Emit, Sleep
 from motorbus.errors import FramingError, RequestError
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.reading import READINGS, read_input
@@ -107,15 +107,15 @@ async def watch_inputs(node: Node, ports: Iterable[int] = PORTS, seconds: float 
     within(seconds, inf, "seconds")
     levels = Levels(await inputs(node, chosen))
     changes: list[InputChanged] = []
-    rounds, began = 0, await Pause(0)
+    rounds, began = 0, await Sleep(0)
     now = began
     while now - began < seconds:
         for port in chosen:
             active = await read_input(node, port)
-            now = await Pause(0)
+            now = await Sleep(0)
             if (change := levels.take(port, active, now)) is not None:
                 changes.append(change)
-                await Report(change)
+                await Emit(change)
         rounds += 1
     return Watched(dict(levels.believed), tuple(changes), rounds, now - began)
 

@@ -18,7 +18,7 @@ from fractions import Fraction
 from math import copysign, tau
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Pause
+from motorbus.core.operation import Sleep
 from motorbus.errors import RequestError
 from motorbus.families.stepper import execution, wire
 from motorbus.families.stepper.driver import commands, goals
@@ -203,7 +203,7 @@ async def single(node: Node, project: Project, watch: Watch, *, wait: bool = Tru
     if wait:
         await waited(watch, seconds, "moving")
     else:
-        node.memory.turning = await Pause(0) + seconds
+        node.memory.turning = await Sleep(0) + seconds
     angle = step.sign * count * tau / float(project.pulses_per_turn or 1)
     promise = Promise.STOP_ACCEPTED if wait else None
     return Moved(node.node, angle, step.sign * _velocity(project), seconds, promise)

@@ -14,7 +14,7 @@ from fractions import Fraction
 from math import tau
 from typing import Final, NamedTuple, TypeVar
 
-from motorbus.core.operation import Operation, Pause, Tune, outcome
+from motorbus.core.operation import Procedure, SetBitrate, Sleep, catch
 from motorbus.core.timing import Timing, Turned
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.stepper import wire
@@ -113,14 +113,14 @@ async def _kept(
     async def motion(project: Project) -> Turned:
         return await _turned(node, project, true, watch, tempo)
 
-    def told(work: Operation[T]) -> Operation[T]:
+    def told(work: Procedure[T]) -> Procedure[T]:
         return _told(timing, honest(watch, work))
 
     accord = Accord(lambda quick: told(settled(quick)), lambda project: told(ready(project)))
     return await borrowed(node, VERB, wanted, lambda project: told(motion(project)), accord=accord)
 
 
-async def _told(timing: Timing, work: Operation[T]) -> T:
+async def _told(timing: Timing, work: Procedure[T]) -> T:
     """Let the others know at once when it fails: giving project 1 back takes seconds, and they would move on."""
     try:
         return await work
@@ -157,7 +157,7 @@ async def _on_guard(node: Node, project: Project, watch: Watch) -> None:
 
     Only what moves may ask how many stops have left; so this is an order that never leaves.
     """
-    told = await outcome(commands.motion(node, "run_once", goals.of_move(node, project), watch.look))
+    told = await catch(commands.motion(node, "run_once", goals.of_move(node, project), watch.look))
     if isinstance(told, MotorbusError) and told is not watch.looked:
         raise told
 
@@ -185,10 +185,10 @@ async def _tempo(node: Node) -> Tempo:
     That a motion begins when the last byte of its order was heard is an assumption; an answer takes as much longer as
     the controller thinks, which on a line where the bus is quiet before each question nobody can tell.
     """
-    rate = await Tune(0)
+    rate = await SetBitrate(0)
     answers: list[float] = []
     while len(answers) < READS or (min(answers) > quiet_time(rate) and len(answers) < DOUBTS):
-        left = await Pause(0)
+        left = await Sleep(0)
         answers.append(await timed(read_input(node, _INPUT)) - left)
     byte, quickest = BITS / rate, min(answers)
     air = byte * (wire.REQUEST_LENGTH + wire.REPLY_LENGTH)
@@ -204,7 +204,7 @@ async def _turned(node: Node, project: Project, true: Project, watch: Watch, tem
     """
     move, sign = moved(project), project.step(1).sign
     pulse = tau / float(true.pulses_per_turn or 1)
-    left = await Pause(0)
+    left = await Sleep(0)
     answered = await timed(commands.motion(node, "run_once", goals.of_move(node, true), watch.refusal))
     await waited(watch, longest(project, move.pulses), "moving")
     first = move.moment(1)

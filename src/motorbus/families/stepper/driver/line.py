@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from motorbus.core.operation import ANY, Exchange, Timeout
+from motorbus.core.operation import ANY, Exchange, TimeoutClass
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.table import DUMP_ENDS, RATE, REPLY, STORE
 
@@ -22,7 +22,7 @@ def air_time(exchange: Exchange[Any], rate: int) -> float:
 
 def turnaround(exchange: Exchange[Any]) -> float:
     """s that the controller may think."""
-    if exchange.timeout is Timeout.STORE:
+    if exchange.timeout is TimeoutClass.STORE:
         return STORE
     due = () if exchange.replies is ANY else exchange.replies
     if any(one.length == wire.DUMP_LENGTH for one in due):

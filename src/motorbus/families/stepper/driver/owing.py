@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import INTENT, OUTCOME, READABLE, Journal, Report, outcome
+from motorbus.core.operation import INTENT, OUTCOME, READABLE, Emit, JournalEntry, catch
 from motorbus.errors import LinkError
 from motorbus.families.stepper.driver.node import Node
 
@@ -36,7 +36,7 @@ async def owed(node: Node, project: int) -> None:
     }
     node.memory.owed = True  # before it is written down: another run that ends now does not settle this one
     try:
-        await Report(Journal(RUN, INTENT, facts))
+        await Emit(JournalEntry(RUN, INTENT, facts))
     except BaseException:
         node.memory.owed = False
         raise
@@ -48,6 +48,6 @@ async def settled(node: Node, how: str) -> None:
     Where there is no journal, or that has another change open, there is nothing to do.
     """
     node.memory.owed = False
-    told = await outcome(Report(Journal(RUN, OUTCOME, {"outcome": how})))
+    told = await catch(Emit(JournalEntry(RUN, OUTCOME, {"outcome": how})))
     if isinstance(told, LinkError):
-        await outcome(Report(Unrecorded(how, told.summary)))
+        await catch(Emit(Unrecorded(how, told.summary)))

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from motorbus.core.entry import Entry, Value
-from motorbus.core.operation import Exchange, Pause, Timeout
+from motorbus.core.operation import Exchange, Sleep, TimeoutClass
 from motorbus.errors import FramingError, RequestError, UnexpectedReply
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.exchanges import command
@@ -27,7 +27,7 @@ _ALIKE: Final = 3
 """Of so many readings each byte is the same, once two have differed: more than half of them all."""
 
 
-def dump_once(node: Node, project: int, timeout: Timeout | None = None) -> Exchange[bytes]:
+def dump_once(node: Node, project: int, timeout: TimeoutClass | None = None) -> Exchange[bytes]:
     """The 226 bytes of a project, 1 to 4, as they come once."""
     return command(node, "read_project", bytes, project=project, timeout=timeout)
 
@@ -53,10 +53,10 @@ async def readings(node: Node, project: int, lasted: list[float] | None = None) 
     """
     seen: list[bytes] = []
     while len(seen) < READINGS and not vote(seen):
-        began = await Pause(0)
+        began = await Sleep(0)
         seen.append(await dump_once(node, project))
         if lasted is not None:
-            lasted.append(await Pause(0) - began)
+            lasted.append(await Sleep(0) - began)
     return seen
 
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final
 
-from motorbus.core.operation import REACHED, Alone, Journal, Report
+from motorbus.core.operation import REACHED, Emit, Exclusive, JournalEntry
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.stepper.driver import characterising, reading
 from motorbus.families.stepper.driver.borrowing import GIVEN_BACK, NOTE, PROJECT, Loan, given_back, loan_of
@@ -53,7 +53,7 @@ async def recover(node: Node, change: str, facts: Mapping[str, Any], *, alone: b
                 node=node.node,
             )
     try:
-        return await Alone(_recovered(node, loan, facts))
+        return await Exclusive(_recovered(node, loan, facts))
     except BaseException as error:
         if not isinstance(error, MotorbusError):  # one of ours says itself what is wrong
             error.add_note(NOTE)
@@ -62,7 +62,7 @@ async def recover(node: Node, change: str, facts: Mapping[str, Any], *, alone: b
 
 async def _recovered(node: Node, loan: Loan, facts: Mapping[str, Any]) -> str:
     told = {**loan.facts(node), REACHED: list(facts.get(REACHED, ()))}
-    await Report(Journal(loan.verb, RESUMED, told))
+    await Emit(JournalEntry(loan.verb, RESUMED, told))
     await ended(node, BY_HAND)
     await _refuse_written(node, loan)
     loan.cut = True  # it may have turned until now

@@ -13,17 +13,17 @@ from typing import Final, NamedTuple
 
 from motorbus.core.operation import (
     ASKED,
-    Alone,
-    Journal,
-    Listen,
-    Notice,
-    Operation,
-    Pause,
-    Report,
+    Emit,
+    Exclusive,
+    Gather,
+    JournalEntry,
+    Notification,
+    Procedure,
+    Sleep,
     Stops,
-    Together,
-    afterwards,
-    outcome,
+    WaitFor,
+    catch,
+    with_cleanup,
 )
 from motorbus.errors import (
     Interrupted,
@@ -79,7 +79,7 @@ async def start_project(
     """
     asked = _Asked(checked_project(project), _checked(how), endless, stop_first, expert)
     watch = Watch(node)
-    return await honest(watch, Alone(_started(node, asked, watch)))
+    return await honest(watch, Exclusive(_started(node, asked, watch)))
 
 
 async def run(
@@ -130,7 +130,7 @@ async def run(
 
 
 async def _waited(
-    node: Node, project: int, course: _Course, watch: Watch, branches: Iterable[Operation[None]]
+    node: Node, project: int, course: _Course, watch: Watch, branches: Iterable[Procedure[None]]
 ) -> None:
     """Run the branches; the journal gets an end that is known, whatever else goes wrong."""
 
@@ -139,7 +139,7 @@ async def _waited(
             await settled(node, course.wait.ran.outcome.value)
 
     try:
-        await afterwards(Together([_failing(course, branch) for branch in branches]), settle)
+        await with_cleanup(Gather([_failing(course, branch) for branch in branches]), settle)
     except MotorbusError:
         raise
     except BaseException as interruption:
@@ -186,12 +186,12 @@ async def _ready(node: Node, asked: _Asked, watch: Watch) -> Plan:
         await settled(node, "stopped")
     else:
         await refuse_unless_idle(node, f"starting project {asked.project}")
-    await Report(Journal(RUN, ASKED, {"node": node.node}))
+    await Emit(JournalEntry(RUN, ASKED, {"node": node.node}))
     program = await reading.read_project(node, asked.project)
     plan = program.plan(asked.how)
     _judge(program, plan, asked.endless, asked.expert)
     if asked.stop_first:
-        await Pause(slowing(program.project, asked.how))  # of this one, for the other is not known
+        await Sleep(slowing(program.project, asked.how))  # of this one, for the other is not known
     return plan
 
 
@@ -272,11 +272,11 @@ class _Course:
     def over(self) -> bool:
         return self.failed or (self.wait is not None and self.wait.ran is not None)
 
-    def heard(self, notice: Notice) -> bool:
+    def heard(self, notice: Notification) -> bool:
         return self.wait is not None and self.wait.heard(notice)
 
 
-async def _failing(course: _Course, branch: Operation[None]) -> None:
+async def _failing(course: _Course, branch: Procedure[None]) -> None:
     try:
         await branch
     except BaseException:
@@ -285,13 +285,13 @@ async def _failing(course: _Course, branch: Operation[None]) -> None:
 
 
 async def _launched(node: Node, asked: _Asked, course: _Course, watch: Watch) -> None:
-    await Alone(_launching(node, asked, course, watch))
+    await Exclusive(_launching(node, asked, course, watch))
 
 
 async def _launching(node: Node, asked: _Asked, course: _Course, watch: Watch) -> None:
     plan = await _ready(node, asked, watch)
     course.levels = Levels(await inputs(node, course.ports))
-    course.wait = wait = Wait(node.memory, plan, await Pause(0), course.timeout)
+    course.wait = wait = Wait(node.memory, plan, await Sleep(0), course.timeout)
     try:
         wait.begun(await _begin(node, plan, watch))
     except _UNHEARD as error:
@@ -301,13 +301,13 @@ async def _launching(node: Node, asked: _Asked, course: _Course, watch: Watch) -
 async def _listening(course: _Course) -> None:
     """Nothing but listen: there is a listener also while the other branch reads inputs."""
     while not course.over:
-        await Listen(course.heard, AGAIN)
+        await WaitFor(course.heard, AGAIN)
 
 
 async def _following(node: Node, course: _Course) -> None:
     """Look at the clock, tell where it should be, and read the inputs that are watched."""
     while course.wait is None and not course.failed:
-        await Pause(SOON / 10)  # less than a start takes on the line: its beginning is not missed
+        await Sleep(SOON / 10)  # less than a start takes on the line: its beginning is not missed
     if course.wait is not None:
         await _followed(node, course, course.wait, course.levels)
 
@@ -316,16 +316,16 @@ async def _followed(node: Node, course: _Course, wait: Wait, levels: Levels) -> 
     twin: Twin | None = None
     told = -inf
     while not course.over:
-        now = await Pause(0)
+        now = await Sleep(0)
         if not wait.pending and twin is None:
             active = frozenset(port for port, level in levels.believed.items() if level)
             twin = Twin(wait.plan, wait.start, active)
         if twin is not None and now - told >= TICK:
             told = now
-            await Report(twin.told(now))
+            await Emit(twin.told(now))
         await _reading(node, wait, levels, twin)
-        await Listen(wait.heard, _patience(wait, levels, now))
-        wait.look(await Pause(0))
+        await WaitFor(wait.heard, _patience(wait, levels, now))
+        wait.look(await Sleep(0))
 
 
 def _patience(wait: Wait, levels: Levels, now: float) -> float:
@@ -341,18 +341,18 @@ async def _reading(node: Node, wait: Wait, levels: Levels, twin: Twin | None) ->
     if wait.pending or twin is None:
         return
     for port in levels.believed:
-        active = await outcome(reading.read_input(node, port))
+        active = await catch(reading.read_input(node, port))
         if isinstance(active, NoReply | WireError):
             continue
         if isinstance(active, MotorbusError):
             raise active
-        change = levels.take(port, active, await Pause(0))
+        change = levels.take(port, active, await Sleep(0))
         if change is None:
             continue
         twin.press(port, change.active, max(change.at, wait.start))
         if port == STOP_INPUT and change.active:
             wait.button()
-        await Report(change)
+        await Emit(change)
 
 
 __all__ = ["TICK", "Outcome", "Ran", "run", "start_project"]

@@ -10,13 +10,13 @@ from typing import Final, NamedTuple
 
 from motorbus.core.family import Found
 from motorbus.core.operation import (
-    Alone,
     Data,
+    Emit,
+    Exclusive,
     Progress,
-    Report,
-    Timeout,
-    Tune,
-    afterwards,
+    SetBitrate,
+    TimeoutClass,
+    with_cleanup,
 )
 from motorbus.errors import NoReply, WireError
 from motorbus.families.stepper import wire
@@ -42,16 +42,16 @@ async def scan(ids: Sequence[int] = (), rates: Sequence[int] = (), motor: int = 
     """
     for node in ids:
         checked_id(node)
-    present = await Tune(0)
+    present = await SetBitrate(0)
     if not rates or tuple(rates) == (present,):
         return await _at(present, motor)
-    return await Alone(afterwards(_everywhere(rates, motor), lambda: Tune(present)))
+    return await Exclusive(with_cleanup(_everywhere(rates, motor), lambda: SetBitrate(present)))
 
 
 async def _everywhere(rates: Sequence[int], motor: int) -> list[Found]:
     found: list[Found] = []
     for rate in rates:
-        await Tune(rate)
+        await SetBitrate(rate)
         found += await _at(rate, motor)
     return found
 
@@ -59,14 +59,14 @@ async def _everywhere(rates: Sequence[int], motor: int) -> list[Found]:
 async def _at(rate: int, motor: int) -> list[Found]:
     node = Node(motor=motor)
     for number in range(PASSES):
-        asked = dump_once(node, 1, timeout=Timeout.SCAN)
-        await Report(Sends(asked.request, rate))
-        await Report(Progress(number, PASSES, f"reading project 1 at {rate} bit/s"))
+        asked = dump_once(node, 1, timeout=TimeoutClass.SCAN)
+        await Emit(Sends(asked.request, rate))
+        await Emit(Progress(number, PASSES, f"reading project 1 at {rate} bit/s"))
         try:
             await asked
         except (NoReply, WireError):
             continue
-        await Report(Found(node.node, rate, None))
+        await Emit(Found(node.node, rate, None))
         return [Found(node.node, rate, await identify(node))]
-    await Report(Progress(PASSES, PASSES, f"nobody at {rate} bit/s"))
+    await Emit(Progress(PASSES, PASSES, f"nobody at {rate} bit/s"))
     return []

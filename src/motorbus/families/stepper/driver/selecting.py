@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Alone, Pause, Report, outcome
+from motorbus.core.operation import Emit, Exclusive, Sleep, catch
 from motorbus.errors import OutcomeUnknown, RequestError, WireError
 from motorbus.families.stepper.driver import commands
 from motorbus.families.stepper.driver.costs import taken
@@ -50,7 +50,7 @@ async def select(node: Node, project: int) -> int:
     under this number.
     """
     checked_project(project)
-    return await Alone(_selected(node, project))
+    return await Exclusive(_selected(node, project))
 
 
 async def _selected(node: Node, project: int) -> int:
@@ -83,7 +83,7 @@ async def _told_apart(node: Node, before: Project, shown: Project) -> None:
                 "back what is stored",
             )  # fmt: skip
     node.memory.unsaved = None
-    await Report(EditsLost(before.number, tuple(changes(before, shown))))
+    await Emit(EditsLost(before.number, tuple(changes(before, shown))))
 
 
 async def save(node: Node, project: int, *, expert: bool = False) -> Written:
@@ -99,9 +99,9 @@ async def save(node: Node, project: int, *, expert: bool = False) -> Written:
     number = checked_project(project)
     meant = node.memory.unsaved
     if meant is not None and meant.number == number:
-        return await Alone(_kept(node, meant))
+        return await Exclusive(_kept(node, meant))
     if expert:
-        return await Alone(_saved_as_is(node, number))
+        return await Exclusive(_saved_as_is(node, number))
     raise RequestError(
         f"nothing of project {number} was edited on this bus and left unsaved",
         expected="edits of this host: saving stores whatever is being edited, also another project",
@@ -112,14 +112,14 @@ async def save(node: Node, project: int, *, expert: bool = False) -> Written:
 
 async def _kept(node: Node, meant: Project) -> Written:
     await refuse_while_lent(node, "save")
-    began = await Pause(0)
+    began = await Sleep(0)
     found = await taken(node, meant.number)
     return await written(node, found, meant, found.image, save=True, began=began)
 
 
 async def _saved_as_is(node: Node, project: int) -> Written:
     await refuse_while_lent(node, "save")
-    began = await Pause(0)
+    began = await Sleep(0)
     found = await taken(node, project)
     before = held(node, found.image, project)
     note = f"project {project} was being saved: what it holds is not known; read it"
@@ -130,7 +130,7 @@ async def _saved_as_is(node: Node, project: int) -> Written:
             node, now, before, f"project {project} was saved and does not read as before",
             "another project was being edited, or this controller shows what is stored; write it if it is not as meant",
         )  # fmt: skip
-    ended = await Pause(0)
+    ended = await Sleep(0)
     spent = found.dumps + dumps
     return Written(project, (), 1, spent, ended - began, True, Proof.AS_BEFORE, unwritable(now, b""))
 
@@ -153,7 +153,7 @@ async def clear(node: Node, project: int, *, expert: bool = False) -> bytes:
             advice="with expert=True it is cleared all the same; nothing was sent",
             node=node.node,
         )
-    return await Alone(_emptied(node, number))
+    return await Exclusive(_emptied(node, number))
 
 
 async def _emptied(node: Node, project: int) -> bytes:
@@ -165,7 +165,7 @@ async def _emptied(node: Node, project: int) -> bytes:
 
 
 async def cleared(node: Node, project: int) -> tuple[int, int]:
-    """Clear a project and read it; gives how many commands and dumps that took. Call it inside `Alone`."""
+    """Clear a project and read it; gives how many commands and dumps that took. Call it inside `Exclusive`."""
     note = f"project {project} was being cleared: it may hold what it held, or nothing"
     tries = await noted(_until_cleared(node, project), note)
     now, dumps = await noted(read_until(node, project, is_blank), note)
@@ -180,7 +180,7 @@ async def cleared(node: Node, project: int) -> tuple[int, int]:
 
 
 async def _until_cleared(node: Node, project: int) -> int:
-    told = await outcome(commands.clear_project(node, project))
+    told = await catch(commands.clear_project(node, project))
     if told is None:
         return 1
     if not isinstance(told, OutcomeUnknown | WireError):

@@ -13,7 +13,7 @@ from math import inf
 from typing import Final
 
 from motorbus.core.family import Stop
-from motorbus.core.operation import Answer, Exchange, Rank, outcome
+from motorbus.core.operation import Exchange, Priority, Response, catch
 from motorbus.errors import Interrupted, LinkError, MotorbusError, OutcomeUnknown
 from motorbus.families.stepper.driver.commands import nothing
 from motorbus.families.stepper.driver.exchanges import command
@@ -75,7 +75,7 @@ async def _said(node: Node, names: tuple[str, ...]) -> dict[str, MotorbusError]:
     """Say each of them once; what was told of those that were not accepted."""
     failures = {}
     for name in names:
-        told = await outcome(command(node, name, nothing, rank=Rank.STOP))
+        told = await catch(command(node, name, nothing, rank=Priority.STOP))
         if told is not None:
             failures[name] = told
     return failures
@@ -101,16 +101,16 @@ def _not_accepted(node: Node, failures: Mapping[str, MotorbusError], times: int)
     )
 
 
-def stop_all(nodes: Mapping[int, Answer | None], motor: int) -> Stop:
+def stop_all(nodes: Mapping[int, Response | None], motor: int) -> Stop:
     """Both commands; where nobody has answered yet, without waiting for an answer."""
     frames = tuple(
-        Exchange[Answer](
+        Exchange[Response](
             said.request,
             said.replies if nodes else (),
-            rank=Rank.STOP,
+            rank=Priority.STOP,
             effect=said.effect,
             repeatable=True,
         )
-        for said in (command(Node(motor=motor), name, nothing, rank=Rank.STOP) for name in STOPS)
+        for said in (command(Node(motor=motor), name, nothing, rank=Priority.STOP) for name in STOPS)
     )
     return Stop(frames, Promise.STOP_ACCEPTED.value)

@@ -17,7 +17,7 @@ from math import ceil, inf, isfinite
 from sys import float_info
 from typing import Final, NamedTuple, TypeVar
 
-from motorbus.core.operation import Pause, Progress, Report, Runnable, Stops
+from motorbus.core.operation import Emit, Progress, Runnable, Sleep, Stops
 from motorbus.errors import Interrupted, MotorbusError, OutcomeUnknown, Refused, RequestError
 from motorbus.families.stepper import execution
 from motorbus.families.stepper.driver.node import Node
@@ -134,13 +134,13 @@ async def waited(watch: Watch, seconds: float, what: str) -> None:
 
     Raises Interrupted when somebody has stopped it.
     """
-    began = now = await Pause(0)
+    began = now = await Sleep(0)
     end = (
         began + seconds
     )  # a moment to compare with: what is left of a time may be rounded to nothing, again and again
     while now < end:
-        await Report(Progress(round(1000 * (now - began)), round(1000 * seconds), f"{what}, estimated"))
-        now = await Pause(min(LOOK, end - now))
+        await Emit(Progress(round(1000 * (now - began)), round(1000 * seconds), f"{what}, estimated"))
+        now = await Sleep(min(LOOK, end - now))
         watch.check()
 
 
@@ -171,7 +171,7 @@ def _readings(how: Behaviour = USUAL) -> list[Behaviour]:
 
 async def refuse_unless_idle(node: Node, what: str) -> None:
     """Raise RequestError while something that was begun on this bus may still turn: `what` would end it half-way."""
-    now = await Pause(0)
+    now = await Sleep(0)
     if not node.memory.owed and node.memory.turning <= now:
         return
     begun = "a project that was started may still run" if node.memory.owed else "a move may not be over"

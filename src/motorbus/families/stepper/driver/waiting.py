@@ -12,7 +12,7 @@ from enum import Enum
 from math import inf, isinf
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Notice
+from motorbus.core.operation import Notification
 from motorbus.errors import MotorbusError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.memory import Memory
@@ -88,7 +88,7 @@ class Wait:
         """Input 4, which stops projects, has become active."""
         self._button = True
 
-    def heard(self, notice: Notice) -> bool:
+    def heard(self, notice: Notification) -> bool:
         """A notice; True when whoever listens should look. One that two listeners hear counts as one."""
         if notice.kind == wire.COMPLETED:
             doubtful = self._memory.stopping > 0 or self._memory.wanted > self._wanted

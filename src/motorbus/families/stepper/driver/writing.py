@@ -17,7 +17,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from motorbus.core.entry import Entry, Value
-from motorbus.core.operation import Alone, Pause, Report, outcome
+from motorbus.core.operation import Emit, Exclusive, Sleep, catch
 from motorbus.errors import MotorbusError, OutcomeUnknown, RequestError, WireError
 from motorbus.families.stepper.driver.commands import save_project
 from motorbus.families.stepper.driver.costs import Cost, Taken, taken
@@ -168,7 +168,7 @@ async def difference(
     Raises RequestError as `write_project` does for what no project can hold, and as `dump`.
     """
     number, wanted = _wanted(program, project)
-    found = await Alone(taken(node, number))
+    found = await Exclusive(taken(node, number))
     return compared(node, found, _meant(node, found, wanted), program.raw, save=save)
 
 
@@ -194,7 +194,7 @@ async def write_project(
     """
     number, wanted = _wanted(program, project)
     _linted(program, wanted, expert)
-    return await Alone(_written(node, number, wanted, program.raw, save))
+    return await Exclusive(_written(node, number, wanted, program.raw, save))
 
 
 async def write(node: Node, /, *, project: int = 1, save: bool = True, **values: Value) -> Written:
@@ -206,13 +206,13 @@ async def write(node: Node, /, *, project: int = 1, save: bool = True, **values:
     """
     checked_project(project)
     raws = {name: _raw(node, node.table[name], value) for name, value in values.items()}
-    return await Alone(_amended(node, project, raws, save))
+    return await Exclusive(_amended(node, project, raws, save))
 
 
 async def written(
     node: Node, found: Taken, meant: Project, raw: bytes, *, save: bool, began: float
 ) -> Written:
-    """Bring a project that was just read to `meant` in all ten rows, and save it. Call it inside `Alone`."""
+    """Bring a project that was just read to `meant` in all ten rows, and save it. Call it inside `Exclusive`."""
     plan = compared(node, found, meant, raw, save=save)
     if not plan:
         unread = Readback(found.image, "untold", 0, 0)
@@ -220,7 +220,7 @@ async def written(
     alike = held(node, found.image, meant.number) == meant
     if not alike:
         node.memory.unsaved = None
-    await Report(Planned(plan))
+    await Emit(Planned(plan))
     # nobody can ask which project is being edited: where the reading finds nothing to send, all of it is sent
     edited = await brought(node, found.image, meant, every=alike)
     if not save:
@@ -249,7 +249,7 @@ async def saved(node: Node, meant: Project, edited: Readback) -> Kept:
 
 
 async def _saved(node: Node, meant: Project, edited: Readback) -> Kept:
-    told = await outcome(save_project(node, meant.number))
+    told = await catch(save_project(node, meant.number))
     if isinstance(told, MotorbusError) and not isinstance(told, OutcomeUnknown | WireError):
         raise told
     image, dumps = await read_back(node, meant)
@@ -287,14 +287,14 @@ def unwritable(image: bytes, wanted: bytes) -> dict[int, int]:
 
 async def _written(node: Node, number: int, wanted: Project, raw: bytes, save: bool) -> Written:
     await refuse_while_lent(node, "write_project")
-    began = await Pause(0)
+    began = await Sleep(0)
     found = await taken(node, number)
     return await written(node, found, _meant(node, found, wanted), raw, save=save, began=began)
 
 
 async def _amended(node: Node, number: int, raws: Mapping[str, int], save: bool) -> Written:
     await refuse_while_lent(node, "write")
-    began = await Pause(0)
+    began = await Sleep(0)
     found = await taken(node, number)
     before = held(node, found.image, number)
     if before.is_cleared and "total_steps" not in raws:
@@ -311,7 +311,7 @@ async def _amended(node: Node, number: int, raws: Mapping[str, int], save: bool)
 async def _done(
     plan: Difference, spent: Readback, before: int, began: float, proof: Proof, *, saved: bool = False
 ) -> Written:
-    now = await Pause(0)
+    now = await Sleep(0)
     dumps = before + spent.dumps
     return Written(
         plan.project,

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Effect, Timeout
+from motorbus.core.operation import Effect, TimeoutClass
 from motorbus.families.stepper import wire
 
 REPLY: Final = 0.2
@@ -36,7 +36,7 @@ class Order(NamedTuple):
     title: str
     effect: Effect
     repeatable: bool
-    timeout: Timeout = Timeout.REPLY
+    timeout: TimeoutClass = TimeoutClass.REPLY
     note: str = ""
 
     @property
@@ -95,7 +95,7 @@ ORDERS: Final[Mapping[str, Order]] = MappingProxyType(
             wire.COMMANDS[name],
             title,
             *what,
-            Timeout.STORE if what is _STORE else Timeout.REPLY,
+            TimeoutClass.STORE if what is _STORE else TimeoutClass.REPLY,
             note,
         )
         for name, title, what, note in _ALL

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from motorbus.core.operation import CanFrame, Data, Event, Noise, Notice, Reply
+from motorbus.core.operation import CanFrame, Data, Event, Noise, Notification, Reply
 from motorbus.families.stepper.wire.frames import (
     DUMP,
     DUMP_LENGTH,
@@ -97,7 +97,7 @@ class Receiver:
 
     def _event(self, data: bytes) -> Event:
         if data == NOTICE:
-            return Notice(self._node, COMPLETED, data)
+            return Notification(self._node, COMPLETED, data)
         return Reply(0, key_of(data), data)
 
 

@@ -20,11 +20,11 @@ from motorbus.core.operation import (
     ASKED,
     INTENT,
     OUTCOME,
-    Alone,
-    Journal,
-    Report,
-    afterwards,
-    outcome,
+    Emit,
+    Exclusive,
+    JournalEntry,
+    catch,
+    with_cleanup,
 )
 from motorbus.errors import LinkError, RequestError, VerificationFailed
 from motorbus.families.stepper.driver import reading
@@ -92,7 +92,7 @@ async def characterise(node: Node, *, scratch: int = 4, travel: float = 1.0) -> 
     checked_project(scratch)
     if not (isfinite(travel) and LEAST_TRAVEL <= travel <= MOST_TRAVEL):
         raise _refused(f"travel: {travel!r} turns", f"{LEAST_TRAVEL:g} to {MOST_TRAVEL:g}")
-    return await Alone(_characterised(node, scratch, travel))
+    return await Exclusive(_characterised(node, scratch, travel))
 
 
 def experiments(*, travel: float = 1.0) -> tuple[Experiment, ...]:
@@ -123,7 +123,7 @@ async def recovered(node: Node, facts: Mapping[str, Any]) -> str:
             expected="what the journal of the bus holds",
             advice="nothing was sent",
         )
-    await Alone(put_back(Node(node.node, node.motor, order, node.memory), image, known))
+    await Exclusive(put_back(Node(node.node, node.motor, order, node.memory), image, known))
     return GIVEN_BACK
 
 
@@ -134,7 +134,7 @@ def _refused(what: str, expected: str) -> RequestError:
 async def _characterised(node: Node, scratch: int, travel: float) -> Profile:
     await refuse_unless_idle(node, f"{VERB}()")
     _refuse_unsaved(node)
-    await Report(Journal(VERB, ASKED, {"node": node.node}))
+    await Emit(JournalEntry(VERB, ASKED, {"node": node.node}))
     await ended(node)
     stored: dict[int, bytes] = {}
     for number in range(1, PROJECTS + 1):
@@ -146,9 +146,9 @@ async def _characterised(node: Node, scratch: int, travel: float) -> Profile:
     case = Case(here, scratch, travel, stored, home if lent.pulses_per_turn is None else scratch)
     facts = _facts(node, stored, home)
     node.memory.commanded(tuple(range(1, OUTPUTS + 1)), None)
-    await Report(Journal(VERB, INTENT, facts))
+    await Emit(JournalEntry(VERB, INTENT, facts))
     try:
-        found = await afterwards(studied(case), lambda: _returned(case, stored[home], facts))
+        found = await with_cleanup(studied(case), lambda: _returned(case, stored[home], facts))
     except BaseException as error:
         if not case.returned:
             error.add_note(NOTE)
@@ -183,12 +183,12 @@ async def put_back(node: Node, image: bytes, facts: Mapping[str, Any], seen: boo
     """
     await ended(node)
     for left in reversed(range(TRIES)):
-        told = await outcome(_edited_again(node, image, int(facts["project"]), seen))
+        told = await catch(_edited_again(node, image, int(facts["project"]), seen))
         if told is None:
             break
         if isinstance(told, LinkError) or not left:
             raise told
-    await Report(Journal(VERB, OUTCOME, {"outcome": GIVEN_BACK, **facts}))
+    await Emit(JournalEntry(VERB, OUTCOME, {"outcome": GIVEN_BACK, **facts}))
 
 
 async def _edited_again(node: Node, image: bytes, number: int, seen: bool) -> None:

@@ -11,13 +11,13 @@ from typing import Any, Final, NamedTuple
 
 from motorbus.core.operation import (
     Exchange,
+    Gather,
     Goal,
-    Listen,
-    Notice,
-    Pause,
-    Rank,
-    Together,
-    outcome,
+    Notification,
+    Priority,
+    Sleep,
+    WaitFor,
+    catch,
 )
 from motorbus.errors import Interrupted, MotorbusError
 from motorbus.families.stepper.driver import goals
@@ -61,7 +61,7 @@ async def write(node: Node, project: Project, *, leave: str = "") -> None:
 def told(node: Node, edit: Edit) -> Exchange[None]:
     """One command that sets parameters."""
     values: dict[str, Any] = dict(edit.values)
-    return command(node, edit.command, nothing, rank=Rank.CONFIGURATION, **values)
+    return command(node, edit.command, nothing, rank=Priority.CONFIGURATION, **values)
 
 
 async def listened(
@@ -74,14 +74,14 @@ async def listened(
     """
     notices: list[float] = []
 
-    def heard(notice: Notice) -> bool:
+    def heard(notice: Notification) -> bool:
         notices.append(notice.at)
         return len(notices) >= wanted
 
-    await outcome(read_input(node, 1))
-    await Pause(QUIET)
+    await catch(read_input(node, 1))
+    await Sleep(QUIET)
     node.memory.owed = True
-    said, _ = await Together[Any]([_said(node, watch, project, acts), _listening(heard, seconds)])
+    said, _ = await Gather[Any]([_said(node, watch, project, acts), _listening(heard, seconds)])
     if watch.overtaken:
         raise Interrupted(
             "somebody stopped the controller during an experiment",
@@ -92,22 +92,22 @@ async def listened(
     return Heard(sent, answered, tuple(notices))
 
 
-async def _listening(heard: Callable[[Notice], bool], seconds: float) -> Notice | None:
-    return await Listen(heard, seconds)
+async def _listening(heard: Callable[[Notification], bool], seconds: float) -> Notification | None:
+    return await WaitFor(heard, seconds)
 
 
 async def _said(
     node: Node, watch: Watch, project: Project, acts: Sequence[Act]
 ) -> tuple[tuple[float, ...], tuple[float | None, ...]]:
-    began = now = await Pause(0.0)
+    began = now = await Sleep(0.0)
     sent: list[float] = []
     answered: list[float | None] = []
     for act in acts:
         if (rest := began + act.at - now) > 0:
-            await Pause(rest)
-        now = await Pause(0.0)
+            await Sleep(rest)
+        now = await Sleep(0.0)
         sent.append(now)
-        came = await outcome(timed(order(node, watch, project, act.command)))
+        came = await catch(timed(order(node, watch, project, act.command)))
         if isinstance(came, Interrupted):
             raise came
         answered.append(None if isinstance(came, MotorbusError) else came)
@@ -123,7 +123,7 @@ def order(node: Node, watch: Watch, project: Project, name: str) -> Exchange[Non
         return motion(node, name, far, watch.refusal, project=project.number)
     if name == "run_once":
         return motion(node, name, goals.of_move(node, project), watch.refusal)
-    return command(node, name, nothing, rank=Rank.STOP)
+    return command(node, name, nothing, rank=Priority.STOP)
 
 
 def _nowhere(node: Node) -> Goal:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple, TypeVar
 
-from motorbus.core.operation import Operation, Report
+from motorbus.core.operation import Emit, Procedure
 from motorbus.errors import NoReply, WireError
 from motorbus.families.stepper.driver.characterising import views
 from motorbus.families.stepper.driver.characterising.experiments import Seen, Trial, Verdict, judged
@@ -61,27 +61,27 @@ def ramp_experiment(travel: float) -> Experiment:
 
 async def studied(case: Case) -> Profile:
     """All experiments, one after the other. One that a bad line spoils is given up, and the next is begun."""
-    await Report(VIEWS)
+    await Emit(VIEWS)
     await views.view(case)
     await _spared(case, ("flags_scope",), views.flags(case))
     for trial in controls(case.motor, case.scratch):
-        await Report(Experiment.of(trial))
+        await Emit(Experiment.of(trial))
     timing = await _spared(case, (), controlled(case))
     if timing is None:
         for name in KNOWN:
             if name not in UNTRIED:
                 case.found.leave(name, f"no time could be taken on this line: {case.found.doubts[0]}")
         return case.found.profile()
-    await Report(SELECTION)
+    await Emit(SELECTION)
     await _spared(case, SELECTION.settles, _selected(case, timing))
     for trial in trials(case.motor, case.scratch, _without_steps(case)):
         await _spared(case, trial.settles, _tried(case, timing, trial))
-    await Report(ramp_experiment(case.travel))
+    await Emit(ramp_experiment(case.travel))
     await _spared(case, RAMP, ramped(case, timing))
     return case.found.profile()
 
 
-async def _spared(case: Case, names: tuple[str, ...], operation: Operation[T]) -> T | None:
+async def _spared(case: Case, names: tuple[str, ...], operation: Procedure[T]) -> T | None:
     """Carry it out; a line that does not answer it leaves these questions open, and is a doubt."""
     try:
         return await operation
@@ -113,7 +113,7 @@ async def _tried(case: Case, timing: Timing, trial: Trial) -> None:
     missing = [name for name, value in trial.needs if found.known.get(name) != value]
     if missing:
         return _leave(case, trial, f"it is tried only where {missing[0]} is {dict(trial.needs)[missing[0]]}")
-    await Report(Experiment.of(trial))
+    await Emit(Experiment.of(trial))
     if trial.project.total_steps:
         await write(case.node, trial.project)
     verdict = await _repeated(case, timing, trial)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Pause
+from motorbus.core.operation import Sleep
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.characterising.experiments import Seen, Trial
 from motorbus.families.stepper.driver.characterising.findings import Case
@@ -92,9 +92,9 @@ async def _timing(case: Case, took: list[tuple[float, float]], latency: float) -
 async def _turnaround(case: Case) -> float:
     """s that it thinks: a short answer and a long one tell what a byte takes, and with that what is no byte."""
     await read_input(case.node, 1)
-    begin = await Pause(0.0)
+    begin = await Sleep(0.0)
     short = await timed(read_input(case.node, 1)) - begin
-    begin = await Pause(0.0)
+    begin = await Sleep(0.0)
     whole = await timed(dump_once(case.node, case.scratch)) - begin
     byte = max(0.0, whole - short) / (wire.DUMP_LENGTH - wire.REPLY_LENGTH)
     return max(0.0, short - byte * (wire.REQUEST_LENGTH + wire.REPLY_LENGTH))
