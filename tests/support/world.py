@@ -42,8 +42,6 @@ __all__ = ["AsyncBus", "Bus", "StopOutcome", "Subscription", "TraceRecord"]
 
 RETRIES = 2
 """How often a bus repeats a request that may be repeated."""
-BIT_TIMES = 33
-"""Exchanges after which a CAN bus knows that its link takes bit time."""
 
 Notify = Callable[[object], None]
 

@@ -12,14 +12,12 @@ import sys
 from collections.abc import Callable, Coroutine
 from functools import cached_property
 from inspect import Parameter, Signature, getattr_static, signature
-from typing import Any, ClassVar, Concatenate, Final, Generic, ParamSpec, Protocol, Self, TypeVar, overload
+from typing import Any, ClassVar, Concatenate, Generic, ParamSpec, Protocol, Self, TypeVar, overload
 
 from motorbus.core.operation import Runnable
 
 P = ParamSpec("P")
 T = TypeVar("T")
-VALUE: Final = re.compile(r"^(?:Exchange|Operation|Runnable|Abreast|Errand)\[(.*)\]$")
-"""The type of the value in the return type of a driver function."""
 
 
 class BlockingRunner(Protocol):
@@ -68,7 +66,10 @@ class Said(Generic[P, T]):
     """Base of descriptors that make a method of a driver function; a subclass says how the method runs it.
 
     On a class it gives a function with the signature of the method; `function` of that is the driver function.
+    `returns` names the types in which a driver function returns its value.
     """
+
+    returns: ClassVar[str] = "Exchange|Procedure|Runnable"
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self.function = function
@@ -86,7 +87,8 @@ class Said(Generic[P, T]):
         first, *rest = found.parameters.values()
         parameters = [first.replace(name="self", annotation=Parameter.empty), *rest]
         return found.replace(
-            parameters=parameters, return_annotation=VALUE.sub(r"\1", str(found.return_annotation))
+            parameters=parameters,
+            return_annotation=re.sub(rf"^(?:{self.returns})\[(.*)\]$", r"\1", str(found.return_annotation)),
         )
 
     def of_class(self, owner: type) -> Any:

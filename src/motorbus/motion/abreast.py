@@ -66,6 +66,8 @@ class LedAsync:
 class together(Said[P, T]):  # noqa: N801 - reads as a word in a list of verbs
     """Makes a method of a function that gives an `Abreast`: blocking on what is `Led`, awaitable on `LedAsync`."""
 
+    returns = "Abreast"
+
     def __init__(self, function: Callable[Concatenate[Any, P], Abreast[T]]) -> None:
         super().__init__(function)
 

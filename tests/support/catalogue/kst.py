@@ -26,7 +26,7 @@ from motorbus.families.kst.simulator import KstBus
 from motorbus.families.kst.table import BIT_RATES
 from motorbus.link.base import Line
 from motorbus.link.memory import MemoryLink
-from tests.support.world import BIT_TIMES, make_bus
+from tests.support.world import make_bus
 
 NODES = (0x25, 0x26, 0x27)
 NODE = NODES[0]
@@ -47,8 +47,6 @@ class KstRig:
         self.bus = make_bus(self.link, self.family, report=lambda event: None)
         self.dialect = Servo(self.bus, NODE).dialect
         self.count = self.here = 0
-        for _ in range(BIT_TIMES):  # by then it shows that this link takes its bit time
-            read_2(self)
 
     def linked(self, simulator: KstBus) -> MemoryLink:
         """A link to them that takes bit time."""

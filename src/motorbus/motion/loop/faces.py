@@ -322,6 +322,8 @@ class Errand(NamedTuple, Generic[T]):
 class looped(Said[P, T]):  # noqa: N801 - reads as a word in a list of verbs
     """Makes a method of a function that gives an `Errand`: blocking on what is `Led`, awaitable on `LedAsync`."""
 
+    returns = "Errand"
+
     def __init__(self, function: Callable[Concatenate[Any, P], Errand[T]]) -> None:
         super().__init__(function)
 
