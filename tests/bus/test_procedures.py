@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 
 import pytest
@@ -228,3 +229,13 @@ def test_after_a_motion_order_a_stop_asks_where_the_node_is(can: Engine) -> None
     assert sorted(can.estop().acknowledged) == [1, 2]
     goals = {frame.id: frame.data[4:6] for frame in can.sent() if frame.data[0] == 0x22}
     assert goals == {0x601: (333).to_bytes(2, "little"), 0x602: (200).to_bytes(2, "little")}
+
+
+def test_a_procedure_that_awaits_no_step_is_told_what_it_may_await(engine: Engine) -> None:
+    async def foreign() -> None:
+        await asyncio.sleep(0)
+
+    with pytest.raises(RequestError, match="which is no step") as caught:
+        engine.run(foreign())
+    assert "asyncio.sleep" in caught.value.cause
+    assert engine.run(read(1)) == 100

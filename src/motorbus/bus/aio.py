@@ -34,10 +34,14 @@ class AsyncBus(BaseBus):
     _thread = 0
     _timer: asyncio.TimerHandle | None = None
     _direct: tuple[Prepared, _Call] | None = None
-    """The prepared request in flight that no other request has met."""
+    """The prepared request in flight, and its call; `send` makes it an ordinary attempt before anything else leaves."""
 
     def run(self, procedure: Runnable[T], report: Notify | None = None) -> Coroutine[Any, Any, T]:
-        """Run a procedure as `Bus.run` does. A cancelled task cleans up, then raises CancelledError."""
+        """Run a procedure as `Bus.run` does. A cancelled task cleans up, then raises CancelledError.
+
+        Ctrl-C is left to the event loop, which cancels the main task.
+        """
+        # Virtual time passes in `_wait` only, and a request with an effect needs `since`, which a call has not.
         if isinstance(procedure, Exchange) and not procedure.effect and not self.link.virtual:
             return self._transact(procedure)
         return self._run(_Owned(procedure), report)

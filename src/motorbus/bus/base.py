@@ -203,7 +203,10 @@ class BaseBus:
     # -- prepared requests -------------------------------------------------------------------------------------
 
     def prepare(self, request: Exchange[Any]) -> Prepared | None:
-        """The prepared form of this request if it may be sent at once, else None. The caller holds the turn."""
+        """The prepared form of this request if it may be sent at once, else None. The caller holds the turn.
+
+        `Engine.submit` makes the prepared form when the request is sent for the first time.
+        """
         engine, link = self.engine, self.link
         prepared: Prepared | None = request.course
         if prepared is None or prepared.engine is not engine:

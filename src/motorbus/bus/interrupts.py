@@ -1,9 +1,9 @@
 """Signals that end a program are raised at the boundary of a request, never within one.
 
 SIGINT, SIGTERM and SIGHUP get a handler of ours when a bus is opened in the main thread, where Python's default
-handler is installed. The first signal is raised when the request in flight has ended; a procedure that is in a guarded
-change is cancelled and cleans up first. A second signal shortens that clean-up; a third one goes to the default
-handler, unless the first came only just now.
+handler is installed. The first signal is raised when a single request has ended; a procedure is cancelled, its guards
+are left, then the signal is raised. A second signal shortens that clean-up. Later ones are raised at once, wherever the
+program is, unless the first came only just now; SIGTERM and SIGHUP go to the default handler then.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ DEFAULTS: Final = (signal.SIG_DFL, signal.default_int_handler)
 class Interrupts:
     """Deferred signals of the main thread.
 
-    `depth` > 0 while a bus is in use; a signal is then kept in `pending`, unless the bus is `waiting` idle, which the
-    signal ends. As a context manager it defers the signals of a block. `count` is the number of signals that have come
-    one after the other. `cleanups` is the number of `with` blocks that stop motors at their end: once a signal has been
-    raised in one of them, the next is kept for that end.
+    `depth` > 0 while a bus is in use; a signal is then kept in `pending`, unless all buses are idle: while `waiting` is
+    True the handler raises it. As a context manager it defers the signals of a block. `count` is the number of signals
+    that have come one after the other. `cleanups` is the number of `with` blocks that stop motors at their end: once a
+    signal has been raised in one of them, the next is kept for that end.
     """
 
     def __init__(self) -> None:

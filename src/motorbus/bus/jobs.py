@@ -13,14 +13,14 @@ from motorbus.core.operation import ANY, Exchange, Expected, Priority, Reply, Re
 NOISE_KEPT = 16
 """Pieces of noise kept for the error message."""
 
-Stops: TypeAlias = "Mapping[int | None, int]"
+StopCounts: TypeAlias = "Mapping[int | None, int]"
 """Number of stops sent by node; None: for all nodes."""
 
 
 class Since(NamedTuple):
     """What had happened on a bus when a caller decided: stops, emergency stops, lost ports."""
 
-    stops: Stops
+    stops: StopCounts
     latches: int
     losses: int
 

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Final
 
-from motorbus.bus.jobs import Stops
+from motorbus.bus.jobs import StopCounts
 from motorbus.bus.prepared import Prepared
 from motorbus.core.family import Family, Stop
 from motorbus.core.goal import Goal, Stays
@@ -39,7 +39,7 @@ class LastPositions(Mapping[int, Reading]):
         self.rate = rate
         self.nodes: frozenset[int] = frozenset()
         self.orders = self.stop_total = 0
-        self.stops: Stops = {}
+        self.stops: StopCounts = {}
         self.latest: dict[int, Prepared | tuple[Exchange[Any], Response, int]] = {}
         self._ordered: dict[tuple[int, ...], int] = {}  # by the nodes that an order was for (empty: all)
         self._accepted: Counter[int] = Counter()
@@ -124,7 +124,7 @@ class LastPositions(Mapping[int, Reading]):
         """Number of stops sent to this node, those for all nodes included."""
         return self.stops.get(node, 0) + self.stops.get(None, 0)
 
-    def is_stopped(self, exchange: Exchange[Any], before: Stops) -> bool:
+    def is_stopped(self, exchange: Exchange[Any], before: StopCounts) -> bool:
         """A stop for a node that this request addresses was sent since `stops` was `before`."""
         if before is self.stops:
             return False

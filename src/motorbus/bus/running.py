@@ -1,4 +1,4 @@
-"""Procedures run in the calling thread, on one bus or on several at the same time."""
+"""Procedures run in the calling thread, on one bus or on several at the same time. Its counterpart is in `aio.py`."""
 
 from __future__ import annotations
 
@@ -147,9 +147,8 @@ def _run_parts(parts: Sequence[_Part[Any]]) -> None:
             try:
                 if not (going := _advance(parts)):
                     return
-                signals.waiting = all(
-                    part.bus.engine.idle for part in going
-                )  # from here the handler raises itself
+                # While all buses are idle the handler raises a signal itself. Set it before `pending` is looked at.
+                signals.waiting = all(part.bus.engine.idle for part in going)
                 if signals.pending is not None:
                     signals.waiting = False
                     signals.raise_pending()
@@ -161,7 +160,7 @@ def _run_parts(parts: Sequence[_Part[Any]]) -> None:
                 signals.waiting = False
     finally:
         for part in parts:
-            if not part.tree.root.finished:  # a second error, raised while cancelling
+            if not part.tree.root.finished:  # a signal was raised outside the inner `try`
                 with part.bus.turn:
                     part.tree.drop()
             part.release_turn()

@@ -55,7 +55,13 @@ class Timer(Job):
 
 
 class Task:
-    """One procedure, and the one thing that it waits for: a job, or its children. `entered`: its code has begun."""
+    """One procedure, and the one thing that it waits for: a job, or its children.
+
+    `started`: nothing is left to begin, though it may wait for exclusive use. `entered`: its code has begun.
+    `joins_one`: the value of its only child is its value, not a list. `claims`: its end releases exclusive use.
+    `checked`: the reads that the interlock requires precede its request. `exempt`: the cancellation was thrown into it,
+    or must not be, as for the end of a guard and what that starts.
+    """
 
     def __init__(self, procedure: Runnable[Any], parent: Task | None = None) -> None:
         self.procedure = procedure
@@ -67,8 +73,7 @@ class Task:
         self.claims = False
         self.checked = False
         self.started = self.entered = self.finished = False
-        # A clean-up that starts tasks of its own is not cancelled again.
-        self.cancelled: bool = parent is not None and parent.cancelled
+        self.exempt: bool = parent is not None and parent.exempt
         self.value: Any = None
         self.error: BaseException | None = None
 
@@ -100,7 +105,9 @@ class TaskTree(Generic[T]):
         self.interruption: BaseException | None = None
         """Raised by one of several children, and no Exception: it cancels the others."""
         self.deadline = inf
+        """s; from then on every step of the clean-up fails."""
         self.extension = 0.0
+        """s by which sleeps of the clean-up may still extend `deadline`."""
         self.timers: list[Timer] = []
         self.root = Task(procedure)
         engine.end_sleeps.append(self.end_sleeps)
@@ -115,7 +122,9 @@ class TaskTree(Generic[T]):
                 self._end(timer, None if timer.listener is not None else now)
         if now >= self.deadline:
             for task in self._waiting(self.root):
-                if task.job is not None:
+                if isinstance(task.job, Timer) and task.job in self.timers:
+                    self._end(task.job, error=failures.abandoned())
+                elif task.job is not None:
                     self.engine.cancel(task.job)
         while self._step_tree(self.root):
             if self.interruption is not None and self.cancellation is None:
@@ -205,10 +214,10 @@ class TaskTree(Generic[T]):
     def _join(self, task: Task) -> None:
         """All children have ended: their values, or the first error, go to the parent; a cancellation goes first."""
         children, task.children = task.children, []
-        if self.cancellation is not None and not task.cancelled:
+        if self.cancellation is not None and not task.exempt:
             for child in children:
                 _add_note(self.cancellation, child.error)
-            task.cancelled = True
+            task.exempt = True
             self._resume(task, error=self.cancellation)
             return
         errors = [child.error for child in children if child.error is not None]
@@ -243,7 +252,7 @@ class TaskTree(Generic[T]):
             self.engine.submit(child.job, self.now())
         elif isinstance(step, Shielded):
             child = Task(step.operation, task)
-            child.cancelled = True
+            child.exempt = True
             task.children, task.joins_one = [child], True
         elif isinstance(step, Emit):
             self._report(task, step.event)
@@ -344,7 +353,7 @@ class TaskTree(Generic[T]):
                 task.coroutine.close()
 
     def _cancel(self, task: Task) -> None:
-        if task.finished or task.cancelled:
+        if task.finished or task.exempt:
             return
         if not task.entered:
             self._cancel_job(task)
@@ -356,7 +365,7 @@ class TaskTree(Generic[T]):
         elif task.children:
             self._join(task)
         else:
-            task.cancelled = True
+            task.exempt = True
             self._cancel_job(task)
             self._resume(task, error=self.cancellation)
 

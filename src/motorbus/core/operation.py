@@ -294,7 +294,10 @@ class Emit(Step[None]):
 
 @dataclass(slots=True, eq=False)
 class Shielded(Step[T_co]):
-    """A procedure that is not cancelled: a cancellation is raised when it has ended. For the end of a `Guard` only."""
+    """A procedure into which no cancellation is thrown: it is raised at this `await` when the procedure has ended.
+
+    For the end of a `Guard` only. From the time-out of the clean-up on its steps fail; see `bus/tasks.py`.
+    """
 
     operation: Runnable[T_co]
 
