@@ -81,7 +81,7 @@ def test_a_port_that_vanishes_meanwhile(tmp_path: Path) -> None:
         command = [
             sys.executable,
             "-m",
-            "motorbus.cli",
+            "motorbus",
             "monitor",
             f"{simulated.bus},reconnect=no#1",
             "--rate",

@@ -146,7 +146,7 @@ def test_a_move_that_is_stopped_says_so(served: Simulated, run: Run) -> None:
     command = [
         sys.executable,
         "-m",
-        "motorbus.cli",
+        "motorbus",
         "move",
         f"{served.bus}#1=90deg",
         "--velocity",

@@ -103,7 +103,7 @@ def port(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     command = [
         sys.executable,
         "-m",
-        "motorbus.cli",
+        "motorbus",
         "simulate",
         "feetech",
         "--ids",

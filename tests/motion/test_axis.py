@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import inspect
+from inspect import getattr_static
 
 import pytest
 
@@ -20,7 +21,7 @@ VERBS = {
 
 def test_both_faces_have_the_same_verbs_and_each_says_what_it_does() -> None:
     for kind in (Axis, AsyncAxis):
-        found = {name: one for name in dir(kind) if isinstance(one := getattr(kind, name), ability)}
+        found = {name: one for name in dir(kind) if isinstance(one := getattr_static(kind, name), ability)}
         assert found.keys() == VERBS
         assert all(one.__doc__ for one in found.values())
 

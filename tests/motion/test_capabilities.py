@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import inspect
+from inspect import getattr_static
 from math import tau
 
 import pytest
@@ -59,7 +60,7 @@ def test_every_capability_is_a_verb_that_is_there() -> None:
 
 
 def _is_verb(kind: type, name: str) -> bool:
-    return isinstance(getattr(kind, name, None), ability)
+    return isinstance(getattr_static(kind, name, None), ability)
 
 
 def test_what_is_told_has_the_zero_the_direction_and_the_gear_of_the_axis() -> None:

@@ -35,7 +35,7 @@ class AsyncRunner(Protocol):
 class _Owner:
     """Base of devices with verbs. A copy drops the cached methods: they are bound to the original."""
 
-    is_async: ClassVar[bool] = False
+    _is_async: ClassVar[bool] = False
 
     def __getstate__(self) -> dict[str, Any]:
         kind = type(self)
@@ -56,7 +56,7 @@ class Blocking(_Owner):
 class Awaiting(_Owner):
     """A device whose verbs run on an async bus."""
 
-    is_async = True
+    _is_async = True
 
     def __init__(self, bus: AsyncRunner) -> None:
         self.bus = bus
@@ -101,7 +101,7 @@ class Said(Generic[P, T]):
 
             self._describe(method, owner, self.signature)
             method.function = self.function  # type: ignore[attr-defined]
-            if getattr(owner, "is_async", False) and sys.version_info >= (3, 12):
+            if getattr(owner, "_is_async", False) and sys.version_info >= (3, 12):
                 inspect.markcoroutinefunction(method)
             self._of_class[owner] = method
         return self._of_class[owner]

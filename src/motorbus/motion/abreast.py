@@ -59,7 +59,7 @@ class Led:
 class LedAsync:
     """Carries out its verbs when they are awaited."""
 
-    is_async = True
+    _is_async = True
     conductor: AsyncConductor
 
 
