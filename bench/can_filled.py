@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 from bench.rounds import Failed
 from motorbus import kst
 from motorbus.bus.blocking import Bus
-from motorbus.core.operation import Gather
+from motorbus.core.steps import gather
 from motorbus.diagnose.budget import Budget, Transfer, budget
 from motorbus.families.kst.simulator import KstBus
 from motorbus.families.kst.wire import encode_upload, encode_upload_reply
@@ -83,7 +83,7 @@ def measured(nodes: range, bitrate: int, reads: int) -> Filled:
             times.append(bus.link.now() - begun)
 
     async def together() -> None:
-        await Gather([reading(node) for node in nodes])
+        await gather(*[reading(node) for node in nodes])
 
     bus.run(together())
     if any(ledger.sent != ledger.ok for ledger in bus.statistics.nodes.values()):

@@ -13,7 +13,8 @@ import sys
 from contextlib import closing
 
 from bench.can_loop import BITRATE, POSITION, position
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Data
 from motorbus.families.kst.simulator import KstBus
 from motorbus.families.kst.simulator.switches import Switches
 from motorbus.families.kst.table import PROFILES

@@ -29,7 +29,7 @@ from typing import NamedTuple
 from bench.rounds import Failed
 from motorbus.cli.simulated import Simulated
 from motorbus.core.can_bits import bits
-from motorbus.core.operation import CanFrame
+from motorbus.core.can_frame import CanFrame
 from motorbus.families.feetech import wire as feetech
 from motorbus.families.kst import wire as kst
 

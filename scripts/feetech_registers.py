@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from motorbus.cli.feetech.tables import database, meanings
-from motorbus.core.entry import Entry, Table
+from motorbus.core.register import Register, RegisterMap
 from motorbus.families.feetech.table import (
     ALARM_BITS_OF,
     BAUD_CODES,
@@ -79,14 +79,14 @@ def _choice() -> Iterator[str]:
     yield from listed(("firmware", "byte order", "map"), rows)
 
 
-def _map(table: Table) -> Iterator[str]:
+def _map(table: RegisterMap) -> Iterator[str]:
     yield f"## {table.name}\n"
     yield f"{table.title[0].upper()}{table.title[1:]}. {len(table)} registers.\n"
     columns = ("address", "register", "bytes", "in", "access", "sign", "range", "default", "unit", "effect")
     yield from listed((*columns, "meaning", "source", "in doubt", "note"), map(_row, table.values()))
 
 
-def _row(row: Entry) -> list[object]:
+def _row(row: Register) -> list[object]:
     return [
         *(row.address, f"`{row.name}`", row.size, row.storage.value, row.access.value),
         "" if row.sign_bit is None else f"bit {row.sign_bit}",

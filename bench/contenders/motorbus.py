@@ -13,7 +13,7 @@ from bench.loop import main
 from bench.workloads import BLOCK, COUNTS, FIELDS, SIZES, Fields, Workload, parts
 from motorbus import feetech
 from motorbus.bus.blocking import Bus
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.motion.safety import Gate
 
 STEP = math.tau / COUNTS

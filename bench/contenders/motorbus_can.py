@@ -7,7 +7,7 @@ from collections.abc import Callable
 import motorbus
 from bench.can_loop import BITRATE, main
 from motorbus import kst
-from motorbus.core.operation import Gather
+from motorbus.core.steps import gather
 
 COUNTS_PER_RADIAN = 10 * 57.29577951308232
 
@@ -38,7 +38,7 @@ class Motorbus:
 
         async def together() -> None:
             pairs = zip(self.servos, values, strict=True)
-            await Gather([endless(servo, found.append) for servo, found in pairs])
+            await gather(*[endless(servo, found.append) for servo, found in pairs])
 
         self.bus.run(together())
 

@@ -26,8 +26,10 @@ from bench.late.device import (
 )
 from motorbus import feetech, kst, stepper
 from motorbus.bus.blocking import Bus
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import SimulatedNode, Simulator
-from motorbus.core.operation import CanFrame, Data, Runnable
+from motorbus.core.request import Data
+from motorbus.core.steps import Runnable
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech.driver.exchanges import read_block
 from motorbus.families.stepper.driver.reading import dump_once

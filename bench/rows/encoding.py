@@ -175,7 +175,7 @@ class Sink:
 def _ours() -> tuple[Encoder, Encoder, Encoder]:
     import motorbus
     from motorbus import feetech
-    from motorbus.core.operation import Exchange
+    from motorbus.core.request import Request
 
     bus = motorbus.open(motorbus.simulate("feetech", ids="1-6").url)
     servos = [feetech.Servo(bus, node) for node in IDS]
@@ -185,8 +185,8 @@ def _ours() -> tuple[Encoder, Encoder, Encoder]:
 
     def read(servo: feetech.Servo) -> Any:
         exchange = position(servo)
-        assert isinstance(exchange, Exchange)
-        return exchange.request
+        assert isinstance(exchange, Request)
+        return exchange.wire
 
     write = feetech.sync_writer(servos, "goal_position", "goal_time", "goal_velocity")
 
@@ -195,8 +195,8 @@ def _ours() -> tuple[Encoder, Encoder, Encoder]:
 
     def sync_write(rows: list[tuple[float, float, float]]) -> Any:
         exchange = write(rows)
-        assert isinstance(exchange, Exchange)
-        return exchange.request
+        assert isinstance(exchange, Request)
+        return exchange.wire
 
     return read, sync_write, prepare
 

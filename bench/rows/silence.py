@@ -132,7 +132,7 @@ def ours(port: str, count: int) -> Said:
     import motorbus
     from motorbus import feetech
     from motorbus.bus.engine import MARGIN
-    from motorbus.core.operation import Exchange, Expected
+    from motorbus.core.request import Expected, Request
 
     told = motorbus.NoReply("nobody was asked yet")
     with motorbus.open(f"feetech:{port},baud={BAUD}") as bus:
@@ -150,10 +150,10 @@ def ours(port: str, count: int) -> Said:
         ask()
         sent, expected = told.sent, int(str(told.expected).split()[0])
         assert isinstance(sent, bytes)
-        asked: Exchange[None] = Exchange(sent, (Expected(NOBODY, NOBODY, expected),))
+        asked: Request[None] = Request(sent, (Expected(NOBODY, NOBODY, expected),))
         family = feetech.FAMILY
         patience = family.air_time(asked, BAUD) + family.turnaround(asked) + bus.link.latency
-        return timed(ask, count, patience + MARGIN[asked.timeout])
+        return timed(ask, count, patience + MARGIN[asked.reply_within])
 
 
 def rust(port: str, count: int) -> Said:

@@ -16,7 +16,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from motorbus.core.operation import ASKED, INTENT, OUTCOME, REACHED, READABLE, JournalEntry
+from motorbus.core.steps import ASKED, INTENT, OUTCOME, REACHED, READABLE, JournalEntry
 from motorbus.errors import LinkError, MotorbusError, RequestError
 from motorbus.link.lock import journals
 
@@ -67,7 +67,7 @@ class Change(NamedTuple):
 
 
 class BusJournal:
-    """The journal of one bus, by its address; called with a `core.operation.Journal` it records it.
+    """The journal of one bus, by its address; called with a `core.steps.JournalEntry` it records it.
 
     Without a `path` it is kept in memory: simulated devices of this process are gone with it.
     """

@@ -11,11 +11,12 @@ from typing import Any, ClassVar
 from motorbus.bus.blocking import Bus
 from motorbus.bus.stop_socket import StopOutcome
 from motorbus.bus.tasks import TaskTree
-from motorbus.core.goal import Goal
-from motorbus.core.operation import ANY, UNLIKE, Data, Exchange, Exclusive, Expected, Response, WaitFor
-from motorbus.core.operation import Effect as Effect
-from motorbus.core.operation import Priority as Priority
-from motorbus.core.operation import TimeoutClass as TimeoutClass
+from motorbus.core.request import ANY, Data, Expected, Request, Response
+from motorbus.core.request import Effect as Effect
+from motorbus.core.request import Priority as Priority
+from motorbus.core.request import TimeoutClass as TimeoutClass
+from motorbus.core.setpoint import Setpoint
+from motorbus.core.steps import Exclusive, WaitFor
 from motorbus.errors import LinkLost
 from motorbus.families import feetech, kst
 from motorbus.families.kst.wire import download_due, upload_due
@@ -37,7 +38,7 @@ def request(
     goal: float = 0.0,
     alternate: Callable[[], Any] | None = None,
     **options: Any,
-) -> Exchange[Any]:
+) -> Request[Any]:
     """One request and the replies it calls for: (node, key, length) each; None: all until the deadline."""
     makers = {"upload": upload_due, "download": download_due}
     dues = tuple(
@@ -53,24 +54,24 @@ def request(
         for due in dues:
             part = data[start : start + due.length]
             if part[:3] != bytes([0xFF, 0xFF, due.node]) or part[4] or ~sum(part[2:-1]) & 0xFF != part[-1]:
-                return UNLIKE
+                return None
             parts.append(part)
             start += due.length
-        return decode(parts) if start == len(data) else UNLIKE
+        return decode(parts) if start == len(data) else None
 
-    return Exchange(
+    return Request(
         frame,
         ANY if expected is None else dues,
         read,
-        rank=priority,
-        goals=() if goal_of is None else (Goal(goal_of, "position", goal, -1.0, 1.0),),
-        other=alternate,
-        whole=whole if isinstance(frame, bytes) and dues else None,
+        priority=priority,
+        setpoints=() if goal_of is None else (Setpoint(goal_of, "position", goal, -1.0, 1.0),),
+        alternate=alternate,
+        decode_exact=whole if isinstance(frame, bytes) and dues else None,
         **options,
     )
 
 
-async def exclusive(*requests: Exchange[Any]) -> Any:
+async def exclusive(*requests: Request[Any]) -> Any:
     """These requests in order, and no other in between."""
 
     async def sequence() -> list[Any]:

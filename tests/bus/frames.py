@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from motorbus.core.operation import CanFrame
+from motorbus.core.can_frame import CanFrame
 from tests.bus.adapter import Effect, Priority, request
 
 BROADCAST = 254

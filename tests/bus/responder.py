@@ -7,7 +7,7 @@ from typing import Any
 
 from motorbus.bus.blocking import Bus
 from motorbus.core.family import SimulatedNode
-from motorbus.core.operation import Data, Effect, Exchange, Expected, Response
+from motorbus.core.request import Data, Effect, Expected, Request, Response
 from motorbus.families.feetech import FAMILY, wire
 from motorbus.link.base import Line
 from motorbus.link.memory import MemoryLink
@@ -78,13 +78,13 @@ def first_byte(answer: Response) -> int:
     return answer.replies[0].data[5]
 
 
-def position(node: int) -> Exchange[int]:
+def position(node: int) -> Request[int]:
     """The low byte of register 56, which is the id."""
-    return Exchange(wire.read(node, 56, 2), (Expected(node, node, 8),), first_byte, repeatable=True)
+    return Request(wire.read(node, 56, 2), (Expected(node, node, 8),), first_byte, repeatable=True)
 
 
-def write(node: int, address: int, value: int, effect: Effect = Effect.NONE) -> Exchange[Response]:
-    return Exchange(
+def write(node: int, address: int, value: int, effect: Effect = Effect.NONE) -> Request[Response]:
+    return Request(
         wire.write(node, address, bytes([value])), (Expected(node, node, 6),), effect=effect, repeatable=True
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from motorbus.core.operation import Exchange
+from motorbus.core.request import Request
 
 
 class Check:
@@ -15,10 +15,10 @@ class Check:
         self._check = check
         self.stops: list[tuple[int, ...]] = []
 
-    def check(self, request: Exchange[Any], now: float) -> None:
+    def check(self, request: Request[Any], now: float) -> None:
         self._check(request)
 
-    def required_reads(self, request: Exchange[Any]) -> Sequence[Any]:
+    def required_reads(self, request: Request[Any]) -> Sequence[Any]:
         return ()
 
     def stopped(self, nodes: Sequence[int]) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.core.operation import CanFrame
+from motorbus.core.can_frame import CanFrame
 from motorbus.errors import (
     ChecksumError,
     FramingError,
@@ -268,7 +268,7 @@ def test_a_group_reply_does_not_prove_a_node_that_owes_one(engine: Engine) -> No
     """A scan is sent without a probe, too."""
     engine.submit("a", read(1, repeatable=False))
     engine.advance(0.03)
-    engine.submit("b", read(1, 3, timeout=TimeoutClass.SCAN))
+    engine.submit("b", read(1, 3, reply_within=TimeoutClass.SCAN))
     engine.deliver(said(1, 7, 3))
     assert engine.result("b") == 7
     engine.sent()
@@ -759,7 +759,7 @@ def test_a_late_acknowledgement_is_not_taken_for_that_of_the_stop(engine: Engine
 def test_a_can_node_is_held_at_a_fresh_position_and_asked_for_an_old_one(can: Engine) -> None:
     servos = can.wire.answer = Servos()
     for age, frames in ((0.0, [4]), (10.0, [4, 4])):
-        assert can.run(can_read(4, tells_position=True)) == 400
+        assert can.run(can_read(4, reports_position=True)) == 400
         can.advance(age)
         can.sent()
         outcome = can.estop()
@@ -789,7 +789,7 @@ def test_the_gate_is_asked_before_every_try_of_motion_and_torque() -> None:
     asked: list[bytes] = []
 
     def check(one: Any) -> None:
-        asked.append(one.request)
+        asked.append(one.wire)
         if len(asked) == 3:
             raise LimitExceeded("beyond the limit")
 

@@ -20,7 +20,7 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
-from motorbus.core.operation import CanFrame
+from motorbus.core.can_frame import CanFrame
 from motorbus.errors import Interrupted, LinkLost, MotorbusError
 from tests.bus.adapter import PENDING, Cancelled, Effect, Engine, Priority, exclusive, request
 from tests.bus.frames import (

@@ -7,10 +7,9 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import (
-    CanFrame,
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.steps import (
     Emit,
-    Gather,
     JournalEntry,
     Procedure,
     Progress,
@@ -18,6 +17,7 @@ from motorbus.core.operation import (
     Sleep,
     WaitFor,
     catch,
+    gather,
     with_cleanup,
 )
 from motorbus.errors import LinkError, NoReply, RequestError
@@ -68,14 +68,14 @@ async def turning(*rests: float) -> None:
 def test_each_step_gives_its_value(engine: Engine) -> None:
     async def everything() -> list[Any]:
         values: list[Any] = [await read(1)]
-        values += await Gather([read(2), read(3)])
+        values += await gather(read(2), read(3))
         none: list[Any] = []
-        values.append(await Gather(none))
+        values.append(await gather(*none))
         values.append(await Sleep(3600.0) > 3600.0)
         values += [await SetBitrate(500_000), await SetBitrate(0), await read(4)]
         return values
 
-    assert engine.run(everything()) == [100, 200, 300, [], True, 1_000_000, 500_000, 400]
+    assert engine.run(everything()) == [100, 200, 300, (), True, 1_000_000, 500_000, 400]
     assert engine.bus.rate == engine.wire.rate == 500_000
 
 
@@ -84,7 +84,7 @@ def test_one_failure_of_several_stops_none_of_the_others(engine: Engine) -> None
     servos.silent = {2, 4}
 
     async def several() -> list[Any]:
-        return await Gather([read(node) for node in (1, 2, 3, 4)])
+        return list(await gather(*[read(node) for node in (1, 2, 3, 4)]))
 
     with pytest.raises(NoReply, match="node 2") as caught:
         engine.run(several())
@@ -128,7 +128,7 @@ def test_without_a_journal_a_guarded_change_is_refused_before_it_begins(engine: 
 @pytest.mark.parametrize("after", [0.0, 0.0005, 0.001, 0.0015])
 def test_a_cancelled_change_closes_its_lock_at_every_step(engine: Engine, after: float) -> None:
     async def both() -> Any:
-        return await Gather([guarded(node, Sleep(0.001)) for node in (1, 2)])
+        return await gather(*[guarded(node, Sleep(0.001)) for node in (1, 2)])
 
     engine.submit("a", both())
     engine.advance(after)
@@ -173,7 +173,7 @@ def test_what_a_clean_up_failed_with_goes_with_the_cancellation_once(engine: Eng
             raise RequestError(text)
 
     async def several() -> Any:
-        return await Gather([failing("it may turn"), failing("it may turn"), failing("so may this")])
+        return await gather(failing("it may turn"), failing("it may turn"), failing("so may this"))
 
     engine.submit("a", several())
     engine.cancel("a")
@@ -213,7 +213,7 @@ def test_a_rate_that_the_link_refuses_fails_the_change_only(
 
 
 def test_a_stop_is_sent_at_the_rate_at_which_nodes_answered(can: Engine) -> None:
-    can.run(can_read(1, tells_position=True))
+    can.run(can_read(1, reports_position=True))
     can.run(SetBitrate(125_000, listen_only=True))
     assert can.estop().acknowledged == (1,)
     assert can.bus.rate == can.wire.rate == 500_000
@@ -221,7 +221,7 @@ def test_a_stop_is_sent_at_the_rate_at_which_nodes_answered(can: Engine) -> None
 
 def test_after_a_motion_order_a_stop_asks_where_the_node_is(can: Engine) -> None:
     for node in (1, 2):
-        can.run(can_read(node, tells_position=True))
+        can.run(can_read(node, reports_position=True))
     can.run(can_move(1, 500))
     can.wire.answer = servos = Servos(lambda node: 333)
     servos.silent = {3}

@@ -17,7 +17,8 @@ import motorbus
 from motorbus import feetech
 from motorbus.bus.blocking import exchange_on
 from motorbus.bus.running import run_on
-from motorbus.core.operation import Exchange, Sleep
+from motorbus.core.request import Request
+from motorbus.core.steps import Sleep
 from motorbus.errors import Interrupted, LinkLost
 from motorbus.families.feetech.driver.torque import disable_torque_everyone
 from tests.bus.test_batches import Arm
@@ -38,7 +39,7 @@ def started(work: Callable[[], object]) -> threading.Thread:
     return thread
 
 
-async def carried_out(order: Exchange[Any]) -> None:
+async def carried_out(order: Request[Any]) -> None:
     await order
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motorbus.bus.statistics import BUCKETS, Statistics
-from motorbus.core.operation import ANY, Expected
+from motorbus.core.request import ANY, Expected
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,8 @@ import pytest
 
 from motorbus.bus.blocking import Bus
 from motorbus.bus.stop_socket import STOP_TIMEOUT, request_estop
-from motorbus.core.operation import Effect, Exchange, SetBitrate
+from motorbus.core.request import Effect, Request
+from motorbus.core.steps import SetBitrate
 from motorbus.errors import LinkError, LinkLost, PortNotFound
 from motorbus.families.feetech import FAMILY
 from motorbus.link.memory import MemoryLink
@@ -64,7 +65,7 @@ def test_the_interlock_learns_of_every_stop_from_any_thread(turn_is_free: bool) 
 
 def test_a_stop_reads_nothing_first_whatever_the_interlock_requires() -> None:
     class Cautious(Check):
-        def required_reads(self, request: Exchange[Any]) -> list[Exchange[int]]:
+        def required_reads(self, request: Request[Any]) -> list[Request[int]]:
             return [position(1)]
 
     bus, responder = memory_bus(virtual=False)
@@ -89,7 +90,9 @@ def test_a_stop_of_many_silent_nodes_ends_in_time_and_says_what_was_sent() -> No
 def test_a_stop_is_sent_at_the_rate_of_the_last_prepared_reply() -> None:
     bus, responder = memory_bus()
     read = position(1)
-    kept = Exchange(read.request, read.replies, read.read, repeatable=True, whole=lambda data, at: data[5])
+    kept = Request(
+        read.wire, read.expected, read.decode, repeatable=True, decode_exact=lambda data, at: data[5]
+    )
     for rate in (1_000_000, 500_000):
         bus.run(SetBitrate(rate))
         for _ in range(3):

@@ -15,7 +15,7 @@ import motorbus
 from motorbus.cli import main
 from motorbus.cli.machine import VARIABLE
 from motorbus.cli.simulated import Simulated
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.link import usb_adapters
 from motorbus.motion.machine import Machine
 from motorbus.simulation.named import Simulation

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from motorbus.cli.simulated import Simulated
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Bench, Run
 from tests.cli.test_estop import FOREIGN, WATCHING, program

@@ -11,17 +11,17 @@ from motorbus.cli import dry
 from motorbus.cli.dry import DryBus
 from motorbus.cli.exits import Unforeseeable
 from motorbus.cli.output import Output
-from motorbus.core.operation import (
+from motorbus.core.request import Request
+from motorbus.core.steps import (
     INTENT,
     Emit,
-    Exchange,
     Exclusive,
-    Gather,
     JournalEntry,
     Progress,
     SetBitrate,
     Sleep,
     WaitFor,
+    gather,
 )
 from motorbus.errors import LimitExceeded
 from motorbus.families.feetech import FAMILY, Servo
@@ -131,7 +131,7 @@ def test_every_kind_of_step_is_gone_through(arm: Simulation) -> None:
         return name
 
     async def outer() -> list[str]:
-        return [await Exclusive(inner("a")), *await Gather([inner("b"), inner("c")])]
+        return [await Exclusive(inner("a")), *await gather(inner("b"), inner("c"))]
 
     with motorbus.open(arm.url) as bus:
         assert DryBus(bus).run(outer()) == ["a", "b", "c"]
@@ -140,9 +140,9 @@ def test_every_kind_of_step_is_gone_through(arm: Simulation) -> None:
 def test_an_error_reaches_the_operation(arm: Simulation) -> None:
     absent = motorbus.feetech.FAMILY.probe(9, 0)
 
-    async def careful(exchange: Exchange[bool]) -> str:
+    async def careful(request: Request[bool]) -> str:
         try:
-            await exchange
+            await request
         except motorbus.NoReply:
             return "nobody"
         return "somebody"

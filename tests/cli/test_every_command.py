@@ -14,7 +14,8 @@ import pytest
 
 import motorbus
 from motorbus import families
-from motorbus.core.operation import INTENT, CanFrame, JournalEntry
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.steps import INTENT, JournalEntry
 from tests.cli.conftest import Bench, Run
 from tests.support.subjects import FAMILIES, TEMPLATE, template_entry_points, vectors
 from tests.support.world import moves

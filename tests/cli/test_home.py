@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import motorbus
-from motorbus.core.operation import Sleep
+from motorbus.core.steps import Sleep
 from tests.cli.conftest import Bench, Run
 from tests.cli.stepper.conftest import line_of
 

@@ -10,7 +10,7 @@ import pytest
 
 import motorbus
 from motorbus.cli.simulated import Simulated
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.motion.machine import Machine
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run

@@ -6,7 +6,7 @@ import pytest
 
 import motorbus
 from motorbus.cli import monitor
-from motorbus.core.operation import Sleep
+from motorbus.core.steps import Sleep
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Bench, Run
 

@@ -7,12 +7,12 @@ import math
 import pytest
 
 from motorbus.cli import quantity
-from motorbus.core.entry import Access, Entry, Storage
+from motorbus.core.register import Access, Register, Storage
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.node import Node, Settings
 from motorbus.families.feetech.table import STS
 
-ANGLE = Entry(
+ANGLE = Register(
     name="angle",
     address=1,
     size=2,
@@ -23,7 +23,7 @@ ANGLE = Entry(
     scale=math.tau / 4096,
     high=4095,
 )
-MODE = Entry(
+MODE = Register(
     name="mode",
     address=3,
     size=1,
@@ -33,7 +33,7 @@ MODE = Entry(
     high=3,
     choices={0: "position", 1: "velocity"},
 )
-FLAGS = Entry(
+FLAGS = Register(
     name="flags",
     address=4,
     size=1,
@@ -79,7 +79,7 @@ def test_a_plain_number_may_be_named(text: str, number: int) -> None:
         (MODE, "1.5"),
     ],
 )
-def test_what_is_no_value_is_refused(entry: Entry, text: str) -> None:
+def test_what_is_no_value_is_refused(entry: Register, text: str) -> None:
     with pytest.raises(RequestError):
         quantity.typed(entry, text)
 
@@ -119,5 +119,5 @@ def test_a_value_is_shown_with_its_unit(number: float | None, unit: str, text: s
     ("entry", "raw", "text"),
     [(MODE, 1, "velocity"), (MODE, 3, ""), (FLAGS, 9, "hot, stuck"), (FLAGS, 0, "")],
 )
-def test_a_raw_value_is_told_in_words(entry: Entry, raw: int, text: str) -> None:
+def test_a_raw_value_is_told_in_words(entry: Register, raw: int, text: str) -> None:
     assert quantity.meaning(entry, raw) == text

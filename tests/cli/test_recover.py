@@ -14,7 +14,7 @@ import pytest
 import motorbus
 from motorbus import session
 from motorbus.cli.simulated import Simulated
-from motorbus.core.operation import INTENT, JournalEntry
+from motorbus.core.steps import INTENT, JournalEntry
 from motorbus.journal import BusJournal
 from motorbus.link.lock import journal_path
 from motorbus.simulation.named import Simulation

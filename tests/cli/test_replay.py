@@ -8,7 +8,7 @@ from typing import get_args
 import pytest
 
 from motorbus.cli import replay
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.motion.trajectory import Interpolation
 from tests.cli.conftest import Bench, Run
 from tests.cli.test_follow import at

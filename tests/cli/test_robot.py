@@ -11,7 +11,7 @@ from motorbus.cli import robot
 from motorbus.cli.machine import machine as machine_of_file
 from motorbus.cli.machine import using
 from motorbus.cli.output import Output
-from motorbus.core.operation import INTENT, JournalEntry, Progress
+from motorbus.core.steps import INTENT, JournalEntry, Progress
 from motorbus.errors import MotorbusError, RequestError
 from tests.cli.conftest import Bench, Run
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from tests.cli.conftest import Bench, Run
 from tests.support.machines import listened, said
 

@@ -6,7 +6,7 @@ import pytest
 
 import motorbus
 from motorbus.cli.exits import Exit
-from motorbus.core.operation import INTENT, OUTCOME, JournalEntry
+from motorbus.core.steps import INTENT, OUTCOME, JournalEntry
 from tests.cli.conftest import Bench, Run
 
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import pytest
 
-from motorbus.core.assurance import Assurance, Given
 from motorbus.core.family import Family
+from motorbus.core.guarantees import Guarantees, Level
 from tests.support.subjects import FAMILIES
 from tests.support.world import abilities, world
 
@@ -20,7 +20,7 @@ def declared(request: pytest.FixtureRequest) -> Family:
     return DECLARED[request.param]
 
 
-def assurance(family: Family) -> Assurance:
+def assurance(family: Family) -> Guarantees:
     found = family.devices.assures
     assert found is not None
     return found
@@ -34,16 +34,16 @@ def test_every_sentence_is_one_and_no_watchdog_is_claimed(declared: Family) -> N
     for about, point in assurance(declared).points():
         assert point.text.strip(), about
         assert not point.text.endswith("."), about
-    assert assurance(declared).watchdog.given is Given.NO
+    assert assurance(declared).watchdog.given is Level.NO
 
 
 def test_what_is_claimed_of_its_devices_is_what_an_axis_can_do(declared: Family) -> None:
     said, able = assurance(declared), abilities(declared)
-    assert (said.measured.given is Given.YES) == ("position" in able)
-    assert (said.torque.given is Given.YES) == ("disable_torque" in able)
-    assert (said.limits.given is not Given.NO) == ("limits" in able)
-    assert (said.restart.given is not Given.NO) == ("health" in able)
-    assert (said.strain.given is not Given.NO) == ("health" in able)
+    assert (said.measured.given is Level.YES) == ("position" in able)
+    assert (said.torque.given is Level.YES) == ("disable_torque" in able)
+    assert (said.limits.given is not Level.NO) == ("limits" in able)
+    assert (said.restart.given is not Level.NO) == ("health" in able)
+    assert (said.strain.given is not Level.NO) == ("health" in able)
     assert said.led == ("train" in able)
 
 

@@ -9,8 +9,9 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.family import Family, Health, State, Train
-from motorbus.core.operation import Effect, Exchange, Gather, Runnable, catch
+from motorbus.core.family import Family, Health, PositionStream, State
+from motorbus.core.request import Effect, Request
+from motorbus.core.steps import Runnable, catch, gather
 from motorbus.errors import LimitExceeded, NoReply, RequestError
 from tests.support.subjects import line_of
 from tests.support.world import IDS, Steps, World, abilities, kept, sent, world
@@ -81,7 +82,7 @@ def test_health_is_one_exchange_of_a_known_device_writes_nothing_and_agrees_with
         device = there.device(NODE)
         ran(there, able["health"](device))
         wanted = able["health"](device)
-        assert isinstance(wanted, Exchange)
+        assert isinstance(wanted, Request)
         found, state = ran(there, wanted), ran(there, able["state"](device))
         assert isinstance(found, Health)
         assert found.torque in ((True, False) if "enable_torque" in able else (None,))
@@ -137,20 +138,20 @@ def ran(there: World, operation: Runnable[Any], worst: Effect = Effect.NONE) -> 
     """The value of the operation, of which nothing had a greater effect than this."""
     steps = Steps(there.bus)
     value = steps.run(operation)
-    assert max((exchange.effect for exchange in steps.exchanges), default=Effect.NONE) <= worst
+    assert max((request.effect for request in steps.requests), default=Effect.NONE) <= worst
     return value
 
 
-def coupled(there: World) -> Train:
+def coupled(there: World) -> PositionStream:
     """All devices as a train; so far nothing was written."""
     before = there.settings()
     devices = [there.device(node) for node in there.ids]
-    train: Train = ran(there, abilities(there.family)["train"](devices, rate=there.family.link.rate))
+    train: PositionStream = ran(there, abilities(there.family)["train"](devices, rate=there.family.link.rate))
     assert there.settings() == before
     return train
 
 
-def heard(there: World, train: Train) -> dict[int, float]:
+def heard(there: World, train: PositionStream) -> dict[int, float]:
     """All positions that it brings; a node that is silent is missing, or all that its exchange asked for."""
     values: dict[int, float] = {}
     for found in there.bus.run(visited(train.positions)):
@@ -163,16 +164,16 @@ def heard(there: World, train: Train) -> dict[int, float]:
     return values
 
 
-async def visited(exchanges: Any) -> list[Any]:
-    return await Gather([catch(one) for one in exchanges])
+async def visited(requests: Any) -> list[Any]:
+    return list(await gather(*[catch(one) for one in requests]))
 
 
-def led(there: World, train: Train, to: Mapping[int, float]) -> None:
+def led(there: World, train: PositionStream, to: Mapping[int, float]) -> None:
     there.bus.run(together(train.goals(to)))
 
 
-async def together(exchanges: Any) -> None:
-    await Gather(list(exchanges))
+async def together(requests: Any) -> None:
+    await gather(*list(requests))
 
 
 def stands(there: World) -> dict[int, int]:
@@ -201,7 +202,7 @@ def test_it_is_known_by_then_and_positions_and_goals_ask_nothing_more(leader: Fa
         with sent(there.bus) as frames:
             there.bus.run(together(goals))
         assert len(frames) == len(goals)
-        assert all(isinstance(one, Exchange) and one.effect is Effect.MOTION for one in goals)
+        assert all(isinstance(one, Request) and one.effect is Effect.MOTION for one in goals)
 
 
 def test_beginning_moves_nothing_wherever_the_devices_went_before(leader: Family) -> None:
@@ -297,9 +298,9 @@ def test_every_goal_names_its_node_and_the_limits_that_the_gate_judges_it_by(lea
     with world(leader) as there:
         train = coupled(there)
         for goal in train.goals(heard(there, train)):
-            assert goal.goals
-            assert all(one.low is not None and one.high is not None for one in goal.goals)
-            assert {one.node for one in goal.goals} <= set(train.nodes)
+            assert goal.setpoints
+            assert all(one.low is not None and one.high is not None for one in goal.setpoints)
+            assert {one.node for one in goal.setpoints} <= set(train.nodes)
 
 
 def test_goals_made_before_a_setting_was_written_do_not_leave(keeping_leader: Family) -> None:
@@ -314,7 +315,7 @@ def test_goals_made_before_a_setting_was_written_do_not_leave(keeping_leader: Fa
         device.write(
             **{row.name: row.to_value(held - 1 if held > row.low else held + 1)}
         )  # what is so is not written
-        mine = [one for one in goals if NODE in {goal.node for goal in one.goals}]
+        mine = [one for one in goals if NODE in {goal.node for goal in one.setpoints}]
         with sent(there.bus) as frames:
             for one in mine:
                 with pytest.raises(RequestError):
@@ -333,7 +334,7 @@ def test_a_dead_node_is_missing_and_costs_nobody_else_his_position(leader: Famil
         led_others(there, train, dead)
 
 
-def led_others(there: World, train: Train, dead: int) -> None:
+def led_others(there: World, train: PositionStream, dead: int) -> None:
     """Who is there follows a goal although one is dead."""
     alive = heard(there, train)
     to = {node: here + 0.02 for node, here in alive.items()}
@@ -364,7 +365,7 @@ def test_who_is_known_is_coupled_again_without_being_asked(leader: Family) -> No
     able = abilities(leader)
     with world(leader) as there:
         devices = [there.device(node) for node in there.ids]
-        make: Callable[[], Runnable[Train]] = lambda: able["train"](devices, rate=leader.link.rate)  # noqa: E731
+        make: Callable[[], Runnable[PositionStream]] = lambda: able["train"](devices, rate=leader.link.rate)  # noqa: E731
         there.bus.run(make())
         with sent(there.bus) as frames:
             there.bus.run(make())

@@ -10,19 +10,10 @@ from typing import Any
 import grimp
 import pytest
 
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import Family
-from motorbus.core.operation import (
-    ANY,
-    CanFrame,
-    Data,
-    Effect,
-    Exchange,
-    Expected,
-    Gather,
-    Priority,
-    Response,
-    TimeoutClass,
-)
+from motorbus.core.request import ANY, Data, Effect, Expected, Priority, Request, Response, TimeoutClass
+from motorbus.core.steps import gather
 from motorbus.errors import MotorbusError, RequestError
 from tests.support.subjects import FAMILIES, PACKAGES, line_of, possible
 from tests.support.world import IDS, World, world
@@ -101,17 +92,17 @@ def test_air_time_grows_with_length_and_falls_with_rate(family: Family) -> None:
 
     def takes(request: int, *replies: int) -> float:
         dues = tuple(Expected(1, 1, length) for length in replies)
-        return family.air_time(Exchange(request_of(family, request), dues), rate)
+        return family.air_time(Request(request_of(family, request), dues), rate)
 
     assert 0 < takes(1) < takes(4) < takes(8) < takes(8, 1) < takes(8, 4) < takes(8, 8) < takes(8, 8, 1)
-    some: Exchange[Any] = Exchange(request_of(family, 8), (Expected(1, 1, 8),))
+    some: Request[Any] = Request(request_of(family, 8), (Expected(1, 1, 8),))
     assert family.air_time(some, rate) > family.air_time(some, 2 * rate)
-    assert family.air_time(Exchange(request_of(family, 8), ANY), rate) > 0
+    assert family.air_time(Request(request_of(family, 8), ANY), rate) > 0
 
 
 def test_thinking_takes_some_time_and_storing_no_less(family: Family) -> None:
     times = {
-        kind: family.turnaround(Exchange(request_of(family, 8), (Expected(1, 1, 8),), timeout=kind))
+        kind: family.turnaround(Request(request_of(family, 8), (Expected(1, 1, 8),), reply_within=kind))
         for kind in TimeoutClass
     }
     assert 0 < times[TimeoutClass.REPLY] <= times[TimeoutClass.STORE]
@@ -139,7 +130,7 @@ def test_lanes_and_window_agree_and_as_many_fly_as_the_window_allows(subject: Fa
 
 
 async def probes(family: Family) -> list[bool]:
-    return await Gather([family.probe(node, 0) for node in possible(family, IDS)])
+    return list(await gather(*[family.probe(node, 0) for node in possible(family, IDS)]))
 
 
 # --- probes, echo, stop -------------------------------------------------------------------------------------
@@ -151,19 +142,19 @@ def test_an_echo_test_is_answered_by_another_length_than_its_own(family: Family)
         assert family.link.kind == "frames"  # only a CAN controller never hears itself
         return
     assert test.effect is Effect.NONE
-    assert test.replies is ANY or {due.length for due in test.replies} & {len(test.request)} == set()
+    assert test.expected is ANY or {due.length for due in test.expected} & {len(test.wire)} == set()
 
 
 def test_probes_differ_from_each_other_and_from_their_echo(family: Family) -> None:
     seen = set()
     for attempt in range(64):
         probe = family.probe(IDS[0], attempt)
-        assert probe.replies is not ANY
-        (due,) = probe.replies
+        assert probe.expected is not ANY
+        (due,) = probe.expected
         assert (due.node, probe.lane) == (IDS[0], family.lane(IDS[0]))
         assert (probe.effect, probe.repeatable) == (Effect.NONE, True)
-        if isinstance(probe.request, bytes):
-            assert due.length != len(probe.request)
+        if isinstance(probe.wire, bytes):
+            assert due.length != len(probe.wire)
         seen.add((due.key, due.length))
     assert len(seen) >= line_of(family).probes
 
@@ -178,10 +169,10 @@ def test_probes_are_answered_truthfully(subject: Family) -> None:
 def test_a_probe_knows_a_wrong_answer(subject: Family) -> None:
     with world(subject) as there:
         probe = subject.probe(IDS[0], 0)
-        assert probe.read is not None
-        plain: Exchange[Response] = Exchange(probe.request, probe.replies, lane=probe.lane)
+        assert probe.decode is not None
+        plain: Request[Response] = Request(probe.wire, probe.expected, lane=probe.lane)
         answer = there.bus.run(plain)
-        assert probe.read(answer) is True
+        assert probe.decode(answer) is True
         wrong = [answer.replies[0]._replace(data=damaged) for damaged in one_bit_off(answer.replies[0].data)]
         verdicts = [verdict(probe, answer._replace(replies=(reply,))) for reply in wrong]
         assert False in verdicts
@@ -192,11 +183,11 @@ def one_bit_off(data: bytes) -> list[bytes]:
             for place in range(len(data)) for bit in range(8)]  # fmt: skip
 
 
-def verdict(probe: Exchange[bool], answer: Response) -> bool | None:
+def verdict(probe: Request[bool], answer: Response) -> bool | None:
     """What the probe makes of an answer; None when it calls it an error, as a refusal."""
-    assert probe.read is not None
+    assert probe.decode is not None
     try:
-        return probe.read(answer)
+        return probe.decode(answer)
     except MotorbusError:
         return None
 
@@ -206,13 +197,13 @@ def test_a_stop_says_what_it_promises(family: Family, nodes: tuple[int, ...]) ->
     nodes = possible(family, nodes)
     stop = family.stop(dict.fromkeys(nodes))
     assert stop.promise.strip()
-    assert {exchange.rank for exchange in stop.exchanges} <= {Priority.STOP}
-    dues = [due.node for one in stop.exchanges if one.replies is not ANY for due in one.replies]
+    assert {exchange.priority for exchange in stop.requests} <= {Priority.STOP}
+    dues = [due.node for one in stop.requests if one.expected is not ANY for due in one.expected]
     assert set(dues) == set(nodes)
     assert {dues.count(node) for node in nodes} <= ({1} if line_of(family).devices != 1 else {1, 2})
-    for exchange in stop.exchanges:
-        if exchange.replies is not ANY and exchange.replies:
-            assert exchange.lane == family.lane(exchange.replies[0].node)
+    for exchange in stop.requests:
+        if exchange.expected is not ANY and exchange.expected:
+            assert exchange.lane == family.lane(exchange.expected[0].node)
 
 
 def test_capabilities_belong_to_a_model(subject: Family) -> None:

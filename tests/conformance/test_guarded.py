@@ -12,9 +12,9 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.entry import Entry
 from motorbus.core.family import Family
-from motorbus.core.operation import Data
+from motorbus.core.register import Register
+from motorbus.core.request import Data
 from motorbus.errors import MotorbusError
 from motorbus.link.memory import MemoryLink
 from tests.support.world import IDS, Cut, Steps, World, closed, kept, locks, said, samples, world
@@ -23,7 +23,7 @@ NODE = IDS[0]
 MOST = 2000
 
 
-def change(there: World) -> tuple[Entry, int]:
+def change(there: World) -> tuple[Register, int]:
     """A row that is kept in EEPROM, and another value than it has; a number, for a choice may be how it answers."""
     row = next(row for row in kept(there.table(NODE)) if not row.choices)
     held = there.memory(NODE)[row.name]

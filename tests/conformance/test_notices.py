@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from motorbus.core.family import Family
-from motorbus.core.operation import Data, Notification, WaitFor
+from motorbus.core.request import Data, Notification
+from motorbus.core.steps import WaitFor
 from motorbus.link.base import Delivery, PerfectLine, Side
 from tests.support.subjects import vectors
 from tests.support.world import IDS, reports, said, sent, world

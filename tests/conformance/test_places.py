@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from motorbus.core.family import Family
-from motorbus.core.operation import Exchange
+from motorbus.core.request import Request
 from tests.support.world import IDS, World, abilities, world
 
 NODE = IDS[0]
@@ -19,9 +19,9 @@ def test_the_bus_keeps_what_told_a_position_and_how_to_read_it(leader: Family, o
     with world(leader) as found:
         told = _told(found, one)
         with found.bus.lock:
-            exchange, answer = found.bus.positions[NODE]
-        assert callable(exchange.tells_position)
-        place = exchange.tells_position(answer)[NODE]
+            request, answer = found.bus.positions[NODE]
+        assert callable(request.reports_position)
+        place = request.reports_position(answer)[NODE]
         assert place == pytest.approx(told)
         assert abs(place) < 4 * pi
 
@@ -34,5 +34,5 @@ def _told(found: World, one: str) -> float:
         return float(told.position if one == "state" else told)
     train = found.bus.run(able["train"]([device], rate=found.bus.rate))
     (reading,) = train.positions
-    assert isinstance(reading, Exchange)
+    assert isinstance(reading, Request)
     return float(found.bus.run(reading).values[NODE])

@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from motorbus.core.family import Family, Found
-from motorbus.core.operation import Effect, Exchange, Gather, Progress, Runnable
+from motorbus.core.request import Effect, Request
+from motorbus.core.steps import Progress, Runnable, gather
 from motorbus.errors import NoReply
 from tests.support.subjects import possible
 from tests.support.world import IDS, Cut, Steps, TraceRecord, World, has, said, sent, world
@@ -35,8 +36,8 @@ def test_looking_has_no_effect(subject: Family) -> None:
         for name, operation in looks(there).items():
             steps = Steps(there.bus)
             steps.run(operation)
-            assert {exchange.effect for exchange in steps.exchanges} == {Effect.NONE}, name
-            assert [exchange.goals for exchange in steps.exchanges if exchange.goals] == []
+            assert {request.effect for request in steps.requests} == {Effect.NONE}, name
+            assert [request.setpoints for request in steps.requests if request.setpoints] == []
         assert there.settings() == before
 
 
@@ -45,11 +46,11 @@ def test_what_looks_is_marked_repeatable(subject: Family) -> None:
         for name, operation in looks(there).items():
             steps = Steps(there.bus)
             steps.run(operation)
-            assert [one for one in steps.exchanges if not one.repeatable and not is_group(one)] == [], name
+            assert [one for one in steps.requests if not one.repeatable and not is_group(one)] == [], name
 
 
-def is_group(exchange: Exchange[Any]) -> bool:
-    return not isinstance(exchange.replies, tuple) or len(exchange.replies) != 1
+def is_group(request: Request[Any]) -> bool:
+    return not isinstance(request.expected, tuple) or len(request.expected) != 1
 
 
 def test_identify_says_what_is_there(subject: Family) -> None:
@@ -201,7 +202,7 @@ def test_what_a_simulated_node_says_of_itself_is_plain_data(subject: Family) -> 
 
 def test_nodes_that_go_and_come_are_noticed(subject: Family) -> None:
     async def everyone() -> list[bool]:
-        return await Gather([said(there.device(node), "ping") for node in there.ids])
+        return list(await gather(*[said(there.device(node), "ping") for node in there.ids]))
 
     with world(subject) as there:
         assert there.bus.run(everyone()) == [True] * len(there.ids)

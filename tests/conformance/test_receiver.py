@@ -13,8 +13,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import Explanation, Family, Receiver
-from motorbus.core.operation import CanFrame, Data, Event, Noise, Notification, Reply
+from motorbus.core.request import Data, Event, Noise, Notification, Reply
 from tests.support.subjects import FAMILIES, Vector, line_of, payload, possible, vectors
 
 MOST_HELD = 4096

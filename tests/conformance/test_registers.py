@@ -7,19 +7,19 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.core.entry import Entry, Storage
 from motorbus.core.family import Family
+from motorbus.core.register import Register, Storage
 from motorbus.errors import RequestError
 from tests.support.world import IDS, World, kept, plain, samples, sent, world
 
 NODE = IDS[0]
 
 
-def write(there: World, row: Entry, raw: int) -> None:
+def write(there: World, row: Register, raw: int) -> None:
     there.device(NODE).write(**{row.name: row.to_value(raw)})
 
 
-def wrong_after(there: World, row: Entry, raw: int) -> str:
+def wrong_after(there: World, row: Register, raw: int) -> str:
     """Write it; "" when the memory and the next reading agree that it is there."""
     write(there, row, raw)
     held = there.memory(NODE)[row.name]

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from motorbus.core.family import Family
-from motorbus.core.operation import Effect, Exchange
+from motorbus.core.request import Effect, Request
 from motorbus.errors import Interrupted, MotionError, NoReply
 from tests.conformance.test_guarded import Interrupting, guarded
 from tests.support.subjects import possible
@@ -75,7 +75,7 @@ def assert_at_rest(there: World, outcome: StopOutcome, silent: tuple[int, ...] =
 def test_when_nobody_is_known_yet(subject: Family) -> None:
     with world(subject) as there, sent(there.bus) as frames:
         assert there.bus.estop().promise
-    assert len(frames) >= len(subject.stop({}).exchanges)
+    assert len(frames) >= len(subject.stop({}).requests)
 
 
 def test_when_idle(mover: Family) -> None:
@@ -193,16 +193,16 @@ def test_at_any_moment_of_a_move(mover: Family) -> None:
 
 def test_what_stops_does_not_switch_on_or_keep(family: Family) -> None:
     nodes = dict.fromkeys(possible(family, IDS))
-    effects = {exchange.effect for exchange in family.stop(nodes).exchanges}
+    effects = {request.effect for request in family.stop(nodes).requests}
     assert effects <= {Effect.NONE, Effect.TORQUE, Effect.MOTION}
 
 
 def test_stop_frames_are_small_enough_to_hurry(family: Family) -> None:
-    def air(exchange: Exchange[Any]) -> float:
-        return family.air_time(exchange, family.link.rate)
+    def air(request: Request[Any]) -> float:
+        return family.air_time(request, family.link.rate)
 
     nodes = dict.fromkeys(possible(family, IDS))
-    assert all(air(exchange) < 0.02 for exchange in family.stop(nodes).exchanges)
+    assert all(air(request) < 0.02 for request in family.stop(nodes).requests)
 
 
 def test_who_can_hold_instead_of_letting_go_takes_whom_it_is_to_hold(family: Family) -> None:

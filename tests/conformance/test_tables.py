@@ -8,9 +8,9 @@ from itertools import pairwise
 
 import pytest
 
-from motorbus.core.entry import Coding, Entry, Storage
 from motorbus.core.family import Family
-from motorbus.core.operation import Effect
+from motorbus.core.register import Coding, Register, Storage
+from motorbus.core.request import Effect
 from motorbus.core.units import QUANTITIES
 from motorbus.errors import RequestError
 from tests.support.world import closed, kept, locks
@@ -18,12 +18,12 @@ from tests.support.world import closed, kept, locks
 NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 
 
-def rows(family: Family) -> Iterator[Entry]:
+def rows(family: Family) -> Iterator[Register]:
     for table in family.tables.values():
         yield from table.values()
 
 
-def reach(row: Entry) -> tuple[int, int]:
+def reach(row: Register) -> tuple[int, int]:
     """The lowest and the highest raw value that the coding can say in so many bytes."""
     if row.coding is Coding.UNSIGNED:
         return 0, (1 << 8 * row.size) - 1
@@ -34,12 +34,12 @@ def reach(row: Entry) -> tuple[int, int]:
     return 1 - (1 << row.sign_bit), (1 << row.sign_bit) - 1
 
 
-def fits(row: Entry) -> bool:
+def fits(row: Register) -> bool:
     lowest, highest = reach(row)
     return lowest <= row.low <= row.high <= highest
 
 
-LAWS: dict[str, Callable[[Entry], bool]] = {
+LAWS: dict[str, Callable[[Register], bool]] = {
     "its name is lower snake case": lambda row: NAME.fullmatch(row.name) is not None,
     "it cites a source": lambda row: bool(row.source.strip()),
     "its size is 1 to 8 bytes": lambda row: 1 <= row.size <= 8,

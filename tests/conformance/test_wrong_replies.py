@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.entry import Entry
 from motorbus.core.family import Family
-from motorbus.core.operation import Data
+from motorbus.core.register import Register
+from motorbus.core.request import Data
 from motorbus.errors import MotorbusError, WireError
 from motorbus.link.base import Delivery, PerfectLine, Side
 from tests.support.subjects import line_of, payload, vectors
@@ -47,22 +47,22 @@ class Tampering(PerfectLine):
         return data[: self.place] + bytes((struck,)) + data[self.place + 1 :]
 
 
-def steady(there: World) -> list[Entry]:
+def steady(there: World) -> list[Register]:
     """Readable rows that do not change while nothing moves."""
     return [row for row in there.table(NODE).values() if row.readable and row.writable]
 
 
-def asked_differently(there: World, rows: list[Entry]) -> list[Entry]:
+def asked_differently(there: World, rows: list[Register]) -> list[Register]:
     """One row for each request: where a reading brings all rows, one is enough."""
     told = {tuple(requests_for(there, NODE, row.name)): row for row in reversed(rows)}
     return list(told.values())
 
 
-def truth(there: World, row: Entry) -> int:
+def truth(there: World, row: Register) -> int:
     return there.memory(NODE)[row.name]
 
 
-def read(there: World, row: Entry) -> int:
+def read(there: World, row: Register) -> int:
     value = there.device(NODE).read(row.name)[row.name]
     return row.to_raw(value)
 
@@ -99,7 +99,7 @@ def test_a_reply_that_is_always_wrong_is_an_error_and_no_value(subject: Family) 
                 assert device.read(row.name)
 
 
-def length_of_reply(there: World, row: Entry) -> int:
+def length_of_reply(there: World, row: Register) -> int:
     there.device(NODE).read(row.name)
     watch = there.bus.trace.subscribe()
     there.device(NODE).read(row.name)

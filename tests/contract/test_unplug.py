@@ -168,9 +168,9 @@ def pulled(name: str, place: str) -> bool:
 def test_a_port_that_is_pulled_at_any_byte(name: str, rounds: Rounds) -> None:
     """In virtual time; bytes of requests and of replies, in each exchange of the call."""
     most, fired = rounds(10_000, 40), 0
-    for exchange in range(1, 10):
+    for request in range(1, 10):
         for byte in range(250):
-            struck = [pulled(name, f"{exchange} byte {byte} to {side}") for side in ("device", "host")]
+            struck = [pulled(name, f"{request} byte {byte} to {side}") for side in ("device", "host")]
             fired += sum(struck)
             if not any(struck) or fired > most:
                 break

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motorbus.core.can_bits import bits, precedence
-from motorbus.core.operation import REMOTE_FLAG, CanFrame
+from motorbus.core.can_frame import REMOTE_FLAG, CanFrame
 
 NODES = range(1, 128)
 POSITIONS = range(-900, 901)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
+from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
 
 
 def test_it_is_shown_as_people_write_it() -> None:

@@ -7,7 +7,7 @@ from math import inf, nan
 import pytest
 
 from motorbus.core.can_bits import bits
-from motorbus.core.operation import CanFrame
+from motorbus.core.can_frame import CanFrame
 from motorbus.diagnose.budget import Budget, Span, Traffic, Transfer, budget
 from motorbus.errors import RequestError
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from motorbus.core.operation import Runnable, Step
+from motorbus.core.request import Step
+from motorbus.core.steps import Runnable
 
 T = TypeVar("T")
 

@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from motorbus.core.can_bits import ERROR_BITS, bits
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Data
 from motorbus.link.base import Delivery, Side
 
 BIT = 1 / 500_000

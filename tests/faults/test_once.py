@@ -13,7 +13,8 @@ import pytest
 
 from motorbus.bus.blocking import Bus
 from motorbus.bus.policy import RETRIES
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Data
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown
 from motorbus.families.feetech import FAMILY, Servo, wire
 from motorbus.families.feetech.driver.exchanges import Block, acknowledged, write_block
@@ -67,9 +68,9 @@ FEETECH_ONCE: dict[str, Callable[[Servo], Any]] = {
 @pytest.mark.parametrize("what", FEETECH_ONCE)
 def test_l18_feetech_says_once_what_would_do_more_when_said_twice(what: str) -> None:
     rig = Rig(model="hls3606")
-    exchange = FEETECH_ONCE[what](Servo(rig.bus, 1))
-    line, error = said_by(rig, lambda: rig.bus.run(exchange))
-    assert line.said.count(exchange.request) == 1
+    request = FEETECH_ONCE[what](Servo(rig.bus, 1))
+    line, error = said_by(rig, lambda: rig.bus.run(request))
+    assert line.said.count(request.request) == 1
     assert isinstance(error, OutcomeUnknown)
 
 

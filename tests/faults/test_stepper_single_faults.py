@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import pytest
 
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.table import EDITS, ORDERS
 from motorbus.link.base import Delivery, PerfectLine, Side

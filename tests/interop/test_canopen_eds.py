@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.entry import Access, Coding, Entry
+from motorbus.core.register import Access, Coding, Register
 from motorbus.families.kst.eds import eds
 from motorbus.families.kst.table import PROFILES, RATES, Profile
 from tests.interop.canopen_peer import LIBRARY, describe
@@ -40,7 +40,7 @@ def understood(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 every_profile = pytest.mark.parametrize("profile", PROFILES.values(), ids=list(PROFILES))
 
 
-def expected(profile: Profile, row: Entry) -> dict[str, Any]:
+def expected(profile: Profile, row: Register) -> dict[str, Any]:
     """What an object has to be, but for its description; a factor is left to a nearer look."""
     letters = row.name in VERSIONS
     signed = row.coding is Coding.TWOS_COMPLEMENT

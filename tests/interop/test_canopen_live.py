@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from motorbus.core.entry import Entry
-from motorbus.core.operation import Effect
+from motorbus.core.register import Register
+from motorbus.core.request import Effect
 from motorbus.families.kst.eds import eds
 from motorbus.families.kst.table import PROFILES, Profile
 from tests.interop.can_bus import WAYS, Way, can_bus
@@ -39,7 +39,7 @@ def canopen(way: Way, profile: Profile, folder: Path) -> Canopen:
     return peer
 
 
-def numbers(profile: Profile) -> list[Entry]:
+def numbers(profile: Profile) -> list[Register]:
     """What can be read and written, but for what makes it another node."""
     return [
         row

@@ -12,7 +12,8 @@ from select import select
 from threading import Event, Thread
 from typing import Protocol
 
-from motorbus.core.operation import REMOTE_FLAG, CanFrame, Data
+from motorbus.core.can_frame import REMOTE_FLAG, CanFrame
+from motorbus.core.request import Data
 from motorbus.link.can import CanLink
 from motorbus.simulation.adapter import Adapter
 from motorbus.simulation.pty import PtyMaster

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import SimulatedNode
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.request import Data
 from motorbus.link.memory import MemoryLink
 
 DELAY = 0.001

@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager
 import can
 import pytest
 
-from motorbus.core.operation import ERROR_FLAG, CanFrame
+from motorbus.core.can_frame import ERROR_FLAG, CanFrame
 from motorbus.errors import LinkError, LinkLost, PortBusy, PortNotFound, RequestError
 from motorbus.link.can import BUS_OFF, CanLink
 from tests.links.can_peer import (

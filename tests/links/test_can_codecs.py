@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.operation import CanFrame
+from motorbus.core.can_frame import CanFrame
 from motorbus.link.slcan import SlcanCodec
 from motorbus.link.socketcand import SocketcandCodec
 from motorbus.simulation.slcan import SlcanAdapter

@@ -7,7 +7,7 @@ from threading import Thread
 import pytest
 
 from motorbus.core.can_bits import bits
-from motorbus.core.operation import CanFrame
+from motorbus.core.can_frame import CanFrame
 from motorbus.errors import LinkLost
 from motorbus.link.memory import MemoryLink
 from tests.links.parrot import DELAY, PING, Parrot, drain

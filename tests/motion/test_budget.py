@@ -46,9 +46,9 @@ def test_a_machine_of_all_kinds() -> None:
         assert found.without == ("lift",)
         arm, can = found.buses["arm"], found.buses["can"]
         assert arm.wire == pytest.approx(880e-6)  # 88 bytes of ten bits at 1 Mbaud
-        assert (arm.exchanges, arm.replies, arm.axes) == (2, 6, ("a1", "a2", "a3", "a4", "a5", "a6"))
+        assert (arm.requests, arm.replies, arm.axes) == (2, 6, ("a1", "a2", "a3", "a4", "a5", "a6"))
         assert can.wire == pytest.approx(8 * 111 * 1.1 / 500_000)
-        assert (can.exchanges, can.replies, can.waits) == (4, 4, 0.0)
+        assert (can.requests, can.replies, can.waits) == (4, 4, 0.0)
         assert found.highest_rate == can.highest_rate
         assert {data[4] for data in line.sent if isinstance(data, bytes)} <= {
             0x02,

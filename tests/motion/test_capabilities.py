@@ -11,7 +11,7 @@ import pytest
 
 from motorbus import AsyncRobot, NoReply, RequestError, Robot
 from motorbus.core.family import Quality
-from motorbus.core.operation import Sleep
+from motorbus.core.steps import Sleep
 from motorbus.motion.axis import AsyncAxis, Axis
 from motorbus.motion.body import Body
 from motorbus.motion.capabilities import ability

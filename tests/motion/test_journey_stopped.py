@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Data, Progress
+from motorbus.core.request import Data
+from motorbus.core.steps import Progress
 from motorbus.errors import Interrupted, MotorbusError, OutcomeUnknown
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.meeting import Seat

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from motorbus import AsyncRobot, LinkLost, MotorbusError, NotHomed, Robot
-from motorbus.core.operation import Gather, Sleep, catch
+from motorbus.core.steps import Sleep, catch, gather
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.leaving import Leaving, given_up, goes_on
 from motorbus.motion.machine import Machine
@@ -299,9 +299,7 @@ def test_a_stop_of_others_in_a_movement_needs_no_more_when_it_is_left() -> None:
     with machine(arm="1") as (made, sims), Robot.of(made) as robot:
 
         async def both() -> list[object]:
-            told = await Gather(
-                [catch(moving.move_axis(robot["a1"], 1.0)), catch(_stopped_after(robot, 0.3))]
-            )
+            told = await gather(catch(moving.move_axis(robot["a1"], 1.0)), catch(_stopped_after(robot, 0.3)))
             return list(told)
 
         told: list[object] = robot.conductor.run(Abreast({"arm": both()}, lambda found: found["arm"]))

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import CanFrame
+from motorbus.core.can_frame import CanFrame
 from motorbus.errors import Interrupted, MotorbusError
 from motorbus.link.base import Side
 from motorbus.motion.capabilities import disable_torque

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.errors import LimitExceeded, NoReply, RequestError, Stalled
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.trajectory import Trajectory

@@ -8,7 +8,7 @@ from math import inf, nan, radians
 import pytest
 
 from motorbus import AsyncRobot, Robot
-from motorbus.core.operation import Sleep
+from motorbus.core.steps import Sleep
 from motorbus.errors import LimitExceeded, MotorbusError, RequestError
 from motorbus.motion.quanta import LONGEST, QUANTUM
 from tests.support.machines import listened, machine, said

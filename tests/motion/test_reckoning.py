@@ -9,7 +9,7 @@ from math import pi, tau
 import pytest
 
 from motorbus import AsyncRobot, Interrupted, LimitExceeded, MotorbusError, NotHomed, RequestError, Robot
-from motorbus.core.operation import Gather, Sleep, catch
+from motorbus.core.steps import Sleep, catch, gather
 from motorbus.motion import capabilities as verbs
 from motorbus.motion import reckoning
 from motorbus.motion.abreast import Abreast
@@ -169,7 +169,7 @@ def test_a_stop_in_the_middle_makes_it_unknown(rank: str) -> None:
                 await verbs.stop(lift)
 
         async def both() -> list[object]:
-            found = await Gather([catch(reckoning.move_by(lift, 0.1)), catch(stopped())])
+            found = await gather(catch(reckoning.move_by(lift, 0.1)), catch(stopped()))
             return list(found)
 
         told: list[object] = robot.conductor.run(Abreast({"stage": both()}, lambda results: results["stage"]))

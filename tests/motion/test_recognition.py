@@ -10,9 +10,9 @@ import pytest
 
 import motorbus
 from motorbus import AsyncRobot, NoReply, RequestError, Robot
+from motorbus.core.device import device_method
 from motorbus.core.family import Identity
-from motorbus.core.operation import Sleep
-from motorbus.core.verbs import verb
+from motorbus.core.steps import Sleep
 from motorbus.motion import recognition
 from tests.support.machines import listened, machine, said
 
@@ -203,7 +203,7 @@ def test_a_place_to_park_needs_a_way_to_it() -> None:
 class Other:
     """A device that is none of those that somebody knows."""
 
-    @verb
+    @device_method
     async def identify(self) -> Identity:
         await Sleep(0)
         return Identity(1, "SCS9999", "9.9", "")

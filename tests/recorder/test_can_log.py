@@ -9,7 +9,7 @@ from pathlib import Path
 import can
 import pytest
 
-from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame
+from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
 from motorbus.errors import LinkError, RequestError
 from motorbus.recorder.can_log import (
     LONGEST,

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 import motorbus
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.capture import PIECE, Packet
-from motorbus.core.operation import CanFrame
 from motorbus.errors import RequestError
 from motorbus.recorder import Decoder
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.capture import Packet
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.request import Data
 from motorbus.families.stepper import wire
 from motorbus.recorder import Decoder, decode
 from motorbus.recorder.heard import ByReceiver, captures_of

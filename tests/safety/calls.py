@@ -15,7 +15,7 @@ from math import inf, isfinite, nan, pi, radians
 from random import Random
 from typing import Any, NamedTuple
 
-from motorbus.core.operation import Gather, catch
+from motorbus.core.steps import catch, gather
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import sync_write, sync_write_positions
 from motorbus.families.kst import broadcast_position
@@ -261,7 +261,7 @@ class Caller:
         return Call("two", lambda: bus.run(self._both(wants)), wants, each=True)
 
     async def _both(self, wants: dict[Spot, object]) -> object:
-        return await Gather([catch(self._write(spot, goal)) for spot, goal in wants.items()])
+        return await gather(*[catch(self._write(spot, goal)) for spot, goal in wants.items()])
 
     async def _write(self, spot: Spot, goal: object) -> object:
         device = self.device(spot)

@@ -11,7 +11,8 @@ from collections.abc import Iterator
 from math import pi, radians
 from typing import NamedTuple
 
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Data
 from motorbus.link.base import Delivery, PerfectLine, Side
 
 COUNT = 2 * pi / 4096  # an STS3215

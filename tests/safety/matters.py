@@ -12,7 +12,7 @@ from math import inf, isfinite, nan, pi
 from typing import Any
 
 import motorbus
-from motorbus.core.operation import Effect, Exchange
+from motorbus.core.request import Effect, Request
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import action_all, sync_write, sync_write_positions, wire
 from motorbus.families.kst import broadcast_position
@@ -254,7 +254,7 @@ class Matters(Courses):
         request = wire.write(node, 42, goal.to_bytes(2, "little"))
         return Call(
             "bytes",
-            lambda: bus.run(Exchange[Any](request, (), lane=node, effect=Effect.MOTION)),
+            lambda: bus.run(Request[Any](request, (), lane=node, effect=Effect.MOTION)),
             {("arm", node): nan},
             barred=[("arm", node)],
         )

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.assurance import Given
 from motorbus.core.family import Devices, Family
+from motorbus.core.guarantees import Level
 from motorbus.motion.machine import Machine
 from motorbus.motion.moving.stream import SHARE, USUAL
 from motorbus.motion.safety.assurance import MACHINE, NONE, SCOPE, WHOLE, assured, cycle, unbounded
@@ -62,9 +62,9 @@ def test_each_bus_with_axes_tells_what_its_devices_give() -> None:
     with machine(arm="1-2", lift=True) as (made, _):
         arm, stage = assured(made, families(made)).buses
     assert (arm.name, arm.family, arm.axes) == ("arm", "feetech", ("a1", "a2"))
-    assert arm.points["torque switch"].given is Given.YES
-    assert stage.points["measures its position"].given is Given.NO
-    assert {bus.points["watchdog in it"].given for bus in (arm, stage)} == {Given.NO}
+    assert arm.points["torque switch"].given is Level.YES
+    assert stage.points["measures its position"].given is Level.NO
+    assert {bus.points["watchdog in it"].given for bus in (arm, stage)} == {Level.NO}
 
 
 class Silent:
@@ -96,13 +96,13 @@ def test_what_nobody_bounds_is_told() -> None:
 
 def test_the_machine_as_a_whole_promises_nothing_of_what_nobody_can() -> None:
     given = {about: point.given for about, point in MACHINE.items()}
-    assert {about for about, one in given.items() if one is Given.NO} == {
+    assert {about for about, one in given.items() if one is Level.NO} == {
         "the host dies",
         "a cable breaks",
         "several hosts",
     }
-    assert given["one gate"] is Given.YES
-    assert given["velocity"] is given["acceleration"] is Given.PARTLY
+    assert given["one gate"] is Level.YES
+    assert given["velocity"] is given["acceleration"] is Level.PARTLY
 
 
 def test_a_guard_is_on_where_a_device_tells_its_strain_and_nobody_switched_it_off() -> None:

@@ -12,7 +12,8 @@ from typing import Any
 import pytest
 
 from motorbus import AsyncRobot, Robot
-from motorbus.core.operation import Data, Sleep
+from motorbus.core.request import Data
+from motorbus.core.steps import Sleep
 from motorbus.errors import Refused, RequestError
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.safety.lease import Lease, Standing

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motorbus import Robot
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.errors import Refused
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.safety.lease import Standing

@@ -10,7 +10,7 @@ import pytest
 
 import motorbus
 from motorbus.bus.base import BaseBus
-from motorbus.core.operation import INTENT, OUTCOME, READABLE, JournalEntry
+from motorbus.core.steps import INTENT, OUTCOME, READABLE, JournalEntry
 from motorbus.errors import Refused
 from motorbus.motion.machine import Machine
 from motorbus.motion.safety import canary

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from motorbus.core.family import Health, State
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.errors import Faulted, Refused, RequestError
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.safety import canary

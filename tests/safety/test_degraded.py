@@ -22,7 +22,7 @@ import motorbus
 from motorbus import Robot
 from motorbus.bus.trace import Subscription, TraceRecord
 from motorbus.cli.simulated import Simulated
-from motorbus.core.operation import Emit
+from motorbus.core.steps import Emit
 from motorbus.errors import MotorbusError
 from tests.support.machines import machine
 from tests.support.world import is_stopping

@@ -14,8 +14,9 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.core.goal import Goal
-from motorbus.core.operation import CanFrame, Data, Effect, Exchange
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Data, Effect, Request
+from motorbus.core.setpoint import Setpoint
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import wire as feetech
 from motorbus.families.feetech.driver.exchanges import read_block
@@ -53,7 +54,7 @@ def busy(family: str, *, seed: int) -> Iterator[tuple[Bus, list[Any]]]:
             yield bus, orders
 
 
-def question(bus: Bus, node: int) -> Exchange[Any]:
+def question(bus: Bus, node: int) -> Request[Any]:
     """The longest reply that one of these gives, as a poll."""
     device = bus.family.devices.blocking(bus, node)
     if bus.family.name == "feetech":
@@ -63,17 +64,17 @@ def question(bus: Bus, node: int) -> Exchange[Any]:
     return bus.family.probe(node, 0)
 
 
-def order(bus: Bus, node: int) -> Exchange[Any]:
+def order(bus: Bus, node: int) -> Request[Any]:
     """An order to move, by the manuals: a goal position (42), a target (6003), or a run of the project (03 0C)."""
-    goal = Goal(node, "position", 0.5, -7.0, 7.0)
+    goal = Setpoint(node, "position", 0.5, -7.0, 7.0)
     request: Data
     if bus.family.name == "feetech":
         request = feetech.write(node, 42, (326).to_bytes(2, "little"))
     elif bus.family.name == "kst":
         request = CanFrame(0x600 + node, bytes.fromhex("2203600026010000"))
     else:
-        request, goal = stepper.encode("run_once"), Goal(node, "relative", 0.5, -7.0, 7.0)
-    return Exchange(request, (), lane=node, effect=Effect.MOTION, goals=(goal,))
+        request, goal = stepper.encode("run_once"), Setpoint(node, "relative", 0.5, -7.0, 7.0)
+    return Request(request, (), lane=node, effect=Effect.MOTION, setpoints=(goal,))
 
 
 def queued(bus: Any, nodes: tuple[int, ...]) -> list[Any]:

@@ -15,7 +15,9 @@ from typing import Any
 import pytest
 
 from motorbus import AsyncRobot, Robot
-from motorbus.core.operation import CanFrame, Data, catch
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Data
+from motorbus.core.steps import catch
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import disable_torque_all
 from tests.support.machines import Heard, listened, machine

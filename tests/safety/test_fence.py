@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.family import Readdressed
-from motorbus.core.operation import Effect, Exchange, Goal, Response
+from motorbus.core.family import IdChanged
+from motorbus.core.request import Effect, Request, Response
+from motorbus.core.setpoint import Setpoint
 from motorbus.errors import LimitExceeded, NoReply, Refused
 from motorbus.families.feetech import sync_write_positions
 from motorbus.motion.safety.fence import bounds, follow
@@ -179,13 +180,13 @@ def test_what_was_refused_or_only_tried_out_engages_nothing() -> None:
             axis.device.enable_torque()
         robot.lease = None
         assert (axis.engaged, axis.under_way) == (False, False)
-        order = Goal(1, "position", pi + 0.1, 0.0, 6.0)
+        order = Setpoint(1, "position", pi + 0.1, 0.0, 6.0)
         axis.position()
-        speed = Goal(1, "speed", 1.0, 0.0, 9.0)
-        exchange: Exchange[Response] = Exchange(b"\x01", effect=Effect.MOTION, goals=(order, speed))
-        gate_of(robot).rehearsing()(exchange)
+        speed = Setpoint(1, "speed", 1.0, 0.0, 9.0)
+        request: Request[Response] = Request(b"\x01", effect=Effect.MOTION, setpoints=(order, speed))
+        gate_of(robot).rehearsing()(request)
         assert (axis.engaged, axis.under_way) == (False, False)
-        gate_of(robot)(exchange)
+        gate_of(robot)(request)
         assert (axis.engaged, axis.under_way) == (True, True)
 
 
@@ -208,7 +209,7 @@ def test_the_fault_goes_along_too_and_bounds_that_the_file_has_for_the_new_id_co
         own = gate.guards[2]
         gate.faults[1] = "it was seen to smoke"
         for old, new in ((1, 2), (1, 9), (None, 8), (77, 78)):
-            follow(bus, gate, Readdressed(old, new))
+            follow(bus, gate, IdChanged(old, new))
         assert gate.guards[2] is own
         assert [gate.guards[node].name for node in (8, 9)] == ["a1", "a1"]
         assert gate.guards.keys() == {1, 2, 8, 9}

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.goal import Stays, torque_on
-from motorbus.core.operation import EVERY_LANE, Effect, Exchange, Expected, Goal, Priority, Response
+from motorbus.core.request import EVERY_LANE, Effect, Expected, Priority, Request, Response
+from motorbus.core.setpoint import Setpoint, Stays, torque_on
 from motorbus.errors import LimitExceeded, Refused
 from motorbus.motion.safety.gate import Gate
 from motorbus.motion.safety.guard import Bounds, Guard
@@ -18,29 +18,29 @@ from motorbus.motion.safety.lease import Lease, Standing
 from motorbus.motion.safety.track import FRESH
 
 
-def motion(*goals: Goal, rank: Priority = Priority.POLL) -> Exchange[Response]:
-    return Exchange(b"\x01", effect=Effect.MOTION, goals=goals, rank=rank)
+def motion(*goals: Setpoint, priority: Priority = Priority.POLL) -> Request[Response]:
+    return Request(b"\x01", effect=Effect.MOTION, setpoints=goals, priority=priority)
 
 
 @pytest.mark.parametrize("value", [-1.0, 0.0, 1.0])
 def test_inside_the_limits_passes(value: float) -> None:
-    Gate()(motion(Goal(1, "position", value, -1.0, 1.0)))
+    Gate()(motion(Setpoint(1, "position", value, -1.0, 1.0)))
 
 
 @pytest.mark.parametrize(
     ("goal", "why"),
     [
-        (Goal(3, "position", nan, -1.0, 1.0), "not a finite number"),
-        (Goal(3, "position", inf, -1.0, 1.0), "not a finite number"),
-        (Goal(3, "position", 1.01, -1.0, 1.0), "lies outside -1 to 1"),
-        (Goal(3, "position", -1.01, -1.0, 1.0), "lies outside -1 to 1"),
-        (Goal(3, "position", 0.0), "limits are not known"),
-        (Goal(3, "position", 0.0, -1.0, None), "limits are not known"),
+        (Setpoint(3, "position", nan, -1.0, 1.0), "not a finite number"),
+        (Setpoint(3, "position", inf, -1.0, 1.0), "not a finite number"),
+        (Setpoint(3, "position", 1.01, -1.0, 1.0), "lies outside -1 to 1"),
+        (Setpoint(3, "position", -1.01, -1.0, 1.0), "lies outside -1 to 1"),
+        (Setpoint(3, "position", 0.0), "limits are not known"),
+        (Setpoint(3, "position", 0.0, -1.0, None), "limits are not known"),
     ],
 )
-def test_everything_else_is_refused_with_the_reason(goal: Goal, why: str) -> None:
+def test_everything_else_is_refused_with_the_reason(goal: Setpoint, why: str) -> None:
     with pytest.raises(LimitExceeded, match=why) as caught:
-        Gate()(motion(Goal(1, "position", 0.0, -1.0, 1.0), goal))
+        Gate()(motion(Setpoint(1, "position", 0.0, -1.0, 1.0), goal))
     assert caught.value.node == 3
     assert "nothing was sent" in str(caught.value)
 
@@ -52,18 +52,18 @@ def test_motion_that_does_not_say_where_to_is_refused() -> None:
 
 @pytest.mark.parametrize("effect", [Effect.NONE, Effect.PERSISTENT, Effect.IDENTITY, Effect.TORQUE])
 def test_what_does_not_move_passes(effect: Effect) -> None:
-    Gate()(Exchange(b"\x01", effect=effect))
+    Gate()(Request(b"\x01", effect=effect))
 
 
 def test_a_stop_always_passes() -> None:
-    Gate()(motion(rank=Priority.STOP))
+    Gate()(motion(priority=Priority.STOP))
 
 
 @given(st.floats(), st.floats(-100, 100), st.floats(0, 100))
 def test_a_goal_passes_exactly_when_it_lies_inside(value: float, low: float, width: float) -> None:
     slack = 1e-6
     try:
-        Gate()(motion(Goal(1, "position", value, low, low + width)))
+        Gate()(motion(Setpoint(1, "position", value, low, low + width)))
         passed = True
     except LimitExceeded:
         passed = False
@@ -76,8 +76,8 @@ def test_a_goal_passes_exactly_when_it_lies_inside(value: float, low: float, wid
 # -- guards, faults, leases ----------------------------------------------------------------------------------------
 
 
-def place(value: float, node: int = 1) -> Goal:
-    return Goal(node, "position", value, -9.0, 9.0)
+def place(value: float, node: int = 1) -> Setpoint:
+    return Setpoint(node, "position", value, -9.0, 9.0)
 
 
 class Line:
@@ -86,31 +86,31 @@ class Line:
     def __init__(self, bounds: Bounds = Bounds(-1.0, 2.0, 0.5, 3.0)) -> None:  # noqa: B008 - a value
         self.gate = Gate()
         self.now = 0.0
-        self.seen: dict[int, tuple[Exchange[Any], Response]] = {}
+        self.seen: dict[int, tuple[Request[Any], Response]] = {}
         self.told: list[bool] = []
         self.gate.watch(self.seen, lambda: self.now)
         self.gate.guards[1] = Guard("elbow", bounds, ask=lambda: QUESTION, ordered=self.told.append)
 
     def reads(self, value: float, at: float | None = None) -> None:
         self.now = self.now if at is None else at
-        self.seen[1] = Exchange(b"?", tells_position=lambda _: {1: value}), Response((), (), self.now)
+        self.seen[1] = Request(b"?", reports_position=lambda _: {1: value}), Response((), (), self.now)
 
-    def passes(self, *goals: Goal, **options: Any) -> bool:
+    def passes(self, *goals: Setpoint, **options: Any) -> bool:
         try:
             self.gate(motion(*goals, **options))
         except Refused:
             return False
         return True
 
-    def reason(self, *goals: Goal, effect: Effect = Effect.MOTION) -> str:
+    def reason(self, *goals: Setpoint, effect: Effect = Effect.MOTION) -> str:
         try:
-            self.gate(Exchange(b"\x01", effect=effect, goals=goals))
+            self.gate(Request(b"\x01", effect=effect, setpoints=goals))
         except Refused as refusal:
             return refusal.reason
         return ""
 
 
-QUESTION: Exchange[Response] = Exchange(b"?")
+QUESTION: Request[Response] = Request(b"?")
 
 
 def test_a_guard_wants_to_know_where_it_is_and_looks_by_itself_at_what_the_bus_heard() -> None:
@@ -136,8 +136,8 @@ def test_an_order_for_everyone_is_one_for_those_whom_it_does_not_name() -> None:
     line = Line()
     line.reads(0.0, 1.0)
     everyone = {"effect": Effect.MOTION, "lane": EVERY_LANE}
-    line.gate(Exchange(b"\x01", goals=(place(0.4, node=2),), **everyone))  # type: ignore[arg-type]
-    order: Exchange[Response] = Exchange(b"\x01", goals=(place(0.6, node=2),), **everyone)  # type: ignore[arg-type]
+    line.gate(Request(b"\x01", setpoints=(place(0.4, node=2),), **everyone))  # type: ignore[arg-type]
+    order: Request[Response] = Request(b"\x01", setpoints=(place(0.6, node=2),), **everyone)  # type: ignore[arg-type]
     with pytest.raises(LimitExceeded, match="elbow: this is 0.6 rad"):
         line.gate(order)
     line.now = 9.0
@@ -146,11 +146,11 @@ def test_an_order_for_everyone_is_one_for_those_whom_it_does_not_name() -> None:
 
 def test_it_says_what_must_be_asked_before_an_order_can_be_judged() -> None:
     line = Line()
-    order = motion(place(0.1), Goal(1, "speed", 1.0, -9.0, 9.0), place(0.0, node=2))
+    order = motion(place(0.1), Setpoint(1, "speed", 1.0, -9.0, 9.0), place(0.0, node=2))
     assert line.gate.required_reads(order) == [QUESTION]
-    assert line.gate.required_reads(motion(place(0.1), rank=Priority.STOP)) == []
-    assert line.gate.required_reads(motion(Goal(1, "position", 0.1, 0.1, 0.1, Stays.STILL))) == []
-    assert line.gate.required_reads(Exchange(b"")) == []
+    assert line.gate.required_reads(motion(place(0.1), priority=Priority.STOP)) == []
+    assert line.gate.required_reads(motion(Setpoint(1, "position", 0.1, 0.1, 0.1, Stays.STILL))) == []
+    assert line.gate.required_reads(Request(b"")) == []
     line.reads(0.0, 1.0)
     assert line.gate.required_reads(order) == []
     line.reads(1.5, 1.001)
@@ -164,14 +164,14 @@ def test_staying_is_always_allowed_and_a_number_it_must_be() -> None:
     line = Line()
     line.gate.faults[1] = "gone"
     line.gate.lease = Lease()
-    assert line.passes(Goal(1, "position", 7.0, 7.0, 7.0, Stays.STILL))
-    assert line.passes(Goal(1, "velocity", 0.0, 0.0, 0.0, Stays.STILL))
-    assert not line.passes(Goal(1, "position", nan, nan, nan, Stays.STILL))
+    assert line.passes(Setpoint(1, "position", 7.0, 7.0, 7.0, Stays.STILL))
+    assert line.passes(Setpoint(1, "velocity", 0.0, 0.0, 0.0, Stays.STILL))
+    assert not line.passes(Setpoint(1, "position", nan, nan, nan, Stays.STILL))
 
 
 def test_a_goal_stays_because_it_is_marked_so_and_not_because_its_limits_leave_one_place() -> None:
     line = Line()
-    only, on = Goal(1, "position", 7.0, 7.0, 7.0), torque_on(1)
+    only, on = Setpoint(1, "position", 7.0, 7.0, 7.0), torque_on(1)
     assert line.gate.required_reads(motion(only)) == [QUESTION]
     assert line.reason(only) == "stale"
     line.reads(0.0, 1.0)
@@ -190,7 +190,7 @@ def test_an_order_for_everyone_is_refused_while_anybody_of_them_is_at_fault() ->
     assert line.passes(place(0.1))
     for effect in (Effect.MOTION, Effect.TORQUE):
         with pytest.raises(Refused, match="node 3 is at fault"):
-            line.gate(Exchange(b"\x01", effect=effect, goals=(place(0.1),), lane=EVERY_LANE))
+            line.gate(Request(b"\x01", effect=effect, setpoints=(place(0.1),), lane=EVERY_LANE))
 
 
 def test_a_node_at_fault_neither_moves_nor_gets_torque_and_others_do() -> None:
@@ -198,12 +198,12 @@ def test_a_node_at_fault_neither_moves_nor_gets_torque_and_others_do() -> None:
     line.reads(0.0, 1.0)
     line.gate.faults[1] = "it has lost its supply"
     assert line.reason(place(0.1)) == "fault"
-    torque: Exchange[Response] = Exchange(b"\x01", (Expected(1, 1, 6),), effect=Effect.TORQUE)
+    torque: Request[Response] = Request(b"\x01", (Expected(1, 1, 6),), effect=Effect.TORQUE)
     with pytest.raises(Refused, match="node 1 is at fault: it has lost its supply"):
         line.gate(torque)
-    line.gate(Exchange(b"\x01", (Expected(1, 1, 6),), effect=Effect.TORQUE, rank=Priority.STOP))
-    line.gate(Exchange(b"\x01", (Expected(1, 1, 6),), effect=Effect.PERSISTENT))
-    line.gate(Exchange(b"\x01", (Expected(2, 2, 6),), effect=Effect.TORQUE))
+    line.gate(Request(b"\x01", (Expected(1, 1, 6),), effect=Effect.TORQUE, priority=Priority.STOP))
+    line.gate(Request(b"\x01", (Expected(1, 1, 6),), effect=Effect.PERSISTENT))
+    line.gate(Request(b"\x01", (Expected(2, 2, 6),), effect=Effect.TORQUE))
     assert line.passes(place(0.1, node=2))
 
 
@@ -222,7 +222,7 @@ def test_with_a_lease_only_its_holder_moves_anything_and_while_he_is_there() -> 
 @pytest.mark.parametrize("quantity", ["velocity", "load", "current"])
 def test_what_has_no_end_of_its_own_needs_somebody_who_attends(quantity: str) -> None:
     line = Line()
-    goal = Goal(1, quantity, 0.5, -9.0, 9.0)
+    goal = Setpoint(1, quantity, 0.5, -9.0, 9.0)
     assert line.passes(goal)
     line.gate.attended = True
     assert line.reason(goal) == "unattended"
@@ -241,8 +241,8 @@ def test_what_has_no_end_of_its_own_needs_somebody_who_attends(quantity: str) ->
 def test_a_velocity_keeps_its_bound_whether_it_turns_or_only_bounds() -> None:
     line = Line()
     for quantity in ("velocity", "speed"):
-        assert line.passes(Goal(1, quantity, -3.0, -9.0, 9.0))
-        assert line.reason(Goal(1, quantity, -4.0, -9.0, 9.0)) == "limits"
+        assert line.passes(Setpoint(1, quantity, -3.0, -9.0, 9.0))
+        assert line.reason(Setpoint(1, quantity, -4.0, -9.0, 9.0)) == "limits"
 
 
 @given(
@@ -257,7 +257,7 @@ def test_whatever_passes_is_inside_near_and_was_read_lately(
     line = Line()
     line.reads(here, 5.0)
     line.now = 5.0 + age
-    if line.passes(Goal(1, quantity, value, -inf, inf)):
+    if line.passes(Setpoint(1, quantity, value, -inf, inf)):
         to = value if quantity == "position" else here + value
         assert age <= FRESH
         assert min(-1.0, here) - 0.004 <= to <= max(2.0, here) + 0.004
@@ -270,8 +270,8 @@ def test_whatever_passes_is_inside_near_and_was_read_lately(
 def test_it_knows_what_goes_on_until_a_stop_or_an_order_to_rest_was_accepted() -> None:
     line, stops, accepted = Line(), {1: 0}, {1: 0}
     line.gate.watch(line.seen, lambda: line.now, stops.__getitem__, accepted.__getitem__)
-    turn = Goal(1, "velocity", 0.5, -9.0, 9.0)
-    for ended in (Goal(1, "velocity", 0.0, 0.0, 0.0, Stays.STILL), turn._replace(value=0.0)):
+    turn = Setpoint(1, "velocity", 0.5, -9.0, 9.0)
+    for ended in (Setpoint(1, "velocity", 0.0, 0.0, 0.0, Stays.STILL), turn._replace(value=0.0)):
         assert not line.gate.goes_on(1)
         assert line.passes(turn)
         assert line.passes(ended)
@@ -284,14 +284,14 @@ def test_it_knows_what_goes_on_until_a_stop_or_an_order_to_rest_was_accepted() -
 def test_what_is_refused_does_not_go_on_and_a_rehearsal_notes_nothing() -> None:
     line = Line()
     line.gate.attended = True
-    turn = Goal(1, "velocity", 0.5, -9.0, 9.0)
+    turn = Setpoint(1, "velocity", 0.5, -9.0, 9.0)
     assert line.reason(turn) == "unattended"
     assert not line.gate.goes_on(1)
     rehearsal = line.gate.rehearsing()
-    rehearsal(Exchange(b"", effect=Effect.MOTION, goals=(turn,)))
+    rehearsal(Request(b"", effect=Effect.MOTION, setpoints=(turn,)))
     assert not line.gate.goes_on(1)
     with pytest.raises(LimitExceeded):
-        rehearsal(Exchange(b"", effect=Effect.MOTION, goals=(turn._replace(value=8.0),)))
+        rehearsal(Request(b"", effect=Effect.MOTION, setpoints=(turn._replace(value=8.0),)))
 
 
 def test_a_lease_has_the_time_of_the_robot() -> None:

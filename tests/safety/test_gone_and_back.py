@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Sleep
+from motorbus.core.steps import Sleep
 from motorbus.errors import Faulted, LinkLost, NotHomed
 from motorbus.motion.safety.gate import Gate
 from motorbus.session.robot import Robot

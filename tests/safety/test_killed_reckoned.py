@@ -19,7 +19,7 @@ import pytest
 
 from motorbus.cli import main
 from motorbus.cli.simulated import Simulated
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.link.serial import SerialLink
 from motorbus.session.robot import Robot
 from tests.support.machines import described

@@ -19,7 +19,9 @@ from typing import Any
 import pytest
 
 from motorbus import AsyncRobot, Interrupted, Robot, feetech, kst
-from motorbus.core.operation import CanFrame, Data, Effect, Exchange, Goal
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Data, Effect, Request
+from motorbus.core.setpoint import Setpoint
 from motorbus.errors import MotorbusError
 from tests.safety.points import asks, sent
 from tests.support.machines import listened, machine
@@ -42,8 +44,8 @@ def moves(data: Data) -> bool:
 
 
 def raw(bus: Any, node: int) -> object:
-    goal = Goal(node, "position", 3.1, 0.0, 6.0)
-    return bus.run(Exchange(bytes.fromhex("ffff01052a0008c7"), (), effect=Effect.MOTION, goals=(goal,)))
+    goal = Setpoint(node, "position", 3.1, 0.0, 6.0)
+    return bus.run(Request(bytes.fromhex("ffff01052a0008c7"), (), effect=Effect.MOTION, setpoints=(goal,)))
 
 
 FACES: dict[str, Callable[[Robot], object]] = {

@@ -13,7 +13,8 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.core.operation import Data, Sleep
+from motorbus.core.request import Data
+from motorbus.core.steps import Sleep
 from motorbus.errors import LimitExceeded, MotorbusError, Refused, RequestError
 from motorbus.families.feetech import sync_write, sync_write_positions
 from motorbus.link.base import Delivery, PerfectLine, Side

@@ -8,7 +8,7 @@ from math import nan, pi
 import pytest
 
 import motorbus
-from motorbus.core.operation import Emit
+from motorbus.core.steps import Emit
 from motorbus.errors import Faulted, LimitExceeded, MotorbusError, Overloaded, Refused, RequestError
 from motorbus.families.feetech import action_all, reg_write_all, sync_write_positions
 from motorbus.families.feetech.driver.jobs import SET_BAUD, SET_ID

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import pytest
 
 from motorbus import Robot
-from motorbus.core.operation import Sleep
+from motorbus.core.steps import Sleep
 from motorbus.errors import MotorbusError
 from motorbus.motion.safety.lease import Lease
 from motorbus.simulation.named import Simulation

@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 
 from motorbus import Robot
-from motorbus.core.operation import Data, Sleep
+from motorbus.core.request import Data
+from motorbus.core.steps import Sleep
 from motorbus.errors import MotorbusError, Refused
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion import capabilities

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from motorbus import families
 from motorbus.core.family import Quality
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech.table import SCS_COUNT
 from motorbus.link.base import Delivery, Side

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motorbus.core.family import Quality
-from motorbus.core.operation import Sleep
+from motorbus.core.steps import Sleep
 from motorbus.errors import WireError
 from motorbus.motion.safety.track import FASTEST, FRESH, MARGIN, REACH, TREMBLING, Sample, Track, believed
 

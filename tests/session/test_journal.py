@@ -13,7 +13,7 @@ import pytest
 
 import motorbus
 from motorbus import journal, session
-from motorbus.core.operation import ASKED, INTENT, OUTCOME, REACHED, JournalEntry
+from motorbus.core.steps import ASKED, INTENT, OUTCOME, REACHED, JournalEntry
 from motorbus.errors import LinkError, RequestError
 from motorbus.journal import BusJournal
 from motorbus.link.lock import journal_path, state_folder

@@ -12,7 +12,7 @@ import pytest
 
 import motorbus
 from motorbus import AsyncRobot, NoReply, PortNotFound, RequestError, Robot
-from motorbus.core.operation import INTENT, JournalEntry, Progress
+from motorbus.core.steps import INTENT, JournalEntry, Progress
 from motorbus.motion.machine import Machine
 from tests.support.machines import machine
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.core.operation import Exchange
+from motorbus.core.request import Request
 from motorbus.errors import LimitExceeded, NoReply, PortBusy, RequestError
 from tests.support.noisy_line import NoisyLine
 
@@ -106,7 +106,7 @@ def test_an_echoing_adapter_is_found_at_open_and_told(caplog: pytest.LogCaptureF
 def test_a_broken_port_is_closed_again_when_opening_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     from motorbus.families.feetech import Feetech
 
-    def fail(self: Feetech) -> Exchange[Any]:
+    def fail(self: Feetech) -> Request[Any]:
         raise RuntimeError("bug")
 
     with motorbus.simulate("feetech") as sim:

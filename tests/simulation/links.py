@@ -6,7 +6,8 @@ import os
 import queue
 import time
 
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Data
 from motorbus.errors import LinkError, LinkLost
 
 PATIENCE = 10.0

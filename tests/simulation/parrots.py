@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from motorbus.core.can_frame import Audience, CanFrame
 from motorbus.core.family import SimulatedNode
-from motorbus.core.frame import Audience
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.request import Data
 
 ANSWER = 0x80
 """The bit by which an answer's identifier differs."""

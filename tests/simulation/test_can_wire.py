@@ -7,8 +7,9 @@ from collections.abc import Mapping
 import pytest
 
 from motorbus.core.can_bits import INTERFRAME, bits
+from motorbus.core.can_frame import ERROR_FLAG, CanFrame
 from motorbus.core.family import SimulatedNode
-from motorbus.core.operation import ERROR_FLAG, CanFrame, Data
+from motorbus.core.request import Data
 from motorbus.link.memory import MemoryLink
 from tests.support.can_wire import CanWire
 

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from motorbus import families
-from motorbus.core.operation import CanFrame
+from motorbus.core.can_frame import CanFrame
 from motorbus.errors import RequestError
 from motorbus.simulation.clients import CanClient, Door
 from motorbus.simulation.faulted import IN_A_FILE, LONGEST, MOST, NEWS, TOLD, Faulted, read_order

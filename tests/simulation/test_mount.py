@@ -11,7 +11,8 @@ from contextlib import closing, contextmanager
 
 import pytest
 
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Data
 from motorbus.errors import RequestError
 from motorbus.families.feetech.simulator import FeetechBus, model, simulate
 from motorbus.link.base import Side

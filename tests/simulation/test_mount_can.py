@@ -12,7 +12,7 @@ from contextlib import closing, contextmanager
 
 import pytest
 
-from motorbus.core.operation import ERROR_FLAG, CanFrame
+from motorbus.core.can_frame import ERROR_FLAG, CanFrame
 from motorbus.errors import RequestError
 from motorbus.link.base import Line
 from motorbus.simulation.clients import CanClient, Door

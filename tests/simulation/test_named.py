@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motorbus import families
-from motorbus.core.operation import CanFrame
+from motorbus.core.can_frame import CanFrame
 from motorbus.errors import LinkLost, PortBusy, PortNotFound, RequestError
 from motorbus.link.memory import MemoryLink
 from motorbus.simulation.faults import FaultyLine

@@ -6,7 +6,7 @@ import pytest
 
 import motorbus
 from motorbus import families
-from motorbus.core.operation import CanFrame
+from motorbus.core.can_frame import CanFrame
 from motorbus.errors import LinkLost, MotorbusError, NoReply, PortNotFound, RequestError
 from motorbus.link.base import PerfectLine
 from motorbus.simulation.faults import FaultyLine, parse

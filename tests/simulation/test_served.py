@@ -8,7 +8,7 @@ from contextlib import closing
 
 import pytest
 
-from motorbus.core.operation import ERROR_FLAG, CanFrame
+from motorbus.core.can_frame import ERROR_FLAG, CanFrame
 from motorbus.errors import LinkLost, MotorbusError, RequestError
 from motorbus.link.base import Line
 from motorbus.link.can import CanLink

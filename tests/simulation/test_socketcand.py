@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame
+from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
 from motorbus.simulation.adapter import Adapter
 from motorbus.simulation.socketcand import LONGEST_ELEMENT, SETTLING, UNKNOWN, SocketcandAdapter
 

@@ -14,8 +14,9 @@ from math import inf
 from typing import NamedTuple
 
 from motorbus.core.can_bits import INTERFRAME, bits, precedence
+from motorbus.core.can_frame import ERROR_FLAG, CanFrame
 from motorbus.core.family import SimulatedNode, Simulator
-from motorbus.core.operation import ERROR_FLAG, CanFrame, Data
+from motorbus.core.request import Data
 
 
 class _Pending(NamedTuple):

@@ -16,7 +16,7 @@ from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import motorbus
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.machine import Machine
 from motorbus.session import parse_ids, prepare

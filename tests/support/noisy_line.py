@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from math import inf
 from random import Random
 
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Data
 from motorbus.link.base import Delivery, Side
 
 

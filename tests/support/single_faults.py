@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple, Protocol, TypeVar
 
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.errors import MotorbusError
 from motorbus.link.base import Delivery, Line, PerfectLine, Side
 from motorbus.link.memory import MemoryLink

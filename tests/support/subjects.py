@@ -17,9 +17,10 @@ from pathlib import Path
 from typing import Any, NamedTuple, cast
 
 from motorbus import families
-from motorbus.core.entry import Table
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import Family, Simulator
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.register import RegisterMap
+from motorbus.core.request import Data
 
 ROOT = Path(__file__).resolve().parents[2]
 TEMPLATE = ROOT / "examples" / "family_template"
@@ -102,7 +103,7 @@ class Kind:
     `simulated` is the table they have.
     """
 
-    def __init__(self, family: Family, simulated: Table, options: dict[str, str]) -> None:
+    def __init__(self, family: Family, simulated: RegisterMap, options: dict[str, str]) -> None:
         self.simulated = simulated
         self._family = family
         self._options = options
@@ -137,7 +138,7 @@ SUBJECTS: dict[str, Family] = {
 """Every family with every kind of simulated device it has, by a name for eyes."""
 
 
-def tables_of(subject: Family) -> list[Table]:
+def tables_of(subject: Family) -> list[RegisterMap]:
     """The tables that its simulated devices can have."""
     return [subject.simulated] if isinstance(subject, Kind) else list(subject.tables.values())
 

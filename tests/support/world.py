@@ -18,20 +18,10 @@ from motorbus.bus.engine import Engine
 from motorbus.bus.jobs import Attempt, RequestJob
 from motorbus.bus.stop_socket import StopOutcome
 from motorbus.bus.trace import Subscription, TraceRecord
-from motorbus.core.entry import Entry, Table
 from motorbus.core.family import Family
-from motorbus.core.operation import (
-    Data,
-    Effect,
-    Exchange,
-    Exclusive,
-    Gather,
-    Notification,
-    Runnable,
-    Shielded,
-    Step,
-    discard,
-)
+from motorbus.core.register import Register, RegisterMap
+from motorbus.core.request import Data, Effect, Notification, Request, Step
+from motorbus.core.steps import Exclusive, Gather, Runnable, Shielded, discard
 from motorbus.errors import RequestError
 from motorbus.link.base import Line, Link
 from motorbus.link.memory import MemoryLink
@@ -89,9 +79,9 @@ def set_rate(bus: BaseBus, rate: int) -> None:
     bus.engine.rate = rate
 
 
-def queue(bus: BaseBus, exchange: Exchange[Any]) -> RequestJob:
+def queue(bus: BaseBus, request: Request[Any]) -> RequestJob:
     """Queue a request without waiting for its reply."""
-    job = RequestJob(exchange)
+    job = RequestJob(request)
     bus.engine.submit(job, bus.link.now())
     return job
 
@@ -113,9 +103,9 @@ class Tries:
         if not echo:
             self.engine.echo.exclude()
 
-    def answered(self, exchange: Exchange[Any], data: list[Data]) -> tuple[Any, str]:
+    def answered(self, request: Request[Any], data: list[Data]) -> tuple[Any, str]:
         """The answer, None where it failed, and the kind of failure of what is missing: `silence`, `checksum` …"""
-        attempt = Attempt(exchange)
+        attempt = Attempt(request)
         self.engine.begin(attempt, 0.0)
         self.engine.feed(data, self.SOON)
         self.engine.expire(attempt.deadline)
@@ -163,7 +153,7 @@ class World:
         """What the simulated device holds."""
         return cast("Memory", cast("Any", self.simulator.nodes[node]).memory)
 
-    def table(self, node: int) -> Table:
+    def table(self, node: int) -> RegisterMap:
         """The register table of the device."""
         return self.family.tables[self.bus.run(self.family.identify(node)).table]
 
@@ -191,7 +181,7 @@ class World:
         self.bus.close()
 
 
-def _writable(table: Table) -> list[str]:
+def _writable(table: RegisterMap) -> list[str]:
     return [row.name for row in table.values() if row.writable]
 
 
@@ -267,31 +257,31 @@ def reports(family: Family) -> list[Notification]:
     return [event for event in events if isinstance(event, Notification)]
 
 
-def locks(family: Family) -> list[Entry]:
+def locks(family: Family) -> list[Register]:
     """The rows named `lock`: what a guarded sequence opens and must close. Their choices say which is which."""
     return [table["lock"] for table in family.tables.values() if "lock" in table]
 
 
-def closed(lock: Entry) -> int:
+def closed(lock: Register) -> int:
     """The value that a lock has when it is closed."""
     values = [value for value, meaning in lock.choices.items() if meaning.startswith("closed")]
     assert len(values) == 1, "the choices of a lock say which value is closed"
     return values[0]
 
 
-def plain(table: Table) -> list[Entry]:
+def plain(table: RegisterMap) -> list[Register]:
     """Rows that can be read and written in RAM without any effect."""
     rows = [row for row in table.values() if row.writable and row.readable and not row.protected]
     return [row for row in rows if row.effect is Effect.NONE]
 
 
-def kept(table: Table) -> list[Entry]:
+def kept(table: RegisterMap) -> list[Register]:
     """The rows that a plain write by name keeps in EEPROM, by a guarded sequence."""
     rows = [row for row in table.values() if row.writable and not row.protected and row.name != "lock"]
     return [row for row in rows if row.effect is Effect.PERSISTENT]
 
 
-def samples(row: Entry) -> list[int]:
+def samples(row: Register) -> list[int]:
     """In-range raw values: both ends, what is next to them, what is next to 0, and some between."""
     span = row.high - row.low
     wanted = {
@@ -337,7 +327,7 @@ class Steps:
         self.seen = seen
         self.count = 0
         self.cuts = 0
-        self.exchanges: list[Exchange[Any]] = []
+        self.requests: list[Request[Any]] = []
 
     def run(self, operation: Runnable[Any]) -> Any:
         """The value of the operation; raises what it raises."""
@@ -358,17 +348,17 @@ class Steps:
 
     def _carried_out(self, step: Step[Any]) -> Any:
         if isinstance(step, Exclusive):
-            return self.run(step.operation)
+            return self.run(step.runnable)
         if isinstance(step, Shielded):
             return self._run_shielded(step)
         if isinstance(step, Gather):
-            return [self.run(operation) for operation in step.operations]
+            return [self.run(operation) for operation in step.runnables]
         number, self.count = self.count, self.count + 1
         cuts = number == self.cut_at
         if cuts and self.before:
             raise self._cut()
-        if isinstance(step, Exchange):
-            self.exchanges.append(step)
+        if isinstance(step, Request):
+            self.requests.append(step)
         value = self.bus.run(step)
         self.seen()
         if cuts:
@@ -379,9 +369,9 @@ class Steps:
         """Carry out the end of a guard; a cancellation in it is raised when it has ended."""
         cut_at, begun = self.cut_at, self.count
         if isinstance(self.error(), Exception):
-            return self.run(step.operation)
+            return self.run(step.runnable)
         self.cut_at = None
-        value = self.run(step.operation)
+        value = self.run(step.runnable)
         self.cut_at = cut_at
         if cut_at is not None and begun <= cut_at < self.count:
             raise self._cut()

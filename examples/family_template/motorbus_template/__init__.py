@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from motorbus.core.entry import Table
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.device import AsyncDevice, AsyncRunner, BlockingDevice, BlockingRunner, device_method
 from motorbus.core.family import (
     Devices,
     Explanation,
@@ -22,8 +23,9 @@ from motorbus.core.family import (
     Simulator,
     Stop,
 )
-from motorbus.core.operation import ANY, CanFrame, Exchange, Procedure, Response, Runnable, TimeoutClass
-from motorbus.core.verbs import AsyncRunner, Awaiting, Blocking, BlockingRunner, verb
+from motorbus.core.register import RegisterMap
+from motorbus.core.request import ANY, Request, Response, TimeoutClass
+from motorbus.core.steps import Procedure, Runnable
 
 from . import driver, wire
 from .scanning import scan
@@ -37,33 +39,33 @@ TURNAROUND: Final = {TimeoutClass.REPLY: 0.005, TimeoutClass.SCAN: 0.002, Timeou
 
 
 class _Verbs(driver.Node):
-    ping = verb(driver.ping)
-    identify = verb(driver.identify)
-    read = verb(driver.read)
-    write = verb(driver.write)
-    set_node_id = verb(driver.set_node_id)
-    position = verb(driver.position)
-    telemetry = verb(driver.telemetry)
-    move = verb(driver.move)
-    enable_torque = verb(driver.enable_torque)
-    disable_torque = verb(driver.disable_torque)
-    stop = verb(driver.stop)
+    ping = device_method(driver.ping)
+    identify = device_method(driver.identify)
+    read = device_method(driver.read)
+    write = device_method(driver.write)
+    set_node_id = device_method(driver.set_node_id)
+    position = device_method(driver.position)
+    telemetry = device_method(driver.telemetry)
+    move = device_method(driver.move)
+    enable_torque = device_method(driver.enable_torque)
+    disable_torque = device_method(driver.disable_torque)
+    stop = device_method(driver.stop)
 
 
-class Servo(_Verbs, Blocking):
+class Servo(_Verbs, BlockingDevice):
     """A Metronome on a blocking bus."""
 
     def __init__(self, bus: BlockingRunner, node: int) -> None:
         driver.Node.__init__(self, node)
-        Blocking.__init__(self, bus)
+        BlockingDevice.__init__(self, bus)
 
 
-class AsyncServo(_Verbs, Awaiting):
+class AsyncServo(_Verbs, AsyncDevice):
     """A Metronome on an async bus."""
 
     def __init__(self, bus: AsyncRunner, node: int) -> None:
         driver.Node.__init__(self, node)
-        Awaiting.__init__(self, bus)
+        AsyncDevice.__init__(self, bus)
 
 
 _AXIS: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
@@ -90,7 +92,7 @@ class Template:
         (Option("temperature", float, 25.0, "of the simulated servos, in °C; an alarm above 80"),),
         window=2,
     )
-    tables: Mapping[str, Table] = {TABLE.name: TABLE}
+    tables: Mapping[str, RegisterMap] = {TABLE.name: TABLE}
     devices = Devices(Servo, AsyncServo)
 
     def configured(self, **settings: object) -> Template:
@@ -101,21 +103,21 @@ class Template:
         """Each node has a lane of its own."""
         return node
 
-    def air_time(self, exchange: Exchange[Any], rate: int) -> float:
+    def air_time(self, exchange: Request[Any], rate: int) -> float:
         """Seconds for the frames, each with the most stuff bits it can have."""
-        due = () if exchange.replies is ANY else exchange.replies
-        request = len(exchange.request.data if isinstance(exchange.request, CanFrame) else exchange.request)
+        due = () if exchange.expected is ANY else exchange.expected
+        request = len(exchange.wire.data if isinstance(exchange.wire, CanFrame) else exchange.wire)
         return sum(_bits(length) for length in (request, *(one.length for one in due))) / rate
 
-    def turnaround(self, exchange: Exchange[Any]) -> float:
+    def turnaround(self, exchange: Request[Any]) -> float:
         """A servo answers within `TURNAROUND`."""
-        return TURNAROUND[exchange.timeout]
+        return TURNAROUND[exchange.reply_within]
 
     def quiet_time(self, rate: int) -> float:
         """A servo that is late is so by one EEPROM page at most."""
         return 0.02
 
-    def echo_test(self) -> Exchange[Any] | None:
+    def echo_test(self) -> Request[Any] | None:
         """A CAN controller does not hear itself."""
         return None
 
@@ -127,7 +129,7 @@ class Template:
         """Answers, reports, noise."""
         return wire.FrameReceiver()
 
-    def probe(self, node: int, attempt: int) -> Exchange[bool]:
+    def probe(self, node: int, attempt: int) -> Request[bool]:
         """256 objects whose values are known."""
         return driver.proof(driver.Node(node), attempt)
 

@@ -1,8 +1,8 @@
 """DRIVER: what to say to get a thing done. Here belong sequences, verification and guards; no bytes, no waiting.
 
-A function takes a node and returns an `Exchange` (one request, which can be kept and run again) or is a generator
-that yields steps. It never knows whether a blocking or an async bus carries it out. Verbs never call each other;
-these functions do. `node` holds what is known of a device and is filled by them.
+A function takes a node. It returns a `Request`, which can be kept and run again, or is a coroutine that awaits steps; a
+blocking or an async bus runs it. Device methods do not call each other; these functions do. They fill `node`, the known
+state of a device.
 """
 
 from __future__ import annotations
@@ -12,23 +12,20 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Final, TypeVar
 
-from motorbus.core.entry import Entry, Storage, Value
 from motorbus.core.family import Health, Identity, State, Stop
-from motorbus.core.operation import (
+from motorbus.core.register import Register, Storage, Value
+from motorbus.core.request import (
     Effect,
-    Exchange,
-    Exclusive,
     Expected,
-    Goal,
     Notification,
+    Precondition,
     Priority,
-    Refusal,
+    Request,
     Response,
     TimeoutClass,
-    WaitFor,
-    catch,
-    with_cleanup,
 )
+from motorbus.core.setpoint import Setpoint
+from motorbus.core.steps import Exclusive, WaitFor, catch, with_cleanup
 from motorbus.errors import (
     DeviceError,
     LimitExceeded,
@@ -70,13 +67,13 @@ def exchange(
     value: bytes = b"",
     *,
     take: Callable[[bytes], T],
-    rank: Priority = Priority.POLL,
+    priority: Priority = Priority.POLL,
     effect: Effect = Effect.NONE,
-    goals: tuple[Goal, ...] = (),
-    timeout: TimeoutClass = TimeoutClass.REPLY,
-    tells_position: bool | Callable[[Response], Mapping[int, float]] = False,
-    refusal: Refusal | None = None,
-) -> Exchange[T]:
+    setpoints: tuple[Setpoint, ...] = (),
+    reply_within: TimeoutClass = TimeoutClass.REPLY,
+    reports_position: bool | Callable[[Response], Mapping[int, float]] = False,
+    precondition: Precondition | None = None,
+) -> Request[T]:
     """One request to one node; `take` makes a value of the four bytes of the answer.
 
     Everything here is repeatable: a goal is absolute. A relative move would have to say `repeatable=False`.
@@ -89,22 +86,22 @@ def exchange(
             raise _refused(node, data[3] & 0x0F, index, subindex)
         return take(data[4:])
 
-    return Exchange(
+    return Request(
         wire.encode_request(node.node, command, index, subindex, value),
         (Expected(node.node, (int(command), index, subindex), wire.LENGTH),),
         read,
         lane=node.node,
-        rank=rank,
+        priority=priority,
         effect=effect,
-        goals=goals,
-        timeout=timeout,
+        setpoints=setpoints,
+        reply_within=reply_within,
         repeatable=True,
-        tells_position=tells_position,
-        refusal=refusal,
+        reports_position=reports_position,
+        precondition=precondition,
     )
 
 
-def read_row(node: Node, row: Entry) -> Exchange[int]:
+def read_row(node: Node, row: Register) -> Request[int]:
     """The raw value of one object."""
     return exchange(
         node,
@@ -116,9 +113,9 @@ def read_row(node: Node, row: Entry) -> Exchange[int]:
 
 
 def write_row(
-    node: Node, row: Entry, raw: int, *goals: Goal, refusal: Refusal | None = None
-) -> Exchange[None]:
-    """Write one object, unless `refusal` objects just before. Raises RequestError for a raw value out of range."""
+    node: Node, row: Register, raw: int, *setpoints: Setpoint, precondition: Precondition | None = None
+) -> Request[None]:
+    """Write one object, unless `precondition` objects just before. Raises RequestError for a raw value out of range."""
     return exchange(
         node,
         wire.Command.WRITE,
@@ -126,24 +123,29 @@ def write_row(
         row.subindex or 0,
         row.encode(raw),
         take=_nothing,
-        rank=Priority.CONTROL,
+        priority=Priority.CONTROL,
         effect=row.effect,
-        goals=goals,
-        timeout=TimeoutClass.STORE if row.storage is Storage.EEPROM else TimeoutClass.REPLY,
-        refusal=refusal,
+        setpoints=setpoints,
+        reply_within=TimeoutClass.STORE if row.storage is Storage.EEPROM else TimeoutClass.REPLY,
+        precondition=precondition,
     )
 
 
-def proof(node: Node, attempt: int = 0, timeout: TimeoutClass = TimeoutClass.REPLY) -> Exchange[bool]:
+def proof(node: Node, attempt: int = 0, reply_within: TimeoutClass = TimeoutClass.REPLY) -> Request[bool]:
     """Ask for something whose answer is known beforehand and differs with `attempt`."""
     subindex = attempt & 0xFF
     right = bytes((~subindex & 0xFF,))
     return exchange(
-        node, wire.Command.READ, wire.PROOF, subindex, take=lambda data: data[-1:] == right, timeout=timeout
+        node,
+        wire.Command.READ,
+        wire.PROOF,
+        subindex,
+        take=lambda data: data[-1:] == right,
+        reply_within=reply_within,
     )
 
 
-def position(node: Node) -> Exchange[float]:
+def position(node: Node) -> Request[float]:
     """Present position, rad."""
     row = TABLE["present_position"]
 
@@ -157,16 +159,16 @@ def position(node: Node) -> Exchange[float]:
         row.address,
         row.subindex or 0,
         take=lambda data: float(row.to_value(row.decode(data))),
-        tells_position=where,
+        reports_position=where,
     )
 
 
-def stop(node: Node) -> Exchange[None]:
+def stop(node: Node) -> Request[None]:
     """Brake and hold; torque stays as it is. Goes before everything else and needs to know nothing."""
-    return exchange(node, wire.Command.STOP, take=_nothing, rank=Priority.STOP, effect=Effect.MOTION)
+    return exchange(node, wire.Command.STOP, take=_nothing, priority=Priority.STOP, effect=Effect.MOTION)
 
 
-def disable_torque(node: Node) -> Exchange[None]:
+def disable_torque(node: Node) -> Request[None]:
     """Torque off: it goes limp where it is."""
     return write_row(node, TABLE["torque_enable"], 0)
 
@@ -237,7 +239,7 @@ async def set_node_id(node: Node, new: int) -> None:
     await Exclusive(_guarded(node, [(TABLE["node_id"], new)]))
 
 
-def _checked(row: Entry, value: Value) -> int:
+def _checked(row: Register, value: Value) -> int:
     """The raw value to write. Raises RequestError when this may not be written by name."""
     raw = row.to_raw(value)
     refusal = ""
@@ -253,7 +255,7 @@ def _checked(row: Entry, value: Value) -> int:
     return raw
 
 
-async def _guarded(node: Node, orders: list[tuple[Entry, int]]) -> None:
+async def _guarded(node: Node, orders: list[tuple[Register, int]]) -> None:
     """Unlock, write, read back, and lock again whatever happens, Ctrl-C and a second Ctrl-C included.
 
     The unlock belongs to what is cleaned up after, for it may have been heard although its answer was not.
@@ -262,7 +264,7 @@ async def _guarded(node: Node, orders: list[tuple[Entry, int]]) -> None:
     await with_cleanup(_unlocked(node, orders), lambda: _locked(node))
 
 
-async def _unlocked(node: Node, orders: list[tuple[Entry, int]]) -> None:
+async def _unlocked(node: Node, orders: list[tuple[Register, int]]) -> None:
     await write_row(node, TABLE["lock"], 0)
     for row, raw in orders:
         await write_row(node, row, raw)
@@ -320,10 +322,10 @@ def _is_arrival(node: int, notice: Notification) -> bool:
     return notice.node == node and notice.kind == "arrived"
 
 
-async def _goal(node: Node, raw: int) -> Goal:
+async def _goal(node: Node, raw: int) -> Setpoint:
     """What this raw goal orders, with the limits the device itself declares, for the gate to judge."""
     known = await limits(node)
-    return Goal(node.node, "position", float(TABLE["goal_position"].to_value(raw)), *known)
+    return Setpoint(node.node, "position", float(TABLE["goal_position"].to_value(raw)), *known)
 
 
 async def limits(node: Node) -> tuple[float, float]:
@@ -348,7 +350,7 @@ async def telemetry(node: Node) -> State:
     )
 
 
-def health(node: Node) -> Exchange[Health]:
+def health(node: Node) -> Request[Health]:
     """Whether its torque is on, and its alarms: what is asked again and again while it is led, so one exchange."""
     row = TABLE["torque_enable"]
 
@@ -360,8 +362,8 @@ def health(node: Node) -> Exchange[Health]:
 
 def stop_all(nodes: tuple[int, ...]) -> Stop:
     """What an emergency stop sends: everyone at once, then each known node until it acknowledges."""
-    everyone = Exchange[Response](
-        wire.encode_request(wire.EVERYONE, wire.Command.STOP), rank=Priority.STOP, effect=Effect.MOTION
+    everyone = Request[Response](
+        wire.encode_request(wire.EVERYONE, wire.Command.STOP), priority=Priority.STOP, effect=Effect.MOTION
     )
     each = [_plain(stop(Node(node))) for node in nodes]
     return Stop(
@@ -370,8 +372,8 @@ def stop_all(nodes: tuple[int, ...]) -> Stop:
     )
 
 
-def _plain(one: Exchange[None]) -> Exchange[Response]:
+def _plain(one: Request[None]) -> Request[Response]:
     """The same exchange without a reading of its answer: an alarm must not count as a missing acknowledgement."""
-    return Exchange(
-        one.request, one.replies, lane=one.lane, rank=one.rank, effect=one.effect, repeatable=True
+    return Request(
+        one.wire, one.expected, lane=one.lane, priority=one.priority, effect=one.effect, repeatable=True
     )

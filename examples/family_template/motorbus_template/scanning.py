@@ -7,16 +7,8 @@ is found is reported at once, for a scan of all rates takes long.
 from __future__ import annotations
 
 from motorbus.core.family import Found
-from motorbus.core.operation import (
-    Emit,
-    Exclusive,
-    Gather,
-    Progress,
-    SetBitrate,
-    TimeoutClass,
-    catch,
-    with_cleanup,
-)
+from motorbus.core.request import TimeoutClass
+from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate, catch, gather, with_cleanup
 from motorbus.errors import MotorbusError
 
 from . import driver, wire
@@ -44,14 +36,14 @@ async def _everyone(nodes: tuple[int, ...], rate: int) -> list[Found]:
     found: dict[int, Found] = {}
     for turn in range(2):
         silent = [node for node in nodes if node not in found]
-        looks = await Gather([_look(driver.Node(node), rate) for node in silent])
+        looks = await gather(*[_look(driver.Node(node), rate) for node in silent])
         found |= {one.node: one for one in looks if one is not None}
         await Emit(Progress((turn + 1) * len(nodes), 2 * len(nodes), f"{rate} bit/s"))
     return [found[node] for node in nodes if node in found]
 
 
 async def _look(node: driver.Node, rate: int) -> Found | None:
-    heard = await catch(driver.proof(node, timeout=TimeoutClass.SCAN))
+    heard = await catch(driver.proof(node, reply_within=TimeoutClass.SCAN))
     if heard is not True:
         return None
     identity = await catch(driver.identify(node))

@@ -13,8 +13,9 @@ from math import inf
 from typing import Final
 
 from motorbus.core import plant
-from motorbus.core.entry import Entry, Storage
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.register import Register, Storage
+from motorbus.core.request import Data
 from motorbus.errors import RequestError
 
 from . import wire
@@ -105,10 +106,10 @@ class Servo:
     def _alarms(self) -> int:
         return 1 << 4 if self.temperature > HOT else 0
 
-    def _code(self, row: Entry) -> bytes:
+    def _code(self, row: Register) -> bytes:
         return (self.memory[row.name] % (1 << 8 * row.size)).to_bytes(row.size, "big")
 
-    def _write(self, row: Entry, raw: int, at: float) -> int:
+    def _write(self, row: Register, raw: int, at: float) -> int:
         values = self._values
         if not row.writable:
             return 2

@@ -11,20 +11,20 @@ from functools import partial
 from math import tau
 from typing import Final
 
-from motorbus.core.entry import Access, Coding, Entry, Storage, Table
-from motorbus.core.operation import Effect
+from motorbus.core.register import Access, Coding, Register, RegisterMap, Storage
+from motorbus.core.request import Effect
 
 COUNT: Final = tau / 65536
 """One count of the encoder, in rad."""
 
 _SOURCE = "Metronome object list (README.md)"
 
-_row = partial(Entry, order="big", source=_SOURCE)
+_row = partial(Register, order="big", source=_SOURCE)
 _position = partial(
     _row, size=4, coding=Coding.TWOS_COMPLEMENT, low=-(2**31), high=2**31 - 1, unit="rad", scale=COUNT
 )
 
-TABLE: Final = Table(
+TABLE: Final = RegisterMap(
     "metronome",
     (
         _row(

@@ -11,7 +11,9 @@ from math import ceil, isfinite
 from typing import Final
 
 from motorbus.core.family import Positions
-from motorbus.core.operation import Exchange, Gather, Goal
+from motorbus.core.request import Request
+from motorbus.core.setpoint import Setpoint
+from motorbus.core.steps import gather
 from motorbus.errors import LimitExceeded, RequestError
 
 from .driver import Node, enable_torque, limits, position, write_row
@@ -23,7 +25,7 @@ _VELOCITY: Final = TABLE["move_velocity"]
 
 async def train(servos: Sequence[Node], *, rate: int) -> Train:
     """These servos, ready to be led; their limits are read and nothing is written. `rate` changes nothing here."""
-    await Gather([limits(node) for node in servos])
+    await gather(*[limits(node) for node in servos])
     return Train(servos)
 
 
@@ -35,7 +37,7 @@ class Train:
         self.nodes: Final = tuple(self._servos)
         self.positions: Final = tuple(_position(node) for node in servos)
 
-    def goals(self, to: Mapping[int, float]) -> Sequence[Exchange[None]]:
+    def goals(self, to: Mapping[int, float]) -> Sequence[Request[None]]:
         """One frame for each. Raises LimitExceeded for what is no number or fits no register."""
         return [_order(self._servo(id), value) for id, value in to.items()]
 
@@ -44,7 +46,7 @@ class Train:
 
         What one cannot be told exactly is rounded up: who follows goals must not fall behind them.
         """
-        await Gather([_begin(node, speeds.get(id)) for id, node in self._servos.items()])
+        await gather(*[_begin(node, speeds.get(id)) for id, node in self._servos.items()])
 
     def _servo(self, id: int) -> Node:
         if id in self._servos:
@@ -52,14 +54,14 @@ class Train:
         raise RequestError(f"node {id} is not led here", expected=f"one of {self.nodes}")
 
 
-def _position(node: Node) -> Exchange[Positions]:
+def _position(node: Node) -> Request[Positions]:
     one = position(node)
-    read = one.read
+    read = one.decode
     assert read is not None
-    return one.reading(lambda answer: Positions({node.node: read(answer)}, (), answer.at))
+    return one.with_decoder(lambda answer: Positions({node.node: read(answer)}, (), answer.at))
 
 
-def _order(node: Node, to: float) -> Exchange[None]:
+def _order(node: Node, to: float) -> Request[None]:
     known = node.limits
     if known is None:
         raise _written(node)
@@ -70,9 +72,9 @@ def _order(node: Node, to: float) -> Exchange[None]:
             advice="give a number in rad; nothing was sent",
             node=node.node,
         )
-    goal = Goal(node.node, "position", float(_GOAL.to_value(raw)), *known)
+    goal = Setpoint(node.node, "position", float(_GOAL.to_value(raw)), *known)
     return write_row(
-        node, _GOAL, raw, goal, refusal=lambda _: None if node.limits == known else _written(node)
+        node, _GOAL, raw, goal, precondition=lambda _: None if node.limits == known else _written(node)
     )
 
 

@@ -17,8 +17,9 @@ from collections.abc import Iterator
 from enum import IntEnum
 from typing import Final, NamedTuple
 
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import Explanation, Part
-from motorbus.core.operation import CanFrame, Data, Event, Key, Noise, Notification, Reply
+from motorbus.core.request import Data, Event, Key, Noise, Notification, Reply
 from motorbus.errors import RequestError
 
 REQUEST: Final = 0x200

@@ -15,7 +15,8 @@ from motorbus.bus.interrupts import DEFAULTS, SIGNALS
 from motorbus.bus.jobs import RequestJob
 from motorbus.bus.prepared import Prepared
 from motorbus.bus.tasks import Notify, TaskTree
-from motorbus.core.operation import UNLIKE, Exchange, Runnable, discard
+from motorbus.core.request import Request
+from motorbus.core.steps import Runnable, discard
 from motorbus.errors import LinkError, LinkLost
 
 T = TypeVar("T")
@@ -42,7 +43,7 @@ class AsyncBus(BaseBus):
         Ctrl-C is left to the event loop, which cancels the main task.
         """
         # Virtual time passes in `_wait` only, and a request with an effect needs `since`, which a call has not.
-        if isinstance(procedure, Exchange) and not procedure.effect and not self.link.virtual:
+        if isinstance(procedure, Request) and not procedure.effect and not self.link.virtual:
             return self._transact(procedure)
         return self._run(_Owned(procedure), report)
 
@@ -51,7 +52,7 @@ class AsyncBus(BaseBus):
         await _run_parts([part])
         return part.tree.result()
 
-    async def _transact(self, request: Exchange[Any]) -> Any:
+    async def _transact(self, request: Request[Any]) -> Any:
         """Carry out one request that changes nothing."""
         call = _Call(request)
         with self.turn:
@@ -128,7 +129,7 @@ class AsyncBus(BaseBus):
                 return
             self._direct = None
             value = self.accept(prepared, chunks, deadline)
-            if value is UNLIKE:
+            if value is None:
                 self.adopt(prepared, chunks, call)
                 self.send()
             else:
@@ -203,7 +204,7 @@ class _Owned:
 class _Call(RequestJob):
     """A request whose value a task of the running loop awaits."""
 
-    def __init__(self, request: Exchange[Any]) -> None:
+    def __init__(self, request: Request[Any]) -> None:
         super().__init__(request, settled=self._settled)
         self.loop = asyncio.get_running_loop()
         self.thread = get_ident()

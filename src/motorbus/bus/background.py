@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 from motorbus.bus.base import BaseBus
 from motorbus.bus.running import run_here
 from motorbus.bus.tasks import TaskTree
-from motorbus.core.operation import Procedure
+from motorbus.core.steps import Procedure
 
 T = TypeVar("T")
 

@@ -21,8 +21,9 @@ from motorbus.bus.stop_socket import StopOutcome, asked_by
 from motorbus.bus.tasks import Notify, TaskTree
 from motorbus.bus.trace import TraceRecord
 from motorbus.bus.turn import Turn
-from motorbus.core.family import Family, Readdressed
-from motorbus.core.operation import UNLIKE, Data, Exchange, JournalEntry, Priority, Runnable
+from motorbus.core.family import Family, IdChanged
+from motorbus.core.request import Data, Priority, Request
+from motorbus.core.steps import JournalEntry, Runnable
 from motorbus.errors import LinkError, LinkLost, MotorbusError, RequestError
 from motorbus.link.base import Link, Renewable
 from motorbus.link.memory import MemoryLink
@@ -53,7 +54,7 @@ class BaseBus:
         self.family = family
         self.report = report
         self.journal = journal
-        self.readdressed: Callable[[Readdressed], None] | None = None
+        self.readdressed: Callable[[IdChanged], None] | None = None
         self.warnings: tuple[str, ...] = tuple(link.warnings)
         self.engine = Engine(
             family,
@@ -202,13 +203,13 @@ class BaseBus:
 
     # -- prepared requests -------------------------------------------------------------------------------------
 
-    def prepare(self, request: Exchange[Any]) -> Prepared | None:
+    def prepare(self, request: Request[Any]) -> Prepared | None:
         """The prepared form of this request if it may be sent at once, else None. The caller holds the turn.
 
         `Engine.submit` makes the prepared form when the request is sent for the first time.
         """
         engine, link = self.engine, self.link
-        prepared: Prepared | None = request.course
+        prepared: Prepared | None = request.prepared
         if prepared is None or prepared.engine is not engine:
             return None
         if engine.in_flight or (not engine.ready and not engine.check_ready()):
@@ -226,13 +227,13 @@ class BaseBus:
         return None if engine.paced and link.now() < engine.free_at else prepared
 
     def write(
-        self, prepared: Prepared, order: Exchange[Any] | None = None, since: Since | None = None
+        self, prepared: Prepared, order: Request[Any] | None = None, since: Since | None = None
     ) -> Attempt:
         """Write a prepared request; an order without reply goes in front of it. Raises what forbids the order."""
         engine, now = self.engine, self.link.now()
         attempt = prepared.attempt
         if attempt.ended:
-            attempt = prepared.attempt = Attempt(prepared.exchange)
+            attempt = prepared.attempt = Attempt(prepared.request)
         wire: Any = prepared.wire
         attempt.sent_at = now
         if order is not None:
@@ -245,30 +246,30 @@ class BaseBus:
         self.link.write(wire)
         return attempt
 
-    def _write_order(self, order: Exchange[Any], since: Since, now: float) -> Any:
+    def _write_order(self, order: Request[Any], since: Since, now: float) -> Any:
         """Check and count an order that leaves with the next request; its data."""
         engine = self.engine
         engine.time = now
         engine.check(order, since)
-        if order.rank is Priority.STOP:
+        if order.priority is Priority.STOP:
             engine.note_stop(order)
         else:
             engine.positions.sent(order)
         engine.statistics.other["sent"] += 1
         engine.free_at = now + engine.air_time(order)
         if engine.trace.subscriptions:
-            engine.trace.put(TraceRecord(now, "tx", order.request))
-        return order.request
+            engine.trace.put(TraceRecord(now, "tx", order.wire))
+        return order.wire
 
     def accept(self, prepared: Prepared, chunks: Sequence[Data], deadline: float) -> Any:
-        """The value if this is the complete reply to a prepared request, else UNLIKE."""
+        """The value if this is the complete reply to a prepared request, else None."""
         if len(chunks) != 1:
-            return UNLIKE
+            return None
         at = self.link.now()
         if at > deadline:  # the host was late
             at = deadline
         value = prepared.decode(chunks[0], at)
-        if value is UNLIKE:
+        if value is None:
             return value
         engine, record, single = self.engine, prepared.record, prepared.single
         if engine.trace.subscriptions:
@@ -288,7 +289,7 @@ class BaseBus:
     def adopt(self, prepared: Prepared, chunks: Sequence[Data], job: RequestJob) -> None:
         """The reply to a prepared request is in pieces, damaged or missing: its job goes the general path."""
         engine, attempt = self.engine, prepared.attempt
-        prepared.attempt = Attempt(prepared.exchange)
+        prepared.attempt = Attempt(prepared.request)
         job.policy = carry_out(engine, job.request)
         job.policy.send(None)  # up to the attempt that is in flight
         attempt.job = job
@@ -304,7 +305,7 @@ class BaseBus:
             return observer
 
         def deliver(event: object) -> None:
-            if readdressed is not None and isinstance(event, Readdressed):
+            if readdressed is not None and isinstance(event, IdChanged):
                 readdressed(event)
             if journal is not None and isinstance(event, JournalEntry):
                 journal(event)
@@ -346,7 +347,7 @@ class BaseBus:
         """Call this function each time the lost port was opened again, before anything is sent."""
         self._on_reconnect.append(function)
 
-    def required_reads(self, request: Exchange[Any]) -> Sequence[Runnable[Any]]:
+    def required_reads(self, request: Request[Any]) -> Sequence[Runnable[Any]]:
         """The reads that the interlock needs before it can check this request."""
         return () if self.interlock is None else self.interlock.required_reads(request)
 
@@ -357,7 +358,7 @@ class BaseBus:
         self.interlock = gate
         self.on_reconnect(gate.forget)
 
-    def expect_echo(self, test: Exchange[Any]) -> None:
+    def expect_echo(self, test: Request[Any]) -> None:
         """Let the next reply to this request show whether the adapter echoes."""
         self.engine.echo.test = test
 

@@ -14,8 +14,9 @@ from motorbus.bus.positions import GATED
 from motorbus.bus.prepared import Prepared
 from motorbus.bus.running import TURN_TIMEOUT, run_here, run_on
 from motorbus.bus.tasks import Notify
-from motorbus.core.entry import shown
-from motorbus.core.operation import UNLIKE, Exchange, Gather, Priority, Runnable
+from motorbus.core.register import shown
+from motorbus.core.request import Priority, Request
+from motorbus.core.steps import Runnable, gather
 from motorbus.errors import LinkError, MotorbusError, RequestError
 
 T = TypeVar("T")
@@ -31,11 +32,11 @@ class Bus(BaseBus):
 
         Raises what the procedure raises; a signal is raised when the procedure has cleaned up.
         """
-        if isinstance(procedure, Exchange) and not self._needs_reads(procedure):
+        if isinstance(procedure, Request) and not self._needs_reads(procedure):
             return self.transact(procedure)  # type: ignore[no-any-return]
         return run_here(self, procedure, report)
 
-    def transact(self, request: Exchange[Any]) -> Any:
+    def transact(self, request: Request[Any]) -> Any:
         """Carry out one request."""
         turn = self.turn
         if self.link.virtual:
@@ -44,7 +45,7 @@ class Bus(BaseBus):
         since = self.engine.since if request.effect else None
         signals.depth += 1  # as `with interrupts()`, written out for speed
         try:
-            turn.acquire(request.rank)
+            turn.acquire(request.priority)
             try:
                 prepared = self.prepare(request)
                 if prepared is not None:
@@ -72,9 +73,9 @@ class Bus(BaseBus):
                 data += b"".join(more)  # type: ignore[arg-type]  # a link gives bytes or frames
             chunks = [data]
         value = self.accept(prepared, chunks, deadline)
-        if value is not UNLIKE:
+        if value is not None:
             return value
-        job = RequestJob(prepared.exchange)
+        job = RequestJob(prepared.request)
         self.adopt(prepared, chunks, job)
         return self._finish(job)
 
@@ -95,7 +96,7 @@ class Bus(BaseBus):
         return job.result()
 
     def exchange(
-        self, requests: Sequence[Exchange[Any]], tolerated: tuple[type[Exception], ...] = ()
+        self, requests: Sequence[Request[Any]], tolerated: tuple[type[Exception], ...] = ()
     ) -> list[Any]:
         """Carry out a batch, as a control loop does in every cycle: the values of its requests.
 
@@ -105,7 +106,7 @@ class Bus(BaseBus):
         """
         return self.start(requests).result(tolerated)
 
-    def start(self, requests: Sequence[Exchange[Any]], timeout: float = -1.0) -> Pending:
+    def start(self, requests: Sequence[Request[Any]], timeout: float = -1.0) -> Pending:
         """Send a batch, see `exchange`; `Pending.result` gives its values.
 
         A batch that cannot be sent at once, or for which the bus is not free within `timeout` s (-1: no limit), is sent
@@ -129,7 +130,7 @@ class Bus(BaseBus):
                 pending.release()
         return pending
 
-    def _write_batch(self, requests: Sequence[Exchange[Any]], since: Since) -> Prepared | None:
+    def _write_batch(self, requests: Sequence[Request[Any]], since: Since) -> Prepared | None:
         """Write a prepared request, and an order in front of it; None where they cannot leave now."""
         order = requests[0] if len(requests) == 2 else None
         if len(requests) > 2 or not requests or (order is not None and not self._may_join(order)):
@@ -144,14 +145,14 @@ class Bus(BaseBus):
                 return None
         return prepared
 
-    def _may_join(self, order: Exchange[Any]) -> bool:
+    def _may_join(self, order: Request[Any]) -> bool:
         """This order may leave in one write with the next request."""
         interlock = self.engine.interlock
-        if order.replies != () or order.effect not in GATED or interlock is None:
-            return order.replies == ()
+        if order.expected != () or order.effect not in GATED or interlock is None:
+            return order.expected == ()
         return not interlock.required_reads(order)
 
-    def _needs_reads(self, request: Exchange[Any]) -> bool:
+    def _needs_reads(self, request: Request[Any]) -> bool:
         return request.effect in GATED and bool(self.required_reads(request))
 
     def defer_signals(self) -> None:
@@ -178,7 +179,7 @@ class Pending:
 
     __slots__ = ("bus", "ended", "prepared", "requests", "signals", "since")
 
-    def __init__(self, bus: Bus, requests: Sequence[Exchange[Any]], signals: Interrupts) -> None:
+    def __init__(self, bus: Bus, requests: Sequence[Request[Any]], signals: Interrupts) -> None:
         self.bus = bus
         self.requests = requests
         self.signals = signals
@@ -217,11 +218,11 @@ class Pending:
 
 
 async def carry_out_batch(
-    requests: Sequence[Exchange[Any]], tolerated: tuple[type[Exception], ...]
+    requests: Sequence[Request[Any]], tolerated: tuple[type[Exception], ...]
 ) -> list[Any]:
     """Carry out these requests: those on different lanes at the same time, others in order."""
     if len({request.lane for request in requests}) > 1:
-        return await Gather([_tolerate(request, tolerated) for request in requests])
+        return list(await gather(*[_tolerate(request, tolerated) for request in requests]))
     values = []
     for request in requests:
         value = await _tolerate(request, tolerated)
@@ -229,7 +230,7 @@ async def carry_out_batch(
     return values
 
 
-async def _tolerate(request: Exchange[Any], tolerated: tuple[type[Exception], ...]) -> Any:
+async def _tolerate(request: Request[Any], tolerated: tuple[type[Exception], ...]) -> Any:
     try:
         return await request
     except tolerated as error:
@@ -237,7 +238,7 @@ async def _tolerate(request: Exchange[Any], tolerated: tuple[type[Exception], ..
 
 
 def exchange_on(
-    batches: Mapping[Bus, Sequence[Exchange[Any]]], tolerated: tuple[type[Exception], ...] = ()
+    batches: Mapping[Bus, Sequence[Request[Any]]], tolerated: tuple[type[Exception], ...] = ()
 ) -> dict[BaseBus, Any]:
     """Carry out a batch on each bus at the same time: the values of each, or its MotorbusError."""
     found: dict[BaseBus, Any] = {}
@@ -268,7 +269,7 @@ def exchange_on(
 
 def _check_requests(requests: Sequence[Any]) -> None:
     for one in requests:
-        if not isinstance(one, Exchange):
+        if not isinstance(one, Request):
             raise RequestError(
                 f"{shown(one)} is not a request",
                 expected="as bus.exchange([write(goals), sync_read_positions(servos)]): single requests, made before",

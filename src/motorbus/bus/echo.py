@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections import deque
 from typing import Any
 
-from motorbus.core.operation import Exchange
+from motorbus.core.request import Request
 
 
 class Echo:
@@ -28,7 +28,7 @@ class Echo:
         self.broken = False
         self.returned = False
         self.recent: deque[bytes] = deque(maxlen=8)
-        self.test: Exchange[Any] | None = None
+        self.test: Request[Any] | None = None
         self._expected = b""
         self._matched = b""
         self._since = b""

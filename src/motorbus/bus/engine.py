@@ -27,18 +27,18 @@ from motorbus.bus.statistics import Statistics
 from motorbus.bus.sync import SyncTable
 from motorbus.bus.trace import Feed, TraceRecord
 from motorbus.core.family import Family
-from motorbus.core.operation import (
+from motorbus.core.request import (
     ANY,
     EVERY_LANE,
     Data,
     Effect,
     Event,
-    Exchange,
     Expected,
     Noise,
     Notification,
     Priority,
     Reply,
+    Request,
     Response,
     TimeoutClass,
 )
@@ -116,19 +116,19 @@ class Engine:
         """s of silence before a node out of sync is probed."""
         return self.family.quiet_time(self.rate)
 
-    def air_time(self, request: Exchange[Any]) -> float:
+    def air_time(self, request: Request[Any]) -> float:
         """s on the wire of this request and its replies."""
         return self.family.air_time(request, self.rate)
 
-    def reply_timeout(self, request: Exchange[Any]) -> float:
+    def reply_timeout(self, request: Request[Any]) -> float:
         """s from the end of the air time to the deadline.
 
         For a scan on a link that holds nothing back: the shorter of the normal and the scan turnaround, no margin.
         """
-        if request.timeout is TimeoutClass.SCAN and self.latency < DIRECT:
-            plain: Exchange[Response] = Exchange(request.request, request.replies)
+        if request.reply_within is TimeoutClass.SCAN and self.latency < DIRECT:
+            plain: Request[Response] = Request(request.wire, request.expected)
             return min(self.family.turnaround(plain), self.family.turnaround(request)) + self.latency
-        return self.family.turnaround(request) + self.latency + MARGIN[request.timeout]
+        return self.family.turnaround(request) + self.latency + MARGIN[request.reply_within]
 
     @property
     def idle(self) -> bool:
@@ -160,8 +160,11 @@ class Engine:
                 return
             if job.priority is Priority.STOP:
                 self.note_stop(job.request)
-            if job.request.whole is not None and getattr(job.request.course, "engine", None) is not self:
-                job.request.course = self.prepare(job.request)
+            if (
+                job.request.decode_exact is not None
+                and getattr(job.request.prepared, "engine", None) is not self
+            ):
+                job.request.prepared = self.prepare(job.request)
             job.policy = carry_out(self, job.request)
             insort(self.queue, job)
         elif isinstance(job, ExclusiveJob) and self.exclusive is not None and self.exclusive is job.owner:
@@ -206,11 +209,11 @@ class Engine:
     def _decode(self, job: RequestJob, answer: Response) -> None:
         request = job.request
         try:
-            value = answer if request.read is None else request.read(answer)
+            value = answer if request.decode is None else request.decode(answer)
         except Exception as error:  # a refusal of the device, or an error of the driver
             job.settle(error=error)
             return
-        if request.replies:
+        if request.expected:
             self.positions.accept(request, answer)
         job.settle(value)
 
@@ -264,7 +267,9 @@ class Engine:
         # Another request to this node may have failed since the probe was chosen: its quiet time runs again.
         if now < self._earliest(attempt):
             return None
-        unprobed = attempt.is_probe or request.rank is Priority.STOP or request.timeout is TimeoutClass.SCAN
+        unprobed = (
+            attempt.is_probe or request.priority is Priority.STOP or request.reply_within is TimeoutClass.SCAN
+        )
         doubtful = [] if unprobed else self.sync.doubtful(request)
         if any(node not in attempt.excluded for node in doubtful):
             self._resume(job)
@@ -278,7 +283,7 @@ class Engine:
         attempt.job = job
         attempt.echo_excluded = attempt.after_echo and self.echo.present is False
         self.begin(attempt, now)
-        return request.request
+        return request.wire
 
     def _earliest(self, step: Attempt | Wait) -> float:
         """The earliest moment (s) for this step; -inf if it may be carried out now."""
@@ -286,29 +291,31 @@ class Engine:
             return step.until
         return self.sync.of(step.dues[0].node).quiet_until if step.is_probe else -inf
 
-    def check(self, request: Exchange[Any], since: Since | None) -> None:
+    def check(self, request: Request[Any], since: Since | None) -> None:
         """Raise the error that forbids sending this request now. `since`: the counts when its caller decided."""
         if self.listening:
             raise failures.listen_only(request)
-        if request.rank is Priority.STOP:
+        if request.priority is Priority.STOP:
             return
         if self.latched or since is not self.since:
             self._check_stops(request, since)
-        if request.effect in GATED or (request.later is not None and self.interlock is not None):
+        if request.effect in GATED or (request.deferred is not None and self.interlock is not None):
             if self.interlock is None:
                 raise failures.no_interlock(request)
-            if request.refusal is not None and (error := request.refusal(self.positions.stop_count)):
+            if request.precondition is not None and (
+                error := request.precondition(self.positions.stop_count)
+            ):
                 raise error
             self.interlock.check(request, self.time)
             if self.before_motion is not None:
                 self.before_motion()
 
-    def _check_stops(self, request: Exchange[Any], since: Since | None) -> None:
+    def _check_stops(self, request: Request[Any], since: Since | None) -> None:
         """Raise the error for a motion or torque request that must not leave.
 
         A stop is latched; or the request moves something, and a stop of its nodes or a lost port came after `since`.
         """
-        if request.effect not in GATED or request.rank is Priority.STOP:
+        if request.effect not in GATED or request.priority is Priority.STOP:
             return
         if self.latched:
             raise failures.latched(self.latched_by)
@@ -319,7 +326,7 @@ class Engine:
         if since.losses != self.losses:
             raise failures.outlived(request)
 
-    def note_stop(self, request: Exchange[Any]) -> None:
+    def note_stop(self, request: Request[Any]) -> None:
         """Count a stop request that will be sent, and inform the interlock; from any thread."""
         self.positions.sent(request)
         self._note_since()
@@ -337,7 +344,7 @@ class Engine:
             self._take_all(self.receiver.flush(), now)
         start, air = max(now, self.free_at), self.air_time(request)
         attempt.sent_at = now
-        if request.replies != ():
+        if request.expected != ():
             self.sync.mark_sent(request, now)
             attempt.deadline = start + air + self.reply_timeout(request)
             self._share_wire(attempt, air)
@@ -345,22 +352,22 @@ class Engine:
         else:
             self.free_at = start + air
             self._unacknowledged.append(attempt)
-        if (request.effect or request.goals) and request.rank is not Priority.STOP:
+        if (request.effect or request.setpoints) and request.priority is not Priority.STOP:
             self.positions.sent(request)
-        if isinstance(request.request, bytes):
-            self.echo.sent(request.request, attempt.is_probe or request is self.echo.test)
-        self.statistics.asked(request.replies)
+        if isinstance(request.wire, bytes):
+            self.echo.sent(request.wire, attempt.is_probe or request is self.echo.test)
+        self.statistics.asked(request.expected)
         if self.trace.subscriptions:
-            self.trace.put(TraceRecord(now, "tx", request.request))
+            self.trace.put(TraceRecord(now, "tx", request.wire))
 
     def adopt(self, attempt: Attempt) -> None:
         """Record of a written prepared request what `begin` records; it continues on the general path."""
         request = attempt.request
         self.note_last()
         self.sync.mark_sent(request, attempt.sent_at)
-        self.statistics.asked(request.replies)
-        if isinstance(request.request, bytes):
-            self.echo.sent(request.request, testing=False)
+        self.statistics.asked(request.expected)
+        if isinstance(request.wire, bytes):
+            self.echo.sent(request.wire, testing=False)
 
     def written(self) -> None:
         """The data of `next_frame` was written. If its request expects no reply, settle the job."""
@@ -393,16 +400,16 @@ class Engine:
             self.receiver = self.family.receiver()
         job.settle(before, error)
 
-    def alternate(self, request: Exchange[Any]) -> Exchange[Any]:
+    def alternate(self, request: Request[Any]) -> Request[Any]:
         """The equivalent request with another reply length, if the last reply of the node had the length of this one.
 
         A copy of the last reply then cannot pass for the new one.
         """
-        if request.other is None or request.replies is ANY or len(request.replies) != 1:
+        if request.alternate is None or request.expected is ANY or len(request.expected) != 1:
             return request
-        due = request.replies[0]
+        due = request.expected[0]
         node = self.sync.nodes.get(due.node)
-        return request.other() if node is not None and node.length == due.length else request
+        return request.alternate() if node is not None and node.length == due.length else request
 
     # -- what comes in -----------------------------------------------------------------------------------------
 
@@ -466,7 +473,7 @@ class Engine:
 
     def _settle_older(self, attempt: Attempt, reply: Reply) -> bool:
         """True for an owed reply of an earlier request, which is settled; only an unprobed request can meet one."""
-        unprobed = attempt.request.rank is Priority.STOP or attempt.request.replies is ANY
+        unprobed = attempt.request.priority is Priority.STOP or attempt.request.expected is ANY
         return unprobed and self._settle_late(reply)
 
     def _settle_late(self, reply: Reply) -> bool:
@@ -539,11 +546,15 @@ class Engine:
     def _end(self, lane: int, attempt: Attempt, now: float) -> None:
         """End an attempt: accept its replies (of a group, those that came) or set its fault; resume its job."""
         request, dues = attempt.request, attempt.dues
-        single = request.replies is not ANY and len(dues) == 1
+        single = request.expected is not ANY and len(dues) == 1
         if (single and not attempt.complete) or (dues and (attempt.fault or attempt.surplus)):
             attempt.fault = attempt.failure()
         answer = attempt.answer(min(now, attempt.deadline))
-        if attempt.is_probe and not attempt.fault and not (request.read is not None and request.read(answer)):
+        if (
+            attempt.is_probe
+            and not attempt.fault
+            and not (request.decode is not None and request.decode(answer))
+        ):
             attempt.fault = "unexpected"
         answered = [due for index, due in enumerate(dues) if self._judge_reply(attempt, index, due, now)]
         del self.in_flight[lane]
@@ -561,7 +572,7 @@ class Engine:
         if not attempt.fault and index in attempt.replies and due.node not in attempt.excluded:
             return True
         quiet_until = now + self.quiet_time
-        if index in attempt.replies or attempt.request.rank is Priority.STOP:
+        if index in attempt.replies or attempt.request.priority is Priority.STOP:
             self.sync.of(due.node).quiet_until = quiet_until
         else:
             self.sync.mark_owed(attempt.request.lane, due, quiet_until)
@@ -570,14 +581,14 @@ class Engine:
 
     def _accept(self, attempt: Attempt, answer: Response, answered: Sequence[Expected], now: float) -> None:
         request = attempt.request
-        if request.replies is ANY:
+        if request.expected is ANY:
             if (
                 request.lane == EVERY_LANE
             ):  # on such a bus the lane is the node: a stop must reach all that answered
                 self.positions.add([reply.lane for reply in answer.replies])
             return
         if (
-            request.rank is not Priority.STOP
+            request.priority is not Priority.STOP
         ):  # an earlier reply may still come, so a stop puts no node in sync
             for due in answered:
                 self.sync.confirm(due, probe=attempt.is_probe)
@@ -593,30 +604,35 @@ class Engine:
 
     # -- prepared requests -------------------------------------------------------------------------------------
 
-    def prepare(self, request: Exchange[Any]) -> Prepared | None:
+    def prepare(self, request: Request[Any]) -> Prepared | None:
         """Prepare a request that is repeated; None if it needs the general path (queue, policy, receiver)."""
-        if request.whole is None or request.rank is Priority.STOP or request.effect or not request.replies:
+        if (
+            request.decode_exact is None
+            or request.priority is Priority.STOP
+            or request.effect
+            or not request.expected
+        ):
             return None
         prepared = self._prepare(request)
-        if request.other is not None and prepared is not None:
-            alternate = self._prepare(request.other())
+        if request.alternate is not None and prepared is not None:
+            alternate = self._prepare(request.alternate())
             if alternate is None:
                 return None
             prepared.alternate = alternate
             alternate.alternate = alternate.record = prepared
-        request.course = prepared
+        request.prepared = prepared
         return prepared
 
-    def _prepare(self, request: Exchange[Any]) -> Prepared | None:
-        if request.whole is None or request.replies is ANY:
+    def _prepare(self, request: Request[Any]) -> Prepared | None:
+        if request.decode_exact is None or request.expected is ANY:
             return None
         nodes = nodes_of(request)
         states, times = [self.sync.of(node) for node in nodes], self.statistics.group(nodes)
-        return Prepared(self, request, request.whole, nodes, states, times, Attempt(request))
+        return Prepared(self, request, request.decode_exact, nodes, states, times, Attempt(request))
 
     def measure(self, prepared: Prepared) -> None:
         """Compute the time budget of a prepared request for the present rate and latency."""
-        request = prepared.exchange
+        request = prepared.request
         prepared.budget = self.air_time(request) + self.reply_timeout(request)
         prepared.rate, prepared.latency = self.rate, self.latency
 
@@ -629,7 +645,7 @@ class Engine:
         if last is not None:
             for state in last.states:
                 state.length, state.asked_at = last.source.length, last.source.attempt.sent_at
-        if record is not None and record.exchange.tells_position:
+        if record is not None and record.request.reports_position:
             self.positions.latest.update(dict.fromkeys(record.nodes, record))
 
     # -- time, loss, stop --------------------------------------------------------------------------------------
@@ -685,7 +701,7 @@ class Engine:
         """s that a stop waits at most: the whole air time on a half-duplex line, else the rest of the request."""
         if not self.family.link.both_ways:
             return self.air_time(attempt.request)
-        request: Exchange[Response] = Exchange(attempt.request.request)
+        request: Request[Response] = Request(attempt.request.wire)
         return max(0.0, attempt.sent_at + self.air_time(request) - now)
 
     def stop_sent(self) -> None:
@@ -702,7 +718,7 @@ class Engine:
         jobs = [*self.queue, *(attempt.job for attempt in self.in_flight.values())]
         jobs += [attempt.job for attempt in self._unacknowledged]
         for lane, attempt in self.in_flight.items():
-            for due in () if attempt.request.replies is ANY else attempt.request.replies:
+            for due in () if attempt.request.expected is ANY else attempt.request.expected:
                 self.statistics.of(due.node).errors["lost"] += 1
                 self.sync.mark_owed(lane, due, attempt.sent_at + self.quiet_time)
         self.in_flight.clear()

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from motorbus.core.operation import ANY, CanFrame, Effect, Exchange
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import ANY, Effect, Request
 from motorbus.errors import (
     ChecksumError,
     FramingError,
@@ -63,13 +64,13 @@ RECONNECTING: Final = (
 
 
 def no_answer(
-    request: Exchange[Any], fault: str, received: bytes, *, tries: int, sent: bool, diagnosis: str = ""
+    request: Request[Any], fault: str, received: bytes, *, tries: int, sent: bool, diagnosis: str = ""
 ) -> MotorbusError:
     """The error for a request whose last attempt failed with this fault, and what was `received` then.
 
     `sent`: the request itself left, not only a probe. `diagnosis` is what the adapter reports, "" for nothing.
     """
-    dues = () if request.replies is ANY else request.replies
+    dues = () if request.expected is ANY else request.expected
     node = dues[0].node if dues else None
     kind, cause, advice = FAULTS[fault]
     unknown = bool(dues) and sent and (request.effect is not Effect.NONE or not request.repeatable)
@@ -82,10 +83,10 @@ def no_answer(
     if unknown:
         kind = OutcomeUnknown
         summary += "; whether the write took effect is not known"
-    words = CAN_WORDS if isinstance(request.request, CanFrame) else SERIAL_WORDS
+    words = CAN_WORDS if isinstance(request.wire, CanFrame) else SERIAL_WORDS
     return kind(
         summary,
-        sent=request.request,
+        sent=request.wire,
         received=received,
         expected=f"{dues[0].length} bytes from {who}" if dues else "",
         cause=diagnosis or cause.format(**words),
@@ -111,31 +112,31 @@ def stopped() -> Interrupted:
     )
 
 
-def no_interlock(request: Exchange[Any]) -> RequestError:
+def no_interlock(request: Request[Any]) -> RequestError:
     """The error for a motion request on a bus without an interlock."""
     return RequestError(
         "this bus has no gate, so it refuses requests that move a motor or switch its torque",
-        sent=request.request,
+        sent=request.wire,
         cause="the bus was built without the gate that open() adds",
         advice="use motorbus.open(), or pass `interlock` to the bus; nothing was sent",
     )
 
 
-def listen_only(request: Exchange[Any]) -> RequestError:
+def listen_only(request: Request[Any]) -> RequestError:
     """The error for a request while the link only listens."""
     return RequestError(
         "the bus only listens: nothing was sent",
-        sent=request.request,
+        sent=request.wire,
         cause="it was opened listen-only, or a scan listens for the bit rate",
         advice="open the bus without listen-only",
     )
 
 
-def outlived(request: Exchange[Any] | None = None) -> LinkLost:
+def outlived(request: Request[Any] | None = None) -> LinkLost:
     """The error for a motion request of a procedure that began before the port was lost."""
     return LinkLost(
         "the port was lost after this procedure began, so it moves nothing any more",
-        sent=b"" if request is None else request.request,
+        sent=b"" if request is None else request.wire,
         cause="devices may have restarted or moved meanwhile",
         advice="start it again if it is still wanted; nothing was sent",
     )

@@ -8,7 +8,8 @@ from math import inf
 from typing import Any, NamedTuple, TypeAlias
 
 from motorbus.bus.failures import FAULTS
-from motorbus.core.operation import ANY, Exchange, Expected, Priority, Reply, Response, SetBitrate
+from motorbus.core.request import ANY, Expected, Priority, Reply, Request, Response
+from motorbus.core.steps import SetBitrate
 
 NOISE_KEPT = 16
 """Pieces of noise kept for the error message."""
@@ -77,14 +78,14 @@ class RequestJob(Job):
 
     def __init__(
         self,
-        request: Exchange[Any],
+        request: Request[Any],
         owner: object = None,
         settled: Callable[[], None] | None = None,
         since: Since | None = None,
     ) -> None:
         super().__init__(owner, settled)
         self.request = request
-        self.priority = request.rank
+        self.priority = request.priority
         self.since = since
         self.policy: Policy | None = None
         self.step: Attempt | Wait | None = None
@@ -123,7 +124,7 @@ class Attempt:
     `surplus`: more came than was expected. `accepted` is what the caller gets. `ended`: it is not in flight any more.
     """
 
-    request: Exchange[Any]
+    request: Request[Any]
     job: RequestJob | None = None
     excluded: tuple[int, ...] = ()
     is_probe: bool = False
@@ -144,11 +145,11 @@ class Attempt:
     @property
     def dues(self) -> tuple[Expected, ...]:
         """The replies expected; none where any reply counts."""
-        return () if self.request.replies is ANY else self.request.replies
+        return () if self.request.expected is ANY else self.request.expected
 
     def take(self, reply: Reply) -> bool:
         """Keep this reply if it is one of those expected."""
-        if self.request.replies is ANY:
+        if self.request.expected is ANY:
             self.replies[len(self.replies)] = reply
             return True
         for index, due in enumerate(self.dues):
@@ -160,7 +161,7 @@ class Attempt:
 
     def _check_complete(self) -> None:
         """A group does not wait for excluded nodes."""
-        dues = self.request.replies
+        dues = self.request.expected
         self.complete = dues is not ANY and all(
             index in self.replies or due.node in self.excluded for index, due in enumerate(dues)
         )
@@ -198,7 +199,7 @@ class Attempt:
 
     def answer(self, at: float) -> Response:
         """The replies in the order expected; excluded nodes count as missing."""
-        if self.request.replies is ANY:
+        if self.request.expected is ANY:
             return Response(tuple(self.replies.values()), (), at)
         taken = [i for i, due in enumerate(self.dues) if i in self.replies and due.node not in self.excluded]
         missing = tuple(due.node for i, due in enumerate(self.dues) if i not in taken)

@@ -9,7 +9,7 @@ from motorbus.bus import failures
 from motorbus.bus.jobs import Attempt, Policy, Wait
 from motorbus.bus.statistics import Statistics
 from motorbus.bus.sync import SyncTable
-from motorbus.core.operation import ANY, Exchange, Priority, TimeoutClass
+from motorbus.core.request import ANY, Priority, Request, TimeoutClass
 from motorbus.errors import MotorbusError
 
 RETRIES = 2
@@ -29,23 +29,23 @@ class Context(Protocol):
     @property
     def quiet_time(self) -> float: ...
 
-    def alternate(self, request: Exchange[Any], /) -> Exchange[Any]: ...
+    def alternate(self, request: Request[Any], /) -> Request[Any]: ...
 
 
-def carry_out(engine: Context, request: Exchange[Any]) -> Policy:
+def carry_out(engine: Context, request: Request[Any]) -> Policy:
     """The reply to this request. Raises MotorbusError when the last attempt fails."""
     tries, sent, fault = 0, False, ""
     while True:
         excluded: tuple[int, ...] = ()
-        if request.rank is not Priority.STOP and (
-            request.timeout is not TimeoutClass.SCAN or fault == "echo"
+        if request.priority is not Priority.STOP and (
+            request.reply_within is not TimeoutClass.SCAN or fault == "echo"
         ):
             for node in engine.sync.doubtful(request):
                 failed, probes = yield from _resync(engine, request, node)
                 tries += probes
                 if failed is None:
                     continue
-                if len(request.replies) == 1:  # type: ignore[arg-type]  # never ANY here
+                if len(request.expected) == 1:  # type: ignore[arg-type]  # never ANY here
                     raise _error(engine, request, failed, tries, sent)
                 excluded += (node,)
         attempt: Attempt | None = yield Attempt(
@@ -57,28 +57,33 @@ def carry_out(engine: Context, request: Exchange[Any]) -> Policy:
         fault = attempt.fault
         if attempt.accepted is not None:
             return attempt.accepted
-        if engine.stopping and request.rank is not Priority.STOP:
+        if engine.stopping and request.priority is not Priority.STOP:
             raise failures.latched(engine.latched_by)
         tries += 1
         if not _may_repeat(request, fault) or tries > RETRIES:
             raise _error(engine, request, attempt, tries, sent)
-        engine.statistics.retried(request.replies)
+        engine.statistics.retried(request.expected)
 
 
-def _may_repeat(request: Exchange[Any], fault: str) -> bool:
+def _may_repeat(request: Request[Any], fault: str) -> bool:
     """A scan is not repeated, for silence is its usual answer; nor is a stop, which has rounds of its own."""
-    patient = request.timeout is not TimeoutClass.SCAN or fault == "echo"
-    return request.repeatable and request.rank is not Priority.STOP and request.replies is not ANY and patient
+    patient = request.reply_within is not TimeoutClass.SCAN or fault == "echo"
+    return (
+        request.repeatable
+        and request.priority is not Priority.STOP
+        and request.expected is not ANY
+        and patient
+    )
 
 
 def _resync(
-    engine: Context, request: Exchange[Any], node: int
+    engine: Context, request: Request[Any], node: int
 ) -> Generator[Attempt | Wait, Attempt | None, tuple[Attempt | None, int]]:
     """Wait for the quiet time and probe this node; the probe that failed, None when the node is in sync, and how many.
 
     A group does not wait for a node that was silent lately.
     """
-    state, group = engine.sync.of(node), len(request.replies) > 1  # type: ignore[arg-type]
+    state, group = engine.sync.of(node), len(request.expected) > 1  # type: ignore[arg-type]
     if group and state.silences and engine.time < state.probe_at:
         return Attempt(request), 0
     for tries in range(1, RETRIES + 2):
@@ -96,9 +101,7 @@ def _resync(
     return attempt, tries
 
 
-def _error(
-    engine: Context, request: Exchange[Any], attempt: Attempt, tries: int, sent: bool
-) -> MotorbusError:
+def _error(engine: Context, request: Request[Any], attempt: Attempt, tries: int, sent: bool) -> MotorbusError:
     return failures.no_answer(
         request, attempt.failure(), attempt.received(), tries=tries, sent=sent, diagnosis=engine.diagnosis()
     )

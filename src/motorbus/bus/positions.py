@@ -13,8 +13,8 @@ from typing import Any, Final
 from motorbus.bus.jobs import StopCounts
 from motorbus.bus.prepared import Prepared
 from motorbus.core.family import Family, Stop
-from motorbus.core.goal import Goal, Stays
-from motorbus.core.operation import ANY, Effect, Exchange, Expected, Priority, Response
+from motorbus.core.request import ANY, Effect, Expected, Priority, Request, Response
+from motorbus.core.setpoint import Setpoint, Stays
 
 FRESH: Final = 0.02
 """s; a position older than this is not where a moving device is."""
@@ -23,7 +23,7 @@ GATED: Final = (Effect.MOTION, Effect.TORQUE)
 ENDLESS: Final = ("velocity", "load", "current")
 """Quantities that a device obeys until another order comes."""
 
-Reading = tuple[Exchange[Any], Response]
+Reading = tuple[Request[Any], Response]
 
 
 class LastPositions(Mapping[int, Reading]):
@@ -40,7 +40,7 @@ class LastPositions(Mapping[int, Reading]):
         self.nodes: frozenset[int] = frozenset()
         self.orders = self.stop_total = 0
         self.stops: StopCounts = {}
-        self.latest: dict[int, Prepared | tuple[Exchange[Any], Response, int]] = {}
+        self.latest: dict[int, Prepared | tuple[Request[Any], Response, int]] = {}
         self._ordered: dict[tuple[int, ...], int] = {}  # by the nodes that an order was for (empty: all)
         self._accepted: Counter[int] = Counter()
         self._acknowledged: dict[int, Response] = {}  # the reply to the last order of a node
@@ -57,18 +57,18 @@ class LastPositions(Mapping[int, Reading]):
     def __len__(self) -> int:
         return len(self.latest)
 
-    def _reading(self, node: int) -> tuple[Exchange[Any], Response, int]:
+    def _reading(self, node: int) -> tuple[Request[Any], Response, int]:
         latest = self.latest[node]
         return latest.reading() if isinstance(latest, Prepared) else latest
 
-    def answered(self, nodes: Iterable[int], exchange: Exchange[Any], answer: Response, rate: int) -> None:
+    def answered(self, nodes: Iterable[int], request: Request[Any], answer: Response, rate: int) -> None:
         """These nodes answered this request."""
         self.rate = rate
         self.add(nodes)
-        if exchange.effect in GATED:
+        if request.effect in GATED:
             self._acknowledged.update(dict.fromkeys(nodes, answer))
-        if exchange.tells_position:
-            self.latest.update(dict.fromkeys(nodes, (exchange, answer, self.orders)))
+        if request.reports_position:
+            self.latest.update(dict.fromkeys(nodes, (request, answer, self.orders)))
 
     def add(self, nodes: Iterable[int]) -> None:
         """These nodes exist."""
@@ -97,23 +97,23 @@ class LastPositions(Mapping[int, Reading]):
 
     # -- orders and stops --------------------------------------------------------------------------------------
 
-    def sent(self, exchange: Exchange[Any]) -> None:
+    def sent(self, request: Request[Any]) -> None:
         """A request leaves that may move something, or stops it.
 
         The last position and acknowledgement of the nodes of an order (none: all) count no longer.
         """
-        if exchange.rank is Priority.STOP:
-            if exchange.effect in GATED:
+        if request.priority is Priority.STOP:
+            if request.effect in GATED:
                 stops = Counter(self.stops)
-                stops.update(addressed(exchange) or (None,))
+                stops.update(addressed(request) or (None,))
                 self.stops, self.stop_total = stops, self.stop_total + 1
             return
-        nodes = tuple(exchange.ordered)
+        nodes = tuple(request.setpoint_nodes)
         if not self.nodes.issuperset(nodes):
             self.add(nodes)
-        if exchange.effect in GATED:
-            if exchange.replies:
-                nodes = tuple(addressed(exchange))
+        if request.effect in GATED:
+            if request.expected:
+                nodes = tuple(addressed(request))
             self.orders += 1
             self._ordered[nodes] = self.orders
             for replies in (self._acknowledged, self._stop_replies):
@@ -124,11 +124,11 @@ class LastPositions(Mapping[int, Reading]):
         """Number of stops sent to this node, those for all nodes included."""
         return self.stops.get(node, 0) + self.stops.get(None, 0)
 
-    def is_stopped(self, exchange: Exchange[Any], before: StopCounts) -> bool:
+    def is_stopped(self, request: Request[Any], before: StopCounts) -> bool:
         """A stop for a node that this request addresses was sent since `stops` was `before`."""
         if before is self.stops:
             return False
-        nodes = addressed(exchange)
+        nodes = addressed(request)
         return not nodes or any(before.get(node, 0) != self.stops.get(node, 0) for node in (*nodes, None))
 
     def frames(self, now: float) -> Stop:
@@ -138,19 +138,19 @@ class LastPositions(Mapping[int, Reading]):
         except Exception:  # the stop must go out
             return self.family.stop(dict.fromkeys(sorted(self.nodes)))
 
-    def accept(self, exchange: Exchange[Any], answer: Response) -> None:
+    def accept(self, request: Request[Any], answer: Response) -> None:
         """This request was answered and not refused: nodes that it stops have accepted a stop."""
-        if exchange.effect not in GATED or exchange.replies is ANY:
+        if request.effect not in GATED or request.expected is ANY:
             return
-        answered = [due for due in exchange.replies if self._acknowledged.get(due.node) is answer]
-        if exchange.rank is Priority.STOP:
+        answered = [due for due in request.expected if self._acknowledged.get(due.node) is answer]
+        if request.priority is Priority.STOP:
             for due in answered:
                 replies = self._stop_replies.setdefault(due.node, set())
                 replies.add(due)
                 if len(replies) >= self._stop_reply_count(due.node):
                     self.accepted(due.node)
-        elif exchange.later is None:
-            resting = {goal.node for goal in exchange.goals if rests(goal)}
+        elif request.deferred is None:
+            resting = {goal.node for goal in request.setpoints if rests(goal)}
             for due in answered:
                 if due.node in resting:
                     self.accepted(due.node)
@@ -170,26 +170,26 @@ class LastPositions(Mapping[int, Reading]):
 
     def _stop_reply_count(self, node: int) -> int:
         """Number of different replies that this node gives to the requests of a stop."""
-        requests = self.family.stop(dict.fromkeys(sorted(self.nodes))).exchanges
-        gated = [one.replies for one in requests if one.effect in GATED and one.replies is not ANY]
+        requests = self.family.stop(dict.fromkeys(sorted(self.nodes))).requests
+        gated = [one.expected for one in requests if one.effect in GATED and one.expected is not ANY]
         return max(1, len({due for dues in gated for due in dues if due.node == node}))
 
 
-def rests(goal: Goal) -> bool:
+def rests(goal: Setpoint) -> bool:
     """A device that obeys this goal moves no more."""
     return goal.stays is Stays.STILL or (goal.quantity in ENDLESS and not goal.value)
 
 
-def moves(exchange: Exchange[Any]) -> bool:
+def moves(request: Request[Any]) -> bool:
     """The request moves something or switches torque on."""
-    if exchange.effect not in GATED or exchange.rank is Priority.STOP:
+    if request.effect not in GATED or request.priority is Priority.STOP:
         return False
-    return exchange.sure or not exchange.goals or not all(map(rests, exchange.goals))
+    return request.prechecked or not request.setpoints or not all(map(rests, request.setpoints))
 
 
-def addressed(exchange: Exchange[Any]) -> set[int]:
+def addressed(request: Request[Any]) -> set[int]:
     """Nodes that answer this request or are ordered something by it; empty for all nodes."""
-    nodes = {goal.node for goal in exchange.goals}
-    if exchange.replies is not ANY:
-        nodes.update(due.node for due in exchange.replies)
+    nodes = {goal.node for goal in request.setpoints}
+    if request.expected is not ANY:
+        nodes.update(due.node for due in request.expected)
     return nodes

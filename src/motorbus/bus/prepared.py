@@ -9,7 +9,8 @@ from typing import Any
 
 from motorbus.bus.jobs import Attempt
 from motorbus.bus.sync import NodeSync
-from motorbus.core.operation import ANY, CanFrame, Data, Exchange, Reply, Response, Whole
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import ANY, Data, ExactDecoder, Reply, Request, Response
 
 
 @dataclass(slots=True, eq=False)
@@ -24,8 +25,8 @@ class Prepared:
     """
 
     engine: object
-    exchange: Exchange[Any]
-    decode: Whole[Any]
+    request: Request[Any]
+    decode: ExactDecoder[Any]
     nodes: tuple[int, ...]
     states: list[NodeSync]
     times: list[int]
@@ -47,34 +48,34 @@ class Prepared:
     kept: Response | None = None
 
     def __post_init__(self) -> None:
-        dues = self.exchange.replies
+        dues = self.request.expected
         assert dues is not ANY
-        self.wire, self.lane, self.length = self.exchange.request, self.exchange.lane, dues[0].length
+        self.wire, self.lane, self.length = self.request.wire, self.request.lane, dues[0].length
         self.size = sum(due.length for due in dues)
         self.single = self.states[0] if len(dues) == 1 else None
         self.alternate = self.record = self.source = self
 
-    def reading(self) -> tuple[Exchange[Any], Response, int]:
+    def reading(self) -> tuple[Request[Any], Response, int]:
         """The request, its last reply, split into the replies of the nodes, and the orders sent before it."""
-        exchange = self.source.exchange
+        request = self.source.request
         if self.kept is None:
-            self.kept = Response(split(exchange, self.data), (), self.at)
-        return exchange, self.kept, self.orders
+            self.kept = Response(split(request, self.data), (), self.at)
+        return request, self.kept, self.orders
 
 
-def nodes_of(exchange: Exchange[Any]) -> tuple[int, ...]:
+def nodes_of(request: Request[Any]) -> tuple[int, ...]:
     """The nodes that answer this request, in the order expected."""
-    dues: Sequence[Any] = () if exchange.replies is ANY else exchange.replies
+    dues: Sequence[Any] = () if request.expected is ANY else request.expected
     return tuple(due.node for due in dues)
 
 
-def split(exchange: Exchange[Any], data: Data) -> tuple[Reply, ...]:
+def split(request: Request[Any], data: Data) -> tuple[Reply, ...]:
     """The complete reply as single replies, in the order expected."""
-    dues = exchange.replies
+    dues = request.expected
     assert dues is not ANY
     content = data.data if isinstance(data, CanFrame) else data
     replies, start = [], 0
     for _, key, length in dues:
-        replies.append(Reply(exchange.lane, key, content[start : start + length]))
+        replies.append(Reply(request.lane, key, content[start : start + length]))
         start += length
     return tuple(replies)

@@ -12,7 +12,7 @@ from motorbus.bus.base import IDLE, BaseBus, check_clocks
 from motorbus.bus.interrupts import interrupts
 from motorbus.bus.jobs import Since
 from motorbus.bus.tasks import Notify, TaskTree
-from motorbus.core.operation import Runnable
+from motorbus.core.steps import Runnable
 from motorbus.link.stream import wait_any
 
 T = TypeVar("T")

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from motorbus.core.operation import ANY, Any_, Expected
+from motorbus.core.request import ANY, Any_, Expected
 
 BUCKETS = 32
 """Of latencies: the last one begins at 18 minutes, longer than any time-out."""

@@ -27,7 +27,8 @@ from motorbus.bus.stop_rounds import stop_in_rounds
 from motorbus.bus.stop_socket import STOP_TIMEOUT, StopOutcome, asked_by, client_name, listening
 from motorbus.bus.tasks import TaskTree
 from motorbus.bus.turn import Turn
-from motorbus.core.operation import Priority, SetBitrate
+from motorbus.core.request import Priority
+from motorbus.core.steps import SetBitrate
 from motorbus.errors import LinkError, LinkLost
 from motorbus.link.base import Link
 
@@ -128,11 +129,11 @@ class EmergencyStop:
         if bus.turn.acquire(Priority.STOP, engine.stop_delay(bus.now())):
             return self._stop_with_turn(by)
         stop = engine.positions.frames(bus.now())
-        disturbs_no_reply = [request for request in stop.exchanges if not request.replies]
-        for request in disturbs_no_reply or stop.exchanges:
+        disturbs_no_reply = [request for request in stop.requests if not request.expected]
+        for request in disturbs_no_reply or stop.requests:
             engine.note_stop(request)
             with contextlib.suppress(LinkError):
-                bus.link.write(request.request)
+                bus.link.write(request.wire)
         if bus.turn.acquire(Priority.STOP, STOP_TIMEOUT):
             return self._stop_with_turn(by)
         engine.stop_sent()

@@ -9,7 +9,8 @@ from motorbus.bus.engine import Engine
 from motorbus.bus.positions import GATED
 from motorbus.bus.prepared import nodes_of
 from motorbus.bus.stop_socket import StopOutcome
-from motorbus.core.operation import Exchange, Gather, Response, Sleep, catch
+from motorbus.core.request import Request, Response
+from motorbus.core.steps import Sleep, catch, gather
 from motorbus.errors import DeviceError, LinkLost, MotorbusError
 
 ROUNDS: Final = 5
@@ -23,15 +24,15 @@ async def stop_in_rounds(engine: Engine, now: Callable[[], float]) -> StopOutcom
     positions.forget_stop_replies()
     before = {node: positions.accepted_count(node) for node in positions.nodes}
     stop = positions.frames(now())
-    frames: Sequence[Exchange[Response]] = stop.exchanges
+    frames: Sequence[Request[Response]] = stop.requests
     acknowledged: list[int] = []
     rounds = 0
     while frames and rounds < ROUNDS and not engine.listening:
-        if acknowledged and not any(one.replies for one in frames):
+        if acknowledged and not any(one.expected for one in frames):
             break
         rounds += 1
         begun = now()
-        found = await Gather([catch(_stop_by(engine, one, now)) for one in frames])
+        found = await gather(*[catch(_stop_by(engine, one, now)) for one in frames])
         errors = [error for error in found if isinstance(error, MotorbusError)]
         acknowledged = sorted(
             node for node in positions.nodes if positions.accepted_count(node) > before.get(node, 0)
@@ -44,14 +45,14 @@ async def stop_in_rounds(engine: Engine, now: Callable[[], float]) -> StopOutcom
         frames = [
             one
             for one in _frames_for(engine, missing, now(), frames)
-            if not one.replies or not set(nodes_of(one)) <= set(acknowledged)
+            if not one.expected or not set(nodes_of(one)) <= set(acknowledged)
         ]
     silent = tuple(sorted(positions.nodes.difference(acknowledged)))
     promise = "nothing: the bus only listens" if engine.listening else stop.promise
     return StopOutcome(tuple(acknowledged), silent, rounds, promise)
 
 
-async def _stop_by(engine: Engine, request: Exchange[Response], now: Callable[[], float]) -> Any:
+async def _stop_by(engine: Engine, request: Request[Response], now: Callable[[], float]) -> Any:
     """Send this request of a stop. If it reads a position, hold the node there."""
     try:
         await request
@@ -62,15 +63,15 @@ async def _stop_by(engine: Engine, request: Exchange[Response], now: Callable[[]
     nodes = nodes_of(request)
     if request.effect not in GATED and nodes:
         frames = _frames_for(engine, nodes, now(), ())
-        await Gather([one for one in frames if one.effect in GATED and nodes_of(one)])
+        await gather(*[one for one in frames if one.effect in GATED and nodes_of(one)])
 
 
 def _frames_for(
-    engine: Engine, nodes: Iterable[int], now: float, before: Sequence[Exchange[Response]]
-) -> Sequence[Exchange[Response]]:
+    engine: Engine, nodes: Iterable[int], now: float, before: Sequence[Request[Response]]
+) -> Sequence[Request[Response]]:
     """The requests that stop these nodes as things are now."""
     fresh = engine.positions.fresh(now)
     try:
-        return engine.family.stop({node: fresh.get(node) for node in nodes}).exchanges
+        return engine.family.stop({node: fresh.get(node) for node in nodes}).requests
     except Exception:  # the stop must go out
         return before

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any, Final, TypeAlias
 
 from motorbus.core.family import Family
-from motorbus.core.operation import ANY, Exchange, Expected, Key
+from motorbus.core.request import ANY, Expected, Key, Request
 
 PROBES: Final = 64
 """Probes compared with what a node owes, to find one that differs."""
@@ -60,15 +60,15 @@ class SyncTable:
             node = self.nodes[number] = NodeSync()
         return node
 
-    def doubtful(self, request: Exchange[Any]) -> list[int]:
+    def doubtful(self, request: Request[Any]) -> list[int]:
         """The nodes out of sync that owe a reply to this request."""
-        if request.replies is ANY or not self.out_of_sync:
+        if request.expected is ANY or not self.out_of_sync:
             return []
-        return [due.node for due in request.replies if due.node in self.out_of_sync]
+        return [due.node for due in request.expected if due.node in self.out_of_sync]
 
-    def mark_sent(self, request: Exchange[Any], now: float) -> None:
+    def mark_sent(self, request: Request[Any], now: float) -> None:
         """A request leaves: its nodes are out of sync until they answer."""
-        for due in request.replies if request.replies is not ANY else ():
+        for due in request.expected if request.expected is not ANY else ():
             node = self.of(due.node)
             node.asked_at, node.lane = now, request.lane
             self.out_of_sync.add(due.node)
@@ -113,15 +113,15 @@ class SyncTable:
                 return True
         return False
 
-    def next_probe(self, number: int) -> Exchange[bool]:
+    def next_probe(self, number: int) -> Request[bool]:
         """A probe of this node whose reply it does not owe; where it owes all of them, the longest owed."""
         node = self.of(number)
-        owed: dict[Kind, Exchange[bool]] = {}
-        first: Exchange[bool] | None = None
+        owed: dict[Kind, Request[bool]] = {}
+        first: Request[bool] | None = None
         for _ in range(PROBES):
             probe = self.family.probe(number, node.probes)
             first = first or probe
-            if owed and probe.request == first.request:  # all probes of the family were compared
+            if owed and probe.wire == first.wire:  # all probes of the family were compared
                 break
             node.probes += 1
             kind = kind_of(probe)
@@ -139,7 +139,7 @@ class SyncTable:
         node.probe_at = now + min(quiet * 2.0 ** min(node.silences, 10), LONGEST_BACK_OFF)
 
 
-def kind_of(probe: Exchange[bool]) -> Kind:
+def kind_of(probe: Request[bool]) -> Kind:
     """The kind of the only reply to a probe."""
-    ((_, key, length),) = probe.replies  # type: ignore[misc]  # a probe has one reply
+    ((_, key, length),) = probe.expected  # type: ignore[misc]  # a probe has one reply
     return probe.lane, key, length

@@ -11,19 +11,16 @@ from motorbus.bus import failures
 from motorbus.bus.engine import Engine
 from motorbus.bus.jobs import ExclusiveJob, Job, RateJob, RequestJob, Since
 from motorbus.bus.positions import GATED
-from motorbus.core.operation import (
+from motorbus.core.request import Notification, Priority, Request, Step
+from motorbus.core.steps import (
     Emit,
-    Exchange,
     Exclusive,
     Gather,
     JournalEntry,
-    Notification,
-    Priority,
     Runnable,
     SetBitrate,
     Shielded,
     Sleep,
-    Step,
     WaitFor,
     catch,
     discard,
@@ -228,22 +225,22 @@ class TaskTree(Generic[T]):
                     errors[0].add_note(f"also: {str(other) or type(other).__name__}")
             self._resume(task, error=errors[0])
         else:
-            values = [child.value for child in children]
+            values = tuple(child.value for child in children)
             self._resume(task, values[0] if task.joins_one else values)
 
     # -- steps -------------------------------------------------------------------------------------------------
 
     def _begin(self, task: Task, step: Step[Any]) -> None:
-        if isinstance(step, Exchange):
+        if isinstance(step, Request):
             self._begin_request(task, step)
         elif isinstance(step, Gather):
             task.joins_one = False
-            task.children = [Task(procedure, task) for procedure in step.operations]
+            task.children = [Task(procedure, task) for procedure in step.runnables]
             if not task.children:
                 task.job = Job()
-                task.job.settle([])
+                task.job.settle(())
         elif isinstance(step, Exclusive):
-            child = Task(step.operation, task)
+            child = Task(step.runnable, task)
             child.claims = child.owner is None  # what is nested belongs to the outermost
             child.owner = child.owner or child
             task.children, task.joins_one = [child], True
@@ -251,7 +248,7 @@ class TaskTree(Generic[T]):
             child.job = ExclusiveJob(child.owner, self.settled)
             self.engine.submit(child.job, self.now())
         elif isinstance(step, Shielded):
-            child = Task(step.operation, task)
+            child = Task(step.runnable, task)
             child.exempt = True
             task.children, task.joins_one = [child], True
         elif isinstance(step, Emit):
@@ -270,13 +267,13 @@ class TaskTree(Generic[T]):
         else:
             self._resume(task, error=_not_a_step(step))
 
-    def _begin_request(self, task: Task, request: Exchange[Any]) -> None:
+    def _begin_request(self, task: Task, request: Request[Any]) -> None:
         interlock = self.engine.interlock
         reads: Sequence[Runnable[Any]] = ()
         if (
             interlock is not None
             and request.effect in GATED
-            and request.rank is not Priority.STOP
+            and request.priority is not Priority.STOP
             and not task.checked
         ):
             reads = interlock.required_reads(request)
@@ -382,7 +379,7 @@ class TaskTree(Generic[T]):
         return [task, *(leaf for child in task.children for leaf in self._waiting(child))]
 
 
-async def _read_first(required: Callable[[Exchange[Any]], Any], reads: Any, request: Exchange[T]) -> T:
+async def _read_first(required: Callable[[Request[Any]], Any], reads: Any, request: Request[T]) -> T:
     """Carry out the reads that the interlock requires, again where they were doubtful, then the request."""
     for _ in range(READS):
         for read in reads:

@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Iterator
 from typing import Generic, NamedTuple, TypeVar
 
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 
 R = TypeVar("R")
 

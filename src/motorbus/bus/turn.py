@@ -9,7 +9,7 @@ from threading import Lock, get_ident
 from time import monotonic
 from typing import Final, Self
 
-from motorbus.core.operation import Priority
+from motorbus.core.request import Priority
 
 AGED: Final = 0.25
 """s after which a waiting thread goes first, whatever its priority."""

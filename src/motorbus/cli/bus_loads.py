@@ -126,7 +126,7 @@ def _facts(name: str, one: Counted, rate: float) -> dict[str, object]:
     found = one.budget
     facts: dict[str, object] = {"bus": name, "axes": list(found.axes), "rate": found.bit_rate}
     facts |= {
-        "exchanges": found.exchanges,
+        "exchanges": found.requests,
         "replies": found.replies,
         "wire": found.wire,
         "waits": found.waits,

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 from motorbus.cli.exits import Unforeseeable
 from motorbus.cli.target import able
-from motorbus.core.operation import Effect
+from motorbus.core.request import Effect
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from motorbus.cli.output import Output
-    from motorbus.core.entry import Entry, Value
+    from motorbus.core.register import Register, Value
 
 FAR: Final = math.pi
 """rad; a way that is longer needs consent."""
@@ -60,7 +60,9 @@ def refused_anyway(rehearse: Callable[[], object]) -> None:
         rehearse()
 
 
-def goals_among(one: Any, entries: Iterable[Entry], values: Mapping[str, Value]) -> list[tuple[Any, float]]:
+def goals_among(
+    one: Any, entries: Iterable[Register], values: Mapping[str, Value]
+) -> list[tuple[Any, float]]:
     """What of these values, by register, are angles to which writing them sends the device, in rad."""
     return [
         (one, float(values[entry.name]))

@@ -18,8 +18,8 @@ from motorbus.recorder.heard import captures_of
 
 if TYPE_CHECKING:
     from motorbus.cli.output import Output
+    from motorbus.core.can_frame import CanFrame
     from motorbus.core.family import Family
-    from motorbus.core.operation import CanFrame
     from motorbus.recorder.can_log import Logged
 
 _PIECE: Final = 1 << 16

@@ -16,8 +16,8 @@ from motorbus.cli.exits import Exit
 from motorbus.cli.files import usable
 from motorbus.cli.output import Output
 from motorbus.cli.target import said
+from motorbus.core.can_frame import REMOTE_FLAG, CanFrame
 from motorbus.core.family import Explanation
-from motorbus.core.operation import REMOTE_FLAG, CanFrame
 from motorbus.errors import RequestError
 from motorbus.recorder import can_log
 from motorbus.recorder.files import from_hex, read_bytes

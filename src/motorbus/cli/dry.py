@@ -13,22 +13,16 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 from motorbus.cli import faces
 from motorbus.cli import frame as frames
 from motorbus.cli.exits import Unforeseeable
-from motorbus.core.operation import (
-    ANY,
-    CanFrame,
-    Effect,
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import ANY, Effect, Priority, Reply, Request, Response, Step
+from motorbus.core.steps import (
     Emit,
-    Exchange,
     Exclusive,
     Gather,
     JournalEntry,
-    Priority,
-    Reply,
-    Response,
     SetBitrate,
     Shielded,
     Sleep,
-    Step,
     WaitFor,
     discard,
 )
@@ -42,7 +36,8 @@ if TYPE_CHECKING:
     from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Output
     from motorbus.core.family import Explanation
-    from motorbus.core.operation import Data, Runnable
+    from motorbus.core.request import Data
+    from motorbus.core.steps import Runnable
 
 T = TypeVar("T")
 
@@ -148,12 +143,12 @@ class DryBus:
                 discard(step)
 
     def _step(self, step: object) -> object:
-        if isinstance(step, Exchange):
+        if isinstance(step, Request):
             return self._one(step)
         if isinstance(step, Exclusive | Shielded):
-            return self.run(step.operation)
+            return self.run(step.runnable)
         if isinstance(step, Gather):
-            return [self.run(operation) for operation in step.operations]
+            return [self.run(operation) for operation in step.runnables]
         if isinstance(step, SetBitrate) and (step.rate == 0 or self.family.link.kind == "bytes"):
             return self._bus.run(
                 step
@@ -167,8 +162,8 @@ class DryBus:
             self._report(step.event)
         return None  # nobody has said anything; another rate: nothing is sent
 
-    def _one(self, exchange: Exchange[Any]) -> object:
-        if exchange.effect is Effect.NONE and exchange.rank is Priority.POLL:
+    def _one(self, exchange: Request[Any]) -> object:
+        if exchange.effect is Effect.NONE and exchange.priority is Priority.POLL:
             return self._foreseen(exchange) if self._follows(exchange) else self._told(exchange)
         for question in self._bus.required_reads(exchange):
             self._bus.run(question)
@@ -177,34 +172,34 @@ class DryBus:
         self._written |= _answering(exchange) or {_EVERYONE}
         if exchange.effect is Effect.IDENTITY:  # from now on it would have another id, or another rate
             self._written.add(_EVERYONE)
-        request = exchange.request
+        request = exchange.wire
         self.frames.append(request.flat() if isinstance(request, CanFrame) else request)
         return None
 
-    def _told(self, exchange: Exchange[Any]) -> object:
+    def _told(self, exchange: Request[Any]) -> object:
         answer = self._bus.run(exchange)
-        self._read[exchange.request] = answer
+        self._read[exchange.wire] = answer
         return answer
 
-    def _foreseen(self, exchange: Exchange[Any]) -> object:
+    def _foreseen(self, exchange: Request[Any]) -> object:
         """What it would read after what was withheld, where its family can say that."""
         foresee = faces.offer(self.family.name, "as_written")
-        data = foresee(self.family, self._read, self.frames, exchange.request) if foresee else None
+        data = foresee(self.family, self._read, self.frames, exchange.wire) if foresee else None
         if data == b"":
             return self._told(exchange)
-        if data is None or exchange.replies is ANY or exchange.read is None:
+        if data is None or exchange.expected is ANY or exchange.decode is None:
             return _AsWritten()
-        reply = Reply(exchange.lane, exchange.replies[0].key, data)
-        return exchange.read(Response((reply,), (), self.link.now() + self._waited))
+        reply = Reply(exchange.lane, exchange.expected[0].key, data)
+        return exchange.decode(Response((reply,), (), self.link.now() + self._waited))
 
-    def _follows(self, exchange: Exchange[Any]) -> bool:
+    def _follows(self, exchange: Request[Any]) -> bool:
         """Does it ask somebody whom something was withheld from?"""
         asked = _answering(exchange) | {_EVERYONE} if self._written else set()
         return bool(asked & self._written)
 
 
-def _answering(exchange: Exchange[Any]) -> set[int]:
-    return set() if exchange.replies is ANY else {due.node for due in exchange.replies}
+def _answering(exchange: Request[Any]) -> set[int]:
+    return set() if exchange.expected is ANY else {due.node for due in exchange.expected}
 
 
 def show(dry: DryBus, output: Output) -> None:

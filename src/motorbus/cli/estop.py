@@ -15,7 +15,7 @@ from motorbus.cli.machine import is_name
 from motorbus.cli.output import Output
 from motorbus.cli.rough import beside_others, forgiving, readable, together, understood
 from motorbus.cli.target import Target, everyone, opened, said, target, targets
-from motorbus.core.operation import Effect
+from motorbus.core.request import Effect
 from motorbus.errors import LinkError, MotorbusError, NoReply, PortNotFound, RequestError
 
 if TYPE_CHECKING:
@@ -257,7 +257,7 @@ def _meet(opening: Bus, wanted: Wanted, output: Output) -> tuple[MotorbusError |
     The error where everyone was asked and that failed: whoever is named is stopped all the same. And whether every
     device of the bus was asked.
     """
-    needs = [exchange.tells_position for exchange in opening.family.stop({ANYBODY: None}).exchanges]
+    needs = [request.reports_position for request in opening.family.stop({ANYBODY: None}).requests]
     if not needs or not all(needs):
         return None, False
     _ask_where(opening, wanted.nodes)
@@ -273,9 +273,9 @@ def _meet(opening: Bus, wanted: Wanted, output: Output) -> tuple[MotorbusError |
 
 def _ask_where(opening: Bus, nodes: Iterable[int]) -> None:
     for node in nodes:
-        for exchange in opening.family.stop({node: None}).exchanges:
+        for request in opening.family.stop({node: None}).requests:
             with suppress(MotorbusError):  # the stop itself will say who is silent
-                opening.run(exchange)
+                opening.run(request)
 
 
 def _confirms(opening: Bus, node: int) -> bool:
@@ -286,14 +286,14 @@ def _confirms(opening: Bus, node: int) -> bool:
 def _stop_node(opening: Bus, node: int) -> bool:
     """Send this node what its family stops it with; has it acknowledged?"""
     answers = []
-    exchanges = opening.family.stop({node: None}).exchanges
-    for exchange in (one for one in exchanges if one.effect is not Effect.NONE):
+    requests = opening.family.stop({node: None}).requests
+    for request in (one for one in requests if one.effect is not Effect.NONE):
         try:
-            opening.run(exchange)
+            opening.run(request)
         except MotorbusError:
             answers.append(False)
         else:
-            answers += [True] if exchange.replies else []  # nobody answers what is said to everyone
+            answers += [True] if request.expected else []  # nobody answers what is said to everyone
     return bool(answers) and all(answers)
 
 
@@ -370,7 +370,7 @@ def _port(bus: str, options: dict[str, str]) -> str:
 
 def _count_others(facts: dict[str, Any], wanted: Wanted, *, all_known: bool) -> None:
     """Add which devices of the machine file were not asked, and what was sent to all that were not."""
-    broadcast = any(not exchange.replies for exchange in wanted.family.stop({}).exchanges)
+    broadcast = any(not request.expected for request in wanted.family.stop({}).requests)
     known = [node for axis in understood(_axes_on(wanted.bus), {}).known for node in target(axis).nodes]
     facts["not_asked"] = sorted({*known} - {*facts["acknowledged"], *facts["silent"]})
     facts["others"] = "not asked, broadcast sent" if broadcast else "not asked, no stop sent"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame
+from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
 
 if TYPE_CHECKING:
     from motorbus.core.family import Family

@@ -10,7 +10,7 @@ from motorbus.cli.consent import consent_to
 from motorbus.cli.exits import Unforeseeable
 from motorbus.cli.target import face, rate_word, takes
 from motorbus.core import units
-from motorbus.core.operation import Progress
+from motorbus.core.steps import Progress
 from motorbus.errors import RequestError
 
 if TYPE_CHECKING:

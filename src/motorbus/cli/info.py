@@ -12,13 +12,13 @@ from motorbus.cli.exits import Exit
 from motorbus.cli.machine import axes_called
 from motorbus.cli.output import Output
 from motorbus.cli.target import device, face, id_shown, opened, table_of
-from motorbus.core.entry import Storage
+from motorbus.core.register import Storage
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from motorbus.core.entry import Entry, Table
     from motorbus.core.family import Family, Identity
+    from motorbus.core.register import Register, RegisterMap
 
 _OPEN: Final = (
     "note: its EEPROM lock is open, so every write to EEPROM is for good: "
@@ -75,17 +75,17 @@ def info(
     return Exit.OK
 
 
-def _entries(table: Table, *, everything: bool) -> list[Entry]:
+def _entries(table: RegisterMap, *, everything: bool) -> list[Register]:
     readable = [entry for entry in table.values() if entry.readable]
     return readable if everything else [entry for entry in readable if _bounds(entry)]
 
 
-def _bounds(entry: Entry) -> bool:
+def _bounds(entry: Register) -> bool:
     """A row that keeps the device within something: its minima, maxima and limits."""
     return entry.storage is Storage.EEPROM and bool({"min", "max", "limit"} & set(entry.name.split("_")))
 
 
-def _word(entry: Entry, raw: int) -> str:
+def _word(entry: Register, raw: int) -> str:
     """What this value is called, without what it comes to."""
     return entry.choices.get(raw, str(raw)).partition(":")[0]
 

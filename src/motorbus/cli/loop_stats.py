@@ -12,7 +12,7 @@ from motorbus.cli.machine import axes_named
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.rates import check_rate, time_of
 from motorbus.cli.robot import rehearse, robot
-from motorbus.core.operation import Progress
+from motorbus.core.steps import Progress
 from motorbus.errors import RequestError
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from motorbus.cli.output import Output
 from motorbus.cli.rates import check_rate
 from motorbus.cli.read import Told, own_position, sampled, state_facts
 from motorbus.cli.target import able, everyone, face, gathered, opened, target
-from motorbus.core.operation import Sleep
+from motorbus.core.steps import Sleep
 from motorbus.errors import LinkError, LinkLost, MotorbusError, NoReply, RequestError
 
 if TYPE_CHECKING:

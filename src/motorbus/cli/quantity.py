@@ -15,7 +15,7 @@ from motorbus.errors import LimitExceeded, RequestError
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from motorbus.core.entry import Entry, Value
+    from motorbus.core.register import Register, Value
 
 
 class Typed(NamedTuple):
@@ -26,7 +26,7 @@ class Typed(NamedTuple):
     named: bool = False
 
 
-def typed(entry: Entry, text: str, *, raw: bool = False) -> Typed:
+def typed(entry: Register, text: str, *, raw: bool = False) -> Typed:
     """A choice by its name, `2048raw`, or a number in the row's unit or with a unit of its own.
 
     Raises RequestError when it is none of these, or not finite.
@@ -42,7 +42,7 @@ def typed(entry: Entry, text: str, *, raw: bool = False) -> Typed:
     return Typed(_whole(entry, text), True)
 
 
-def _whole(entry: Entry, text: str) -> int:
+def _whole(entry: Register, text: str) -> int:
     try:
         return units.whole(text)
     except ValueError:
@@ -53,13 +53,13 @@ def _whole(entry: Entry, text: str) -> int:
         ) from None
 
 
-def to_value(one: Any, entry: Entry, raw: int) -> Value:
+def to_value(one: Any, entry: Register, raw: int) -> Value:
     """Raw value -> value in the row's unit, by the settings of this device."""
     value: Value = one.value(entry, raw) if hasattr(one, "value") else entry.to_value(raw)
     return value
 
 
-def to_raw(one: Any, entry: Entry, value: Value) -> int:
+def to_raw(one: Any, entry: Register, value: Value) -> int:
     """Value in the row's unit -> raw value, by the settings of this device."""
     raw: int = one.raw(entry, value) if hasattr(one, "raw") else entry.to_raw(value)
     return raw
@@ -86,7 +86,7 @@ def shown(number: Value | None, unit: str) -> str:
     return f"{number} {unit}".rstrip()
 
 
-def meaning(entry: Entry, raw: int) -> str:
+def meaning(entry: Register, raw: int) -> str:
     """What a raw value says in words: its choice, or the bits that are set."""
     if raw in entry.choices:
         return entry.choices[raw]

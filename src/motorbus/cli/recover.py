@@ -13,7 +13,7 @@ from motorbus.cli.exits import Exit, Unforeseeable
 from motorbus.cli.identity import address, carried_out
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.target import face, offers, opened, takes, target
-from motorbus.core.operation import OUTCOME, JournalEntry
+from motorbus.core.steps import OUTCOME, JournalEntry
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.journal import Change
 

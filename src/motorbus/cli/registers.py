@@ -10,13 +10,13 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
     from motorbus.cli.output import Output
-    from motorbus.core.entry import Entry, Value
+    from motorbus.core.register import Register, Value
 
 BRIEF = ("register", "value", ">raw", "meaning")
 FULL = ("register", ">address", "value", ">raw", "meaning", "storage", "access")
 
 
-def facts(one: Any, entries: Iterable[Entry], values: Mapping[str, Value]) -> list[dict[str, Any]]:
+def facts(one: Any, entries: Iterable[Register], values: Mapping[str, Value]) -> list[dict[str, Any]]:
     """What these registers of a device hold, as plain data."""
     meaning = faces.offer(one.bus.family.name, "meaning") or quantity.meaning
     return [
@@ -25,7 +25,9 @@ def facts(one: Any, entries: Iterable[Entry], values: Mapping[str, Value]) -> li
     ]
 
 
-def _facts(entry: Entry, value: Value, raw: int, meaning: Callable[[Entry, int], str]) -> dict[str, Any]:
+def _facts(
+    entry: Register, value: Value, raw: int, meaning: Callable[[Register, int], str]
+) -> dict[str, Any]:
     return {
         "name": entry.name,
         "address": entry.address,

@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from motorbus.cli.target import face, opened
-from motorbus.core.operation import Gather, catch
+from motorbus.core.steps import catch, gather
 from motorbus.errors import MotorbusError, VerificationFailed
 from motorbus.motion.safety.standstill import Rest, watched
 
@@ -56,7 +56,7 @@ def _judge(bus: Bus, there: Sequence[dict[str, Any]], errors: list[MotorbusError
 
 async def _all_of(devices: Mapping[int, Any]) -> list[Any]:
     asks = [partial(type(one).position.function, one) for one in devices.values()]
-    return await Gather([catch(watched(ask)) for ask in asks])
+    return list(await gather(*[catch(watched(ask)) for ask in asks]))
 
 
 def _unseen(one: dict[str, Any], why: str) -> None:

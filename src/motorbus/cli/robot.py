@@ -19,7 +19,7 @@ from motorbus.cli.output import Bar
 from motorbus.cli.target import face, said
 from motorbus.cli.traced import traced
 from motorbus.cli.wording import in_words_of_the_shell, shell_words
-from motorbus.core.operation import Progress
+from motorbus.core.steps import Progress
 from motorbus.errors import MotorbusError, RequestError
 
 if TYPE_CHECKING:

@@ -16,8 +16,8 @@ from motorbus.errors import RequestError
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from motorbus.core.assurance import Point
     from motorbus.core.family import Family
+    from motorbus.core.guarantees import Guarantee
     from motorbus.motion.machine import Machine
     from motorbus.motion.safety.assurance import Assured, Bounded
 
@@ -146,7 +146,7 @@ def _facts(found: Assured) -> dict[str, object]:
     }
 
 
-def _given(points: Mapping[str, Point]) -> dict[str, dict[str, str]]:
+def _given(points: Mapping[str, Guarantee]) -> dict[str, dict[str, str]]:
     return {about: {"given": point.given.value, "text": point.text} for about, point in points.items()}
 
 
@@ -157,6 +157,6 @@ def _axes(axes: Sequence[Bounded], output: Output) -> None:
     output.table("", [COLUMNS[name] for name in columns], rows)
 
 
-def _points(points: Mapping[str, Point], output: Output) -> None:
+def _points(points: Mapping[str, Guarantee], output: Output) -> None:
     rows = [(about.replace("_", " "), point.given.value, point.text) for about, point in points.items()]
     output.table("", ["", "given", ""], rows)

@@ -13,7 +13,7 @@ from motorbus.cli.output import Output
 from motorbus.cli.target import id_shown, nobody, opened, rate_word, target
 from motorbus.core import units
 from motorbus.core.family import Found
-from motorbus.core.operation import Progress
+from motorbus.core.steps import Progress
 from motorbus.errors import NoReply, RequestError
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from motorbus.errors import MotionError, MotorbusError
 if TYPE_CHECKING:
     from motorbus.bus.blocking import Bus
     from motorbus.cli.dry import DryBus
-    from motorbus.core.operation import Runnable
+    from motorbus.core.steps import Runnable
 
 T = TypeVar("T")
 

@@ -17,7 +17,7 @@ from motorbus.cli.fenced import fenced
 from motorbus.cli.machine import addresses
 from motorbus.cli.traced import traced
 from motorbus.cli.wording import in_words_of_the_shell, shell_words
-from motorbus.core.operation import Progress
+from motorbus.core.steps import Progress
 from motorbus.errors import DeviceError, MotorbusError, NoReply, RequestError
 
 if TYPE_CHECKING:
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from motorbus.bus.blocking import Bus
     from motorbus.cli.dry import DryBus
     from motorbus.cli.output import Output
-    from motorbus.core.entry import Table
     from motorbus.core.family import Family
+    from motorbus.core.register import RegisterMap
 
 
 LOG = logging.getLogger("motorbus.cli")
@@ -171,11 +171,11 @@ def takes(one: Any, verb: str, options: Iterable[str]) -> None:
             )
 
 
-def table_of(one: Any) -> Table:
+def table_of(one: Any) -> RegisterMap:
     """The register map of a device, by its own firmware. Raises DeviceError when nobody knows it."""
     identity = one.identify()
-    tables: Mapping[str, Table] = one.bus.family.tables
-    known: Table | None = getattr(one, "table", None) or tables.get(identity.table)
+    tables: Mapping[str, RegisterMap] = one.bus.family.tables
+    known: RegisterMap | None = getattr(one, "table", None) or tables.get(identity.table)
     if known is None:
         raise DeviceError(
             f"#{one.node} is {identity.model} with firmware {identity.firmware}, whose registers nobody has described",

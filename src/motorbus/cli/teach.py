@@ -16,7 +16,7 @@ from motorbus.cli.machine import axes_named, machine
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.rates import check_rate, check_smooth, time_of
 from motorbus.cli.robot import place, robot
-from motorbus.core.operation import Progress
+from motorbus.core.steps import Progress
 from motorbus.errors import MotorbusError
 
 if TYPE_CHECKING:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Final
 from motorbus.cli import frame
 from motorbus.cli.exits import Exit
 from motorbus.cli.target import opened, target
-from motorbus.core.operation import CanFrame, Sleep
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.steps import Sleep
 from motorbus.errors import NoReply, RequestError
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from motorbus.cli.files import usable
 from motorbus.cli.simulated import Simulated
 from motorbus.cli.target import face, nobody, opened
 from motorbus.core import units
-from motorbus.core.operation import Gather
+from motorbus.core.steps import gather
 from motorbus.errors import MotorbusError, RequestError
 
 if TYPE_CHECKING:
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
     from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Bar, Output
-    from motorbus.core.family import Found, Positions, Train
-    from motorbus.core.operation import Exchange
+    from motorbus.core.family import Found, Positions, PositionStream
+    from motorbus.core.request import Request
 
 AMPLITUDE: Final = 0.8
 """rad; how far the wave goes to either side."""
@@ -102,7 +102,7 @@ def _introduce(opening: Bus, found: Sequence[Found], output: Output) -> None:
     output.table("Found", [*scan.COLUMNS, ">position", ">voltage", ">temperature"], rows)
 
 
-def _led(opening: Bus, found: Sequence[Found]) -> Train:
+def _led(opening: Bus, found: Sequence[Found]) -> PositionStream:
     """These devices, to be asked and told in a loop. Raises RequestError when they are of a kind that cannot be."""
     models = [one.identity.model if one.identity else "" for one in found]
     able = opening.family.axis(models[0])
@@ -112,11 +112,11 @@ def _led(opening: Bus, found: Sequence[Found]) -> Train:
             advice="nothing was sent",
         )
     devices = [face(opening, one.node) for one in found]
-    train: Train = opening.run(able["train"](devices, rate=opening.rate))
+    train: PositionStream = opening.run(able["train"](devices, rate=opening.rate))
     return train
 
 
-def _moved(opening: Bus, train: Train, duration: float, output: Output) -> Course:
+def _moved(opening: Bus, train: PositionStream, duration: float, output: Output) -> Course:
     limp = [one for one in (face(opening, node) for node in train.nodes) if hasattr(one, "disable_torque")]
     try:
         opening.run(train.begin({}))
@@ -127,7 +127,7 @@ def _moved(opening: Bus, train: Train, duration: float, output: Output) -> Cours
             device.disable_torque()
 
 
-def _loop(opening: Bus, train: Train, duration: float, bar: Bar) -> Course:
+def _loop(opening: Bus, train: PositionStream, duration: float, bar: Bar) -> Course:
     """As fast as the bus allows: all goals out, all positions in."""
     first = _told(opening, train.positions)
     nodes = list(first)
@@ -150,16 +150,16 @@ def _loop(opening: Bus, train: Train, duration: float, bar: Bar) -> Course:
     return course
 
 
-def _all(opening: Bus, exchanges: Sequence[Exchange[Any]]) -> list[Any]:
+def _all(opening: Bus, requests: Sequence[Request[Any]]) -> list[Any]:
     """What each told; those on lanes of their own are in flight at once."""
-    return [opening.run(exchanges[0])] if len(exchanges) == 1 else opening.run(_together(exchanges))
+    return [opening.run(requests[0])] if len(requests) == 1 else opening.run(_together(requests))
 
 
-async def _together(exchanges: Sequence[Exchange[Any]]) -> list[Any]:
-    return await Gather(exchanges)
+async def _together(requests: Sequence[Request[Any]]) -> list[Any]:
+    return list(await gather(*requests))
 
 
-def _told(opening: Bus, reads: Sequence[Exchange[Positions]]) -> dict[int, float]:
+def _told(opening: Bus, reads: Sequence[Request[Positions]]) -> dict[int, float]:
     """Positions (rad) of all who answered."""
     return {node: position for one in _all(opening, reads) for node, position in one.values.items()}
 

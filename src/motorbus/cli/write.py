@@ -13,8 +13,8 @@ from motorbus.cli.exits import Exit, NeedsConsent
 from motorbus.cli.output import Output
 from motorbus.cli.parameters import DryRun, Flag
 from motorbus.cli.target import check_names, device, face, offers, opened, table_of
-from motorbus.core.entry import Storage
-from motorbus.core.operation import Effect
+from motorbus.core.register import Storage
+from motorbus.core.request import Effect
 from motorbus.errors import LimitExceeded, RequestError
 
 if TYPE_CHECKING:
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
     from motorbus.bus.blocking import Bus
     from motorbus.cli.quantity import Typed
-    from motorbus.core.entry import Entry, Value
     from motorbus.core.family import Family
+    from motorbus.core.register import Register, Value
 
 app = App(
     name="write",
@@ -53,7 +53,7 @@ Examples:
 class Order(NamedTuple):
     """One register, the value it shall have in the row's unit, and whether it was given as a raw number."""
 
-    entry: Entry
+    entry: Register
     value: Value
     raw: bool
 
@@ -166,7 +166,7 @@ def _orders(one: Any, wanted: Mapping[str, str], raw: bool) -> list[Order]:
     ]
 
 
-def _typed_by_some(entries: Sequence[Entry], text: str, raw: bool) -> None:
+def _typed_by_some(entries: Sequence[Register], text: str, raw: bool) -> None:
     """Raise RequestError for a text that is a value of this register in none of the maps that have it."""
     refusals = []
     for entry in entries:
@@ -178,7 +178,7 @@ def _typed_by_some(entries: Sequence[Entry], text: str, raw: bool) -> None:
         raise refusals[0]
 
 
-def _order(one: Any, entry: Entry, typed: Typed, text: str) -> Order:
+def _order(one: Any, entry: Register, typed: Typed, text: str) -> Order:
     value = quantity.to_value(one, entry, int(typed.number)) if typed.raw else typed.number
     plain = text[-1:].isdigit() or text.endswith(".")
     given = text if not plain else f"raw value {text}" if typed.raw else f"{text} {entry.unit}".rstrip()

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, TypeVar
 
-from motorbus.core.operation import Runnable
+from motorbus.core.steps import Runnable
 from motorbus.errors import VerificationFailed
 
 T = TypeVar("T")

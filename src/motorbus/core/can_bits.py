@@ -10,7 +10,7 @@ from __future__ import annotations
 from functools import cache, lru_cache
 from typing import Final
 
-from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame
+from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
 
 INTERFRAME: Final = 3
 """Bits between two frames; counted with the first."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, Final, NamedTuple, Protocol, TypeAlias
 
-from motorbus.core.operation import Data, Noise
+from motorbus.core.request import Data, Noise
 
 NOISE: Final = 0
 REQUEST: Final = 1

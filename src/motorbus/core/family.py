@@ -11,10 +11,11 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, NamedTuple, Protocol
 
-from motorbus.core.assurance import Assurance
 from motorbus.core.capture import Captures
-from motorbus.core.entry import Table, Value
-from motorbus.core.operation import Data, Event, Exchange, Procedure, Response, Runnable
+from motorbus.core.guarantees import Guarantees
+from motorbus.core.register import RegisterMap, Value
+from motorbus.core.request import Data, Event, Request, Response
+from motorbus.core.steps import Procedure, Runnable
 
 
 class Option(NamedTuple):
@@ -79,7 +80,7 @@ class Found(NamedTuple):
     identity: Identity | None
 
 
-class Readdressed(NamedTuple):
+class IdChanged(NamedTuple):
     """An event for `Emit` before a device gets another id: from now on `new` may reach the device `node`.
 
     `node` is None if the device is unknown. The event precedes the first write.
@@ -143,7 +144,7 @@ class Positions(NamedTuple):
     at: float
 
 
-class Train(Protocol):
+class PositionStream(Protocol):
     """Devices of one bus in a control loop, with all data that a cycle needs; see `Family.axis`.
 
     Its exchanges can run without reading anything first. Those on different lanes may be in flight at once. Before
@@ -157,13 +158,13 @@ class Train(Protocol):
         """The ids, in the given order."""
 
     @property
-    def positions(self) -> Sequence[Exchange[Positions]]:
+    def positions(self) -> Sequence[Request[Positions]]:
         """Exchanges that together read all positions; may be kept and run again.
 
         An exchange that reads several nodes lists silent ones as missing; an exchange for one node raises NoReply.
         """
 
-    def goals(self, to: Mapping[int, float]) -> Sequence[Exchange[Any]]:
+    def goals(self, to: Mapping[int, float]) -> Sequence[Request[Any]]:
         """Exchanges that order these goals (rad) for some or all nodes; the gate judges them when they leave.
 
         Raises LimitExceeded for a goal that is not finite or that no device of this kind can take, RequestError for
@@ -182,7 +183,7 @@ class Train(Protocol):
 class Stop(NamedTuple):
     """Requests that stop the nodes, in order, and what their acknowledgement promises."""
 
-    exchanges: tuple[Exchange[Response], ...]
+    requests: tuple[Request[Response], ...]
     promise: str
 
 
@@ -267,7 +268,7 @@ class Simulator(Protocol):
 
     Some simulators also have `usual_rate` (bit/s; the rate of the devices, if not the default of the family),
     `script(text)` (inputs of the devices), `duplicate(id)` (adds a second device with this id) and, on CAN,
-    `audience(frame)` (its receivers, a `core.frame.Audience`).
+    `audience(frame)` (its receivers, a `core.can_frame.Audience`).
     """
 
     @property
@@ -325,7 +326,7 @@ class Devices(NamedTuple):
 
     blocking: Callable[[Any, int], Any]
     awaiting: Callable[[Any, int], Any]
-    assures: Assurance | None = None
+    assures: Guarantees | None = None
 
 
 class Family(Protocol):
@@ -339,7 +340,7 @@ class Family(Protocol):
     def link(self) -> LinkNeeds: ...
 
     @property
-    def tables(self) -> Mapping[str, Table]:
+    def tables(self) -> Mapping[str, RegisterMap]:
         """All register maps, by name."""
 
     def configured(self, **settings: object) -> Family:
@@ -354,16 +355,16 @@ class Family(Protocol):
     def lane(self, node: int) -> int:
         """The lane of this node. Requests on one lane never overlap; all nodes of a serial line have lane 0."""
 
-    def air_time(self, exchange: Exchange[Any], rate: int) -> float:
+    def air_time(self, request: Request[Any], rate: int) -> float:
         """Time (s) on the wire of the request and all expected replies, with the gaps of the protocol."""
 
-    def turnaround(self, exchange: Exchange[Any]) -> float:
+    def turnaround(self, request: Request[Any]) -> float:
         """Maximum total time (s) of devices before and between their replies; depends on `exchange.timeout`."""
 
     def quiet_time(self, rate: int) -> float:
         """Time (s) after which no part of an old reply can still arrive; then a node out of sync is probed."""
 
-    def echo_test(self) -> Exchange[Any] | None:
+    def echo_test(self) -> Request[Any] | None:
         """An exchange whose reply has another length than its echo, sent when a bus is opened; None: no echo."""
 
     def explain(self, data: bytes) -> list[Explanation]:
@@ -371,7 +372,7 @@ class Family(Protocol):
 
     def receiver(self) -> Receiver: ...
 
-    def probe(self, node: int, attempt: int) -> Exchange[bool]:
+    def probe(self, node: int, attempt: int) -> Request[bool]:
         """An exchange without effect; its value is True for the expected content of the reply.
 
         Attempts cycle through several probes whose replies differ in key or length. No reply has the length of the echo

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, Final, NamedTuple, Protocol, TypeVar
 
 from motorbus.core import units
-from motorbus.core.operation import Exclusive, Gather, Runnable, Sleep, catch, with_cleanup
+from motorbus.core.steps import Exclusive, Runnable, Sleep, catch, gather, with_cleanup
 from motorbus.errors import MotorbusError, RequestError
 
 T = TypeVar("T")
@@ -81,11 +81,11 @@ class _Wait:
             return
         interrupted = MotorbusError("its stop was interrupted")
         self.notes = [_note(moving, interrupted) for moving in self._devices]
-        results = await Gather([catch(Exclusive(self._stop(moving))) for moving in self._devices])
+        results = await gather(*[catch(Exclusive(self._stop(moving))) for moving in self._devices])
         self._open = False
         stopped = [pair for pair in zip(self._devices, results, strict=True) if pair[1]]
         self.notes = [_note(moving, result) for moving, result in stopped]
-        places = await Gather([_place(moving, result) for moving, result in stopped])
+        places = await gather(*[_place(moving, result) for moving, result in stopped])
         self.notes = [note + place for note, place in zip(self.notes, places, strict=True)]
 
     async def _stop(self, moving: Moving) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-from motorbus.core.operation import Procedure
+from motorbus.core.steps import Procedure
 
 
 class Timing(Protocol):

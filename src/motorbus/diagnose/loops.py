@@ -11,7 +11,7 @@ from math import inf
 from typing import Any, Final, NamedTuple
 
 from motorbus.bus.blocking import Bus
-from motorbus.core.family import Train
+from motorbus.core.family import PositionStream
 from motorbus.motion.budget import BusBudget, counted
 from motorbus.session import open, parse_address, prepare
 from motorbus.simulation.named import Simulation
@@ -65,14 +65,14 @@ def count(wanted: Wanted, *, turnaround: float = 0.0) -> Counted | None:
     return Counted(whole, told, asked)
 
 
-def _train(bus: Bus, nodes: Sequence[int], rate: int) -> Train | None:
+def _train(bus: Bus, nodes: Sequence[int], rate: int) -> PositionStream | None:
     """The devices with these ids, as they would be led in a loop at this rate of the bus (bit/s)."""
     devices = [bus.family.devices.blocking(bus, node) for node in nodes]
     able = bus.family.axis(devices[0].identify().model)
     return bus.run(able["train"](devices, rate=rate)) if "train" in able else None
 
 
-def _angles(bus: Bus, train: Train) -> dict[int, float]:
+def _angles(bus: Bus, train: PositionStream) -> dict[int, float]:
     """An angle (rad) that each can be told: all goals are as long, so any will do to count."""
     found = {}
     for node in train.nodes:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple, Protocol, runtime_checkable
 
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 
 
 class Link(Protocol):

@@ -18,7 +18,8 @@ from threading import Lock
 from types import ModuleType
 from typing import Any, Final
 
-from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Data
+from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
+from motorbus.core.request import Data
 from motorbus.errors import LinkError, LinkLost, MotorbusError, PortNotFound, RequestError
 from motorbus.link import usb_adapters
 from motorbus.link.can_options import SHARED, CanOptions, check_rate, kernel_rate, read_options

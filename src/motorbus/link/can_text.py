@@ -5,7 +5,8 @@ from __future__ import annotations
 import time
 from re import Match, Pattern
 
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Data
 from motorbus.link.errors import full
 from motorbus.link.serial import ByteLink
 

@@ -14,8 +14,9 @@ from math import inf
 from threading import Condition, get_ident
 
 from motorbus.core.can_bits import bits
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import Simulator
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.request import Data
 from motorbus.errors import LinkError, LinkLost, RequestError
 from motorbus.link.base import Line, PerfectLine, Side
 

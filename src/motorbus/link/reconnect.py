@@ -18,7 +18,7 @@ from pathlib import Path
 from threading import Lock
 from typing import Any, Final, NamedTuple
 
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.errors import AnotherAdapter, LinkLost, MotorbusError, PortNotFound
 from motorbus.link import usb_adapters
 from motorbus.link.base import Link

@@ -19,7 +19,7 @@ from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, TypeAlias
 
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.errors import LinkError, PortNotFound, RequestError
 from motorbus.link import usb_adapters
 from motorbus.link.errors import busy, lost, no_permission, not_a_port, not_found, unsupported_rate

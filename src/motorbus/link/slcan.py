@@ -11,7 +11,7 @@ import re
 import time
 from typing import Final
 
-from motorbus.core.operation import REMOTE_FLAG, CanFrame
+from motorbus.core.can_frame import REMOTE_FLAG, CanFrame
 from motorbus.errors import LinkError
 from motorbus.link.can_options import SLCAN_RATES, CanOptions
 from motorbus.link.can_text import TextChannel, TextCodec

@@ -11,7 +11,7 @@ import re
 import time
 from typing import Final
 
-from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame
+from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
 from motorbus.errors import LinkError, RequestError
 from motorbus.link.can_options import CanOptions
 from motorbus.link.can_text import LONGEST, TextChannel, TextCodec

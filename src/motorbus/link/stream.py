@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from time import monotonic
 from typing import Any
 
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.link.errors import full, lost
 from motorbus.link.lock import PortLock
 

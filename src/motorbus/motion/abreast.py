@@ -11,8 +11,8 @@ from collections.abc import Callable, Coroutine, Generator, Mapping
 from dataclasses import dataclass
 from typing import Any, Concatenate, Generic, ParamSpec, Protocol, Self, TypeAlias, TypeVar, overload
 
-from motorbus.core.operation import Runnable
-from motorbus.core.verbs import Said
+from motorbus.core.device import DeviceMethod
+from motorbus.core.steps import Runnable
 from motorbus.errors import MotorbusError
 
 P = ParamSpec("P")
@@ -63,7 +63,7 @@ class LedAsync:
     conductor: AsyncConductor
 
 
-class together(Said[P, T]):  # noqa: N801 - reads as a word in a list of verbs
+class together(DeviceMethod[P, T]):  # noqa: N801 - reads as a word in a list of verbs
     """Makes a method of a function that gives an `Abreast`: blocking on what is `Led`, awaitable on `LedAsync`."""
 
     returns = "Abreast"

@@ -5,7 +5,7 @@ Each is a driver function of an axis, and is there on an axis whose device has t
 
 from __future__ import annotations
 
-from motorbus.core.verbs import Awaiting, Blocking
+from motorbus.core.device import AsyncDevice, BlockingDevice
 from motorbus.motion import capabilities as axis
 from motorbus.motion import reckoning
 from motorbus.motion.capabilities import AxisVerbs, ability
@@ -34,9 +34,9 @@ class _Verbs(AxisVerbs):
     run = ability("run", reckoning.run)
 
 
-class Axis(_Verbs, Blocking):
+class Axis(_Verbs, BlockingDevice):
     """An axis of a `Robot`."""
 
 
-class AsyncAxis(_Verbs, Awaiting):
+class AsyncAxis(_Verbs, AsyncDevice):
     """An axis of an `AsyncRobot`: every verb is awaited."""

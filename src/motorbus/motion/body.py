@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from motorbus.bus.base import BaseBus
-from motorbus.core.entry import shown
+from motorbus.core.register import shown
 from motorbus.errors import RequestError
 from motorbus.motion.capabilities import AxisVerbs
 from motorbus.motion.machine import Machine

@@ -1,8 +1,8 @@
 """What a loop would load each bus with, and how fast it can be: known before anything moves.
 
-A cycle of a loop is the exchanges of a family's `Train`: what they ask, what is due for an answer, and so how long they
-are on the wire. No program can beat the wire, so its limit is the highest rate there is; devices that take their time
-before they answer make it lower. Nothing here knows a family.
+A cycle of a loop is the requests of a family's `PositionStream`: what they ask, which replies they expect, and so how
+long they are on the wire. The wire limits the rate; the time that devices take before they reply lowers it.
+Nothing here knows a family.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from math import inf, isfinite
 from typing import Any, Final
 
 from motorbus.bus.base import BaseBus
-from motorbus.core.family import Family, Train
-from motorbus.core.operation import ANY, Exchange
+from motorbus.core.family import Family, PositionStream
+from motorbus.core.request import ANY, Request
 from motorbus.errors import RequestError
 from motorbus.motion import limits
 from motorbus.motion.abreast import Abreast, settled
@@ -40,7 +40,7 @@ class BusBudget:
 
     axes: tuple[str, ...]
     bit_rate: int
-    exchanges: int
+    requests: int
     replies: int
     wire: float
     turnaround: float
@@ -124,7 +124,11 @@ async def some_angles(axes: Iterable[AxisVerbs]) -> dict[int, float]:
 
 
 def bus_budget(
-    bus: BaseBus, train: Train, names: Sequence[str], angles: Mapping[int, float], turnaround: float = 0.0
+    bus: BaseBus,
+    train: PositionStream,
+    names: Sequence[str],
+    angles: Mapping[int, float],
+    turnaround: float = 0.0,
 ) -> BusBudget:
     """What a cycle of this train costs on its bus, with goals at these `angles` (rad, by id)."""
     return counted(bus.family, bus.rate, (*train.goals(angles), *train.positions), names, turnaround)
@@ -133,17 +137,17 @@ def bus_budget(
 def counted(
     family: Family,
     bit_rate: int,
-    cycle: Sequence[Exchange[Any]],
+    cycle: Sequence[Request[Any]],
     names: Sequence[str],
     turnaround: float = 0.0,
 ) -> BusBudget:
     """What a cycle of these exchanges costs at `bit_rate` (bit/s)."""
-    replies = [0 if one.replies is ANY else len(one.replies) for one in cycle]
+    replies = [0 if one.expected is ANY else len(one.expected) for one in cycle]
     overlap = len({one.lane for one in cycle}) > 1 and family.link.window > 1
     return BusBudget(
         axes=tuple(names),
         bit_rate=bit_rate,
-        exchanges=len(cycle),
+        requests=len(cycle),
         replies=sum(replies),
         wire=sum(family.air_time(one, bit_rate) for one in cycle),
         turnaround=turnaround,

@@ -10,9 +10,9 @@ from collections.abc import Callable, Mapping
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Concatenate, Final, ParamSpec, TypeAlias, TypeVar
 
+from motorbus.core.device import device_method
 from motorbus.core.family import Quality, State
-from motorbus.core.operation import Runnable
-from motorbus.core.verbs import verb
+from motorbus.core.steps import Runnable
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion.command import Command
 from motorbus.motion.machine import AxisSpec
@@ -56,7 +56,7 @@ def _telling(
     return told
 
 
-class ability(verb[P, T]):  # noqa: N801 - reads as a word in a list of verbs
+class ability(device_method[P, T]):  # noqa: N801 - reads as a word in a list of verbs
     """A verb that an axis has only if its device has one of the capabilities that it `needs`, one or several names."""
 
     def __init__(

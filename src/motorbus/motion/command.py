@@ -13,19 +13,17 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from motorbus.bus import failures
-from motorbus.core.aimed import Aim, Aimed
-from motorbus.core.operation import (
+from motorbus.core.request import (
     Effect,
-    Exchange,
-    Exclusive,
-    Gather,
+    Precondition,
     Priority,
-    Refusal,
-    Runnable,
+    Request,
+    SetpointGroup,
+    SetpointWrite,
     Step,
     Stops,
-    catch,
 )
+from motorbus.core.steps import Exclusive, Gather, Runnable, catch, gather
 from motorbus.errors import Interrupted, MotorbusError
 
 if TYPE_CHECKING:
@@ -55,7 +53,7 @@ class Command:
         self._stops = {axis.name: _stops(axis) for axis in self.axes}
         self._orders: dict[str, int] = {}
         self._counts: tuple[tuple[AxisVerbs, int], ...] = ()
-        self._aim: tuple[Aim, Aim] | None = None
+        self._aim: tuple[SetpointGroup, SetpointGroup] | None = None
         self._count()
 
     def _count(self) -> None:
@@ -134,39 +132,39 @@ class Command:
         self._stopping = stopping  # those were for others
         return None
 
-    def guarded(self, exchange: Exchange[T]) -> Exchange[T]:
+    def guarded(self, request: Request[T]) -> Request[T]:
         """The same exchange, which does not leave once the command is lost."""
-        if isinstance(exchange, Aimed):
-            aimed: Any = exchange.under(self._aim_of(exchange.aim))
+        if isinstance(request, SetpointWrite):
+            aimed: Any = request.with_group(self._aim_of(request.group))
             return aimed  # type: ignore[no-any-return]
-        own, other = exchange.refusal, exchange.other
-        return Exchange(
-            exchange.request,
-            exchange.replies,
-            exchange.read,
-            lane=exchange.lane,
-            rank=exchange.rank,
-            effect=exchange.effect,
-            goals=exchange.goals,
-            timeout=exchange.timeout,
-            repeatable=exchange.repeatable,
-            tells_position=exchange.tells_position,
-            refusal=self._refusal if own is None else partial(self._either, own),
-            other=None if other is None else lambda: self.guarded(other()),
+        own, other = request.precondition, request.alternate
+        return Request(
+            request.wire,
+            request.expected,
+            request.decode,
+            lane=request.lane,
+            priority=request.priority,
+            effect=request.effect,
+            setpoints=request.setpoints,
+            reply_within=request.reply_within,
+            repeatable=request.repeatable,
+            reports_position=request.reports_position,
+            precondition=self._refusal if own is None else partial(self._either, own),
+            alternate=None if other is None else lambda: self.guarded(other()),
         )
 
-    def _aim_of(self, aim: Aim) -> Aim:
+    def _aim_of(self, aim: SetpointGroup) -> SetpointGroup:
         """The same aim, of which nothing leaves once the command is lost; kept, for a loop asks in each cycle."""
         known = self._aim
         if known is None or known[0] is not aim:
-            own = Aim(aim.ordered, aim.goals, partial(self._either, aim.refusal))
+            own = SetpointGroup(aim.nodes, aim.to_setpoints, partial(self._either, aim.precondition))
             known = self._aim = aim, own
         return known[1]
 
     def _refusal(self, _: Stops) -> MotorbusError | None:
         return self.lost()
 
-    def _either(self, own: Refusal, stops: Stops) -> MotorbusError | None:
+    def _either(self, own: Precondition, stops: Stops) -> MotorbusError | None:
         return own(stops) or self.lost()
 
     async def watched(self, operation: Runnable[T]) -> T:
@@ -197,12 +195,14 @@ class Command:
             operation.close()
 
     def _watching(self, step: Step[Any]) -> Step[Any]:
-        if isinstance(step, Exchange):
-            return self.guarded(step) if step.effect in GUARDED and step.rank is not Priority.STOP else step
+        if isinstance(step, Request):
+            return (
+                self.guarded(step) if step.effect in GUARDED and step.priority is not Priority.STOP else step
+            )
         if isinstance(step, Gather):
-            return Gather([self.watched(one) for one in step.operations])
+            return gather(*[self.watched(one) for one in step.runnables])
         if isinstance(step, Exclusive):
-            return Exclusive(self.watched(step.operation))
+            return Exclusive(self.watched(step.runnable))
         return step
 
     async def stop(self, *, anew: bool = False) -> dict[str, MotorbusError]:
@@ -211,7 +211,7 @@ class Command:
         With `anew` also those for which a stop has left on their bus, where nobody knows whether it was accepted.
         """
         axes = self.untold() if anew else self.held()
-        ended = await Gather([catch(axis.able["stop"](axis.device)) for axis in axes])
+        ended = await gather(*[catch(axis.able["stop"](axis.device)) for axis in axes])
         errors = {
             axis.name: told for axis, told in zip(axes, ended, strict=True) if isinstance(told, MotorbusError)
         }

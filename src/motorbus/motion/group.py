@@ -12,7 +12,7 @@ from functools import partial
 from typing import Any, TypeAlias
 
 from motorbus.core.family import State
-from motorbus.core.operation import Procedure
+from motorbus.core.steps import Procedure
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion import capabilities as one
 from motorbus.motion import reckoning

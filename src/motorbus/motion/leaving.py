@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Iterable, Mapping
 from typing import Any, Final, TypeAlias
 
-from motorbus.core.operation import Procedure, catch
+from motorbus.core.steps import Procedure, catch
 from motorbus.errors import Interrupted, MotorbusError, NotHomed, Stalled
 from motorbus.motion import capabilities as one
 from motorbus.motion.abreast import Abreast

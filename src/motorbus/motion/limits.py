@@ -12,7 +12,7 @@ from math import inf, isfinite
 from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 from motorbus.core import units
-from motorbus.core.entry import shown
+from motorbus.core.register import shown
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.motion.machine import AxisSpec
 from motorbus.motion.machine.model import ACCELERATION, ROUNDING, VELOCITY, Measure

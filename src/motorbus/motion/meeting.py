@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Final, Generic, TypeVar
 
-from motorbus.core.operation import Runnable, Sleep
+from motorbus.core.steps import Runnable, Sleep
 from motorbus.errors import Interrupted, MotorbusError
 
 T = TypeVar("T")

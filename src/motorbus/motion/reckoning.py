@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar
 
-from motorbus.core.operation import Runnable, discard
+from motorbus.core.steps import Runnable, discard
 from motorbus.errors import LimitExceeded, MotionError, MotorbusError, NotHomed, RequestError
 from motorbus.motion import limits
 from motorbus.motion.machine.model import FARTHEST

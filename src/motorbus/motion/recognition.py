@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
 from motorbus.core.family import Identity
-from motorbus.core.operation import Runnable
+from motorbus.core.steps import Runnable
 from motorbus.errors import DeviceError, LimitExceeded, MotorbusError, NoReply, RequestError
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.body import Body

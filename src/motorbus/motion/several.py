@@ -11,7 +11,7 @@ from copy import copy
 from re import escape, search
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
-from motorbus.core.operation import Gather, Runnable, catch, with_cleanup
+from motorbus.core.steps import Runnable, catch, gather, with_cleanup
 from motorbus.errors import MotorbusError
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ Told: TypeAlias = "dict[str, Any]"
 
 async def everyone(axes: Sequence[AxisVerbs], act: Act[Any]) -> Told:
     """Do it to each, at the same time where the bus allows it; an interruption ends it."""
-    told = await Gather([catch(act(axis)) for axis in axes])
+    told = await gather(*[catch(act(axis)) for axis in axes])
     return {axis.name: one for axis, one in zip(axes, told, strict=True)}
 
 
@@ -41,10 +41,10 @@ async def insisted(axes: Sequence[AxisVerbs], act: Act[Any]) -> Told:
         told[axis.name] = await catch(act(axis))
 
     async def rest() -> None:
-        await Gather([one(axis) for axis in axes if axis.name not in told])
+        await gather(*[one(axis) for axis in axes if axis.name not in told])
 
     async def all_of_them() -> None:
-        await Gather([one(axis) for axis in axes])
+        await gather(*[one(axis) for axis in axes])
 
     await with_cleanup(all_of_them(), rest)
     return told

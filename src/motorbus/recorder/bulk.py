@@ -10,10 +10,11 @@ from collections.abc import Sequence
 from importlib.util import find_spec
 from typing import Any
 
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.capture import FAULTS, KINDS, Columns, Packet
-from motorbus.core.entry import shown
 from motorbus.core.family import Family
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.register import shown
+from motorbus.core.request import Data
 from motorbus.core.spans import cut_out
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.recorder.decoder import Decoder, checked, fitting, timed

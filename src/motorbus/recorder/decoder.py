@@ -11,10 +11,11 @@ from math import isfinite
 from operator import attrgetter
 from typing import Final
 
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.capture import FAULTS, PIECE, WAYS, Captures, Cutter, Packet, Run
-from motorbus.core.entry import shown
 from motorbus.core.family import Family
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.register import shown
+from motorbus.core.request import Data
 from motorbus.errors import RequestError
 from motorbus.recorder.heard import captures_of, spoken
 from motorbus.recorder.packets import Heard, Mark

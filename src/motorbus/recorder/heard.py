@@ -5,10 +5,11 @@ from __future__ import annotations
 from functools import cache
 
 from motorbus import families
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.capture import ABSENT, NOTICE, REPLY, Captures, PacketFacts, Run
-from motorbus.core.entry import shown
 from motorbus.core.family import Family
-from motorbus.core.operation import CanFrame, Data, Event, Noise, Notification
+from motorbus.core.register import shown
+from motorbus.core.request import Data, Event, Noise, Notification
 from motorbus.errors import RequestError
 
 

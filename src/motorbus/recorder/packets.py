@@ -13,8 +13,9 @@ from functools import cached_property
 from itertools import accumulate, repeat
 from typing import Any, Final, NamedTuple, TypeAlias, overload
 
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.capture import ABSENT, FAULTS, KINDS, NOISE, Columns, Packet, PacketFacts
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.request import Data
 
 _new = tuple.__new__
 _VOID: Final = (NOISE, ABSENT, ABSENT)

@@ -18,7 +18,7 @@ from collections.abc import Mapping
 from types import TracebackType
 from typing import Any, Final, Self
 
-from motorbus.core.operation import Sleep, catch
+from motorbus.core.steps import Sleep, catch
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.body import Body

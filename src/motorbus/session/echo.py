@@ -6,12 +6,12 @@ import logging
 from typing import Any
 
 from motorbus.bus.base import BaseBus
-from motorbus.core.operation import Exchange
+from motorbus.core.request import Request
 
 LOG = logging.getLogger("motorbus.session")
 
 
-def echo_test(bus: BaseBus) -> Exchange[Any] | None:
+def echo_test(bus: BaseBus) -> Request[Any] | None:
     """Log the warnings of the bus; return the request that shows an echo, None where the family needs none."""
     for warning in bus.warnings:
         LOG.warning("%s: %s", bus.link.name, warning)

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from motorbus.bus.base import BaseBus
-from motorbus.core.operation import READABLE
+from motorbus.core.steps import READABLE
 from motorbus.errors import MotorbusError, Refused, RequestError
 from motorbus.journal import Change
 from motorbus.motion.body import Body

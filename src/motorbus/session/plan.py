@@ -11,8 +11,8 @@ from typing import NamedTuple, Self
 from motorbus import families
 from motorbus.bus.aio import AsyncBus
 from motorbus.bus.blocking import Bus
-from motorbus.core.entry import shown
 from motorbus.core.family import Family
+from motorbus.core.register import shown
 from motorbus.errors import LinkError, MotorbusError, RequestError
 from motorbus.motion.axis import AsyncAxis, Axis
 from motorbus.motion.body import named as named_in

@@ -13,7 +13,7 @@ from threading import Event, Thread
 from typing import Any, Final
 
 from motorbus.bus.background import BackgroundTask
-from motorbus.core.operation import Sleep, catch
+from motorbus.core.steps import Sleep, catch
 from motorbus.errors import MotorbusError
 from motorbus.motion.body import Body
 from motorbus.motion.leaving import given_up, goes_on, moves, stopped_going_on

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from motorbus.core.operation import CanFrame
+from motorbus.core.can_frame import CanFrame
 
 
 class Adapter(Protocol):

@@ -11,7 +11,8 @@ from collections.abc import Callable
 from copy import deepcopy
 from typing import Any, Final, Protocol
 
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Data
 from motorbus.errors import RequestError
 from motorbus.link.base import Line, PerfectLine
 from motorbus.simulation.adapter import Adapter

@@ -19,9 +19,9 @@ from math import inf
 from typing import Final, NamedTuple
 
 from motorbus.core.can_bits import bits
+from motorbus.core.can_frame import Audience, CanFrame
 from motorbus.core.family import Simulator
-from motorbus.core.frame import Audience
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.request import Data
 from motorbus.errors import RequestError
 from motorbus.link.base import Delivery, Line, PerfectLine, Side
 

@@ -14,7 +14,8 @@ from contextlib import contextmanager
 from types import TracebackType
 from typing import TYPE_CHECKING, Final, Self
 
-from motorbus.core.operation import ERROR_FLAG, CanFrame, Data
+from motorbus.core.can_frame import ERROR_FLAG, CanFrame
+from motorbus.core.request import Data
 from motorbus.errors import LinkError, LinkLost, RequestError
 from motorbus.link.base import Line, Link
 from motorbus.simulation.clients import Participant

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from math import inf
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame
+from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
 
 PORT: Final = 29536
 """The usual TCP port."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import motorbus
 from motorbus.cli.feetech.offers import say
-from motorbus.core.operation import Progress
+from motorbus.core.steps import Progress
 from motorbus.families.feetech.driver import Skipped, Suspicion
 from tests.cli.conftest import Run
 

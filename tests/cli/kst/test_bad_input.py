@@ -13,7 +13,8 @@ import pytest
 
 import motorbus
 from motorbus.cli.simulated import Simulated
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Data
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Ran, Run
 

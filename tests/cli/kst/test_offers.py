@@ -6,7 +6,7 @@ import motorbus
 from motorbus import families
 from motorbus.cli.kst import offers
 from motorbus.core.can_bits import bits
-from motorbus.core.operation import Progress
+from motorbus.core.steps import Progress
 from motorbus.families.kst import Skipped, Suspicion
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import pytest
 
 import motorbus
-from motorbus.core.operation import Data, Effect
+from motorbus.core.request import Data, Effect
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.table import ORDERS
 from motorbus.simulation.named import Simulation

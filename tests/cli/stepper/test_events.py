@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from motorbus.cli.stepper.events import say
-from motorbus.core.operation import CanFrame, Progress
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.steps import Progress
 from motorbus.families.stepper import EditsLost, Sends, Slowing, Unrecorded
 
 READ_1 = "FF AA 3E 01 00 00 00 00 00 00 E8"

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import motorbus
-from motorbus.core.operation import INTENT, JournalEntry
+from motorbus.core.steps import INTENT, JournalEntry
 from tests.cli.conftest import Run
 from tests.cli.stepper.conftest import Line
 

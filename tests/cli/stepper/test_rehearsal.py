@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motorbus.cli.stepper.rehearsal import as_written
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.families.stepper import FAMILY, wire
 from motorbus.families.stepper.table import decode_image
 from tests.cli.conftest import Run

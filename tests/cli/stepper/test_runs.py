@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from tests.cli.conftest import Run
 from tests.cli.stepper.conftest import Line, line_of, press
 

@@ -6,7 +6,7 @@ import pytest
 
 import motorbus
 from motorbus.cli import monitor
-from motorbus.core.operation import Procedure
+from motorbus.core.steps import Procedure
 from tests.cli.conftest import Run
 from tests.cli.stepper.conftest import Line
 

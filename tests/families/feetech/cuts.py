@@ -10,7 +10,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from motorbus.core.operation import Data, Exclusive, JournalEntry
+from motorbus.core.request import Data
+from motorbus.core.steps import Exclusive, JournalEntry
 from motorbus.errors import LinkLost, MotorbusError
 from motorbus.families.feetech import FAMILY
 from motorbus.families.feetech.driver import Node, prepare, recover

@@ -10,19 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeAlias, TypeVar
 
-from motorbus.core.operation import (
-    ANY,
-    Effect,
-    Emit,
-    Exchange,
-    Exclusive,
-    Reply,
-    Response,
-    Runnable,
-    SetBitrate,
-    Shielded,
-    Sleep,
-)
+from motorbus.core.request import ANY, Effect, Reply, Request, Response
+from motorbus.core.steps import Emit, Exclusive, Runnable, SetBitrate, Shielded, Sleep
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown
 from motorbus.families.feetech.driver import Node
 from tests.families.player import played
@@ -129,7 +118,7 @@ class Played:
     ) -> None:
         self.script = list(script)
         self.interrupt_at = interrupt_at
-        self.exchanges: list[Exchange[Any]] = []
+        self.requests: list[Request[Any]] = []
         self.events: list[object] = []
         self.rate = rate
         self.rates: list[int] = []
@@ -139,18 +128,18 @@ class Played:
     @property
     def sent(self) -> list[bytes]:
         """Every packet in order."""
-        return [bytes(exchange.request) for exchange in self.exchanges if isinstance(exchange.request, bytes)]
+        return [bytes(request.wire) for request in self.requests if isinstance(request.wire, bytes)]
 
     def run(self, runnable: Runnable[T]) -> T:
         """Carry it out to its end; at exchange number `interrupt_at` a KeyboardInterrupt is thrown in instead."""
         return played(runnable, self._carry_out)
 
     def _carry_out(self, step: Any) -> Any:
-        if isinstance(step, Exchange):
+        if isinstance(step, Request):
             return self._exchange(step)
         if isinstance(step, Exclusive):
             self.alone += 1
-            return self.run(step.operation)
+            return self.run(step.runnable)
         if isinstance(step, Shielded):
             return self._shielded(step)
         if isinstance(step, SetBitrate):
@@ -166,10 +155,10 @@ class Played:
 
     def _shielded(self, step: Shielded[Any]) -> Any:
         """The end of a guard; an interruption in it is raised when it has ended."""
-        at, self.interrupt_at, first = self.interrupt_at, None, len(self.exchanges)
-        value = self.run(step.operation)
+        at, self.interrupt_at, first = self.interrupt_at, None, len(self.requests)
+        value = self.run(step.runnable)
         self.interrupt_at = at
-        if at is not None and first <= at < len(self.exchanges):
+        if at is not None and first <= at < len(self.requests):
             raise KeyboardInterrupt
         return value
 
@@ -180,22 +169,22 @@ class Played:
             self.rates.append(rate)
         return before
 
-    def _exchange(self, exchange: Exchange[Any]) -> Any:
-        number = len(self.exchanges)
-        self.exchanges.append(exchange)
+    def _exchange(self, request: Request[Any]) -> Any:
+        number = len(self.requests)
+        self.requests.append(request)
         if number == self.interrupt_at:
             raise KeyboardInterrupt
-        assert self.script, f"nothing more was expected, but {bytes_of(exchange).hex(' ')} was sent"
+        assert self.script, f"nothing more was expected, but {bytes_of(request).hex(' ')} was sent"
         line = self.script.pop(0)
-        assert bytes_of(exchange).hex(" ") == line.sent.hex(" ")
+        assert bytes_of(request).hex(" ") == line.sent.hex(" ")
         self.now += 0.001
         if isinstance(line.back, BaseException):
             raise line.back
-        return self._answer(exchange, line.back)
+        return self._answer(request, line.back)
 
-    def _answer(self, exchange: Exchange[Any], back: bytes | Sequence[bytes] | None) -> Any:
+    def _answer(self, request: Request[Any], back: bytes | Sequence[bytes] | None) -> Any:
         frames = [] if back is None else [back] if isinstance(back, bytes) else list(back)
-        dues = exchange.replies
+        dues = request.expected
         assert dues is not ANY
         replies = []
         for due in dues:
@@ -205,20 +194,20 @@ class Played:
         )
         missing = tuple(due.node for due in dues if due.node not in {reply.data[2] for reply in replies})
         if len(dues) == 1 and missing:
-            raise silence(exchange)
+            raise silence(request)
         answer = Response(tuple(replies), missing, self.now)
-        return answer if exchange.read is None else exchange.read(answer)
+        return answer if request.decode is None else request.decode(answer)
 
 
-def silence(exchange: Exchange[Any]) -> MotorbusError:
+def silence(request: Request[Any]) -> MotorbusError:
     """As the bus has it: silence after a read is NoReply, after a write nobody knows what became of it."""
-    changes = exchange.effect is not Effect.NONE or not exchange.repeatable
+    changes = request.effect is not Effect.NONE or not request.repeatable
     return OutcomeUnknown("no acknowledgement") if changes else NoReply("silence")
 
 
-def bytes_of(exchange: Exchange[Any]) -> bytes:
-    assert isinstance(exchange.request, bytes)
-    return exchange.request
+def bytes_of(request: Request[Any]) -> bytes:
+    assert isinstance(request.wire, bytes)
+    return request.wire
 
 
 def play(runnable: Runnable[T], *script: Line) -> T:

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from typing import Any, Final
 
 import motorbus
-from motorbus.core.entry import Entry
+from motorbus.core.register import Register
 from motorbus.families.feetech.driver import Node
 from motorbus.families.feetech.driver.identity import learn
 from motorbus.families.feetech.driver.node import IMAGE
@@ -29,7 +29,7 @@ MODELS: Final = {
 _RATES: Final = {"smbl": "115200", "smcl": "115200"}
 
 
-def spread(row: Entry) -> list[int]:
+def spread(row: Register) -> list[int]:
     """Raw values of a row from end to end: all of a row of one byte, and a thousand or so of a longer one."""
     step = max(1, (row.high - row.low) // 997)
     between = {*range(row.low, row.high + 1, step), -1, 0, 1, row.high - 1, row.high}

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import motorbus
 from motorbus.bus.blocking import Bus
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.simulation.named import Simulation
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.errors import MotorbusError, OutcomeUnknown, VerificationFailed
 from motorbus.families.feetech import Servo, wire
 from motorbus.families.feetech.table import ALARM_BITS, alarms

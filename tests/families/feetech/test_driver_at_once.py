@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.errors import DeviceError, LimitExceeded, MotorbusError, NoReply, OutcomeUnknown, RequestError
 from motorbus.families.feetech import Servo, action_all, reg_write_all
 from motorbus.link.base import Delivery, PerfectLine, Side

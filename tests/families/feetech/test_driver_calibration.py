@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Effect
+from motorbus.core.request import Effect
 from motorbus.errors import DeviceError, MotorbusError, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.feetech.driver import Node, calibrate, zero
 from motorbus.families.feetech.driver.calibration import shortest
@@ -60,7 +60,7 @@ def test_the_middle_by_the_torque_switch() -> None:
     )
     played = watch(calibrate(Node(3)), *script)
     assert played.alone == 1
-    assert Effect.MOTION not in {exchange.effect for exchange in played.exchanges}
+    assert Effect.MOTION not in {request.effect for request in played.requests}
     told = play(calibrate(Node(3)), *script)
     assert told.before == pytest.approx(600 * COUNT)
     assert told.after == pytest.approx(math.pi)

@@ -10,7 +10,8 @@ import pytest
 import motorbus
 from motorbus import session
 from motorbus.bus.blocking import Bus
-from motorbus.core.operation import INTENT, Data, Exclusive, JournalEntry
+from motorbus.core.request import Data
+from motorbus.core.steps import INTENT, Exclusive, JournalEntry
 from motorbus.errors import LinkError, LinkLost, MotorbusError, NoReply, RequestError
 from motorbus.families.feetech.driver import Node, prepare
 from motorbus.families.feetech.driver.changing import guarded
@@ -221,7 +222,7 @@ def test_an_interruption_when_all_is_over_says_that_it_is() -> None:
 
     def work(bus: Bus) -> None:
         bus.run(prepare(Node(OLD)))
-        bus.run(step.operation)
+        bus.run(step.runnable)
 
     world.run(work)
     with pytest.raises(KeyboardInterrupt) as caught:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from motorbus.core.operation import Effect, Priority
+from motorbus.core.request import Effect, Priority
 from motorbus.errors import (
     DeviceError,
     LimitExceeded,
@@ -70,8 +70,8 @@ def test_limits_become_0_and_one_bit_is_set(name: str, phase: int) -> None:
     assert told.after.limits == pytest.approx((-FAR, FAR))
     assert told.before.position == told.after.position == pytest.approx(808 * COUNT)
     assert "forgets its turns" in told.note
-    kept = [one for one in played.exchanges if bytes(one.request)[4:6] in (b"\x03\x12", b"\x03\x09")]  # type: ignore[arg-type]
-    assert [(one.effect, one.rank) for one in kept] == [(Effect.PERSISTENT, Priority.CONFIGURATION)] * 2
+    kept = [one for one in played.requests if bytes(one.wire)[4:6] in (b"\x03\x12", b"\x03\x09")]  # type: ignore[arg-type]
+    assert [(one.effect, one.priority) for one in kept] == [(Effect.PERSISTENT, Priority.CONFIGURATION)] * 2
 
 
 def test_off_limits_come_before_the_bit_is_cleared() -> None:

@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Effect, Priority, Sleep, TimeoutClass
+from motorbus.core.request import Effect, Priority, TimeoutClass
+from motorbus.core.steps import Sleep
 from motorbus.errors import ChecksumError, MotorbusError, NoReply, OutcomeUnknown, VerificationFailed
 from motorbus.families.feetech.driver import write
 from motorbus.families.feetech.table import TABLES, Mode
@@ -40,9 +41,9 @@ WHOLE = (*LOOK, UNLOCK, OFF, IDLE, *WRITES, STILL_OPEN, LOCK, LOCKED)
 def test_the_sequence_and_nobody_else_on_the_bus_meanwhile() -> None:
     played = watch(write(prepared(), position_p=33, led_mask=5), *WHOLE)
     assert played.alone == 1
-    stores = [one for one in played.exchanges if one.timeout is TimeoutClass.STORE]
-    assert stores == [played.exchanges[0], played.exchanges[2], *played.exchanges[4:]]
-    assert [exchange.effect for exchange in played.exchanges] == [
+    stores = [one for one in played.requests if one.reply_within is TimeoutClass.STORE]
+    assert stores == [played.requests[0], played.requests[2], *played.requests[4:]]
+    assert [request.effect for request in played.requests] == [
         Effect.NONE,
         Effect.NONE,
         Effect.PERSISTENT,
@@ -54,7 +55,7 @@ def test_the_sequence_and_nobody_else_on_the_bus_meanwhile() -> None:
         Effect.PERSISTENT,
         Effect.NONE,
     ]
-    assert played.exchanges[3].rank is Priority.STOP
+    assert played.requests[3].priority is Priority.STOP
 
 
 def test_several_runs_of_registers_are_one_guarded_sequence_and_ram_follows() -> None:
@@ -82,7 +83,7 @@ def test_a_servo_that_is_limp_cannot_be_moved_by_its_mode() -> None:
             LOCKED,
         ),
     )
-    assert max(exchange.effect for exchange in played.exchanges) is Effect.TORQUE
+    assert max(request.effect for request in played.requests) is Effect.TORQUE
 
 
 def test_a_reg_write_that_waits_is_replaced_by_one_that_moves_nothing() -> None:
@@ -90,7 +91,7 @@ def test_a_reg_write_that_waits_is_replaced_by_one_that_moves_nothing() -> None:
     played = watch(
         write(prepared(), position_p=33, led_mask=5), *(*WHOLE[:4], reads(3, 64, 1), harmless, *WHOLE[5:])
     )
-    assert played.exchanges[5].effect is Effect.NONE
+    assert played.requests[5].effect is Effect.NONE
 
 
 def test_settings_are_read_again_afterwards() -> None:

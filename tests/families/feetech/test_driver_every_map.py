@@ -11,7 +11,7 @@ import pytest
 
 import motorbus
 from motorbus.bus.blocking import Bus
-from motorbus.core.operation import Sleep
+from motorbus.core.steps import Sleep
 from motorbus.errors import RequestError
 from motorbus.families.feetech import (
     Servo,

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from motorbus.core.family import Health
-from motorbus.core.operation import Exchange
+from motorbus.core.request import Request
 from motorbus.families.feetech.driver import Node, health
 from motorbus.families.feetech.driver.health import WHOLE
 from tests.families.feetech.driver_script import play, prepared, prepares, reads
@@ -46,11 +46,11 @@ def test_it_is_blank_with_what_it_powers_up_with(told: dict[str, Any], blank: bo
 
 
 def test_of_a_known_servo_it_is_one_exchange_and_a_new_one_is_asked_first() -> None:
-    exchange = health(prepared())
-    assert isinstance(exchange, Exchange)
-    assert not exchange.tells_position  # the position is not at its beginning
+    request = health(prepared())
+    assert isinstance(request, Request)
+    assert not request.reports_position  # the position is not at its beginning
     for _ in range(2):
-        play(exchange, reads(3, 40, *block(1)))
+        play(request, reads(3, 40, *block(1)))
     assert play(health(Node(3)), prepares(), reads(3, 40, *block(1))).torque is True
 
 

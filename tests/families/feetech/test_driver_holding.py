@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import motorbus
-from motorbus.core.operation import Data, Expected, Priority, Reply, Response
+from motorbus.core.request import Data, Expected, Priority, Reply, Response
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.holding import COUNT, PROMISE, ask, held_ids, holds, resting
 from motorbus.families.feetech.driver.line import stop
@@ -56,9 +56,9 @@ def test_what_is_no_id_is_refused(said: Any) -> None:
 
 def test_everything_that_matters_is_asked_in_one_read_with_the_rank_of_a_stop() -> None:
     exchange = ask(3)
-    assert exchange.request == packet(3, READ, 0, 58)
-    assert (exchange.replies, exchange.rank) == ((Expected(3, 3, 64),), Priority.STOP)
-    assert exchange.tells_position
+    assert exchange.wire == packet(3, READ, 0, 58)
+    assert (exchange.expected, exchange.priority) == ((Expected(3, 3, 64),), Priority.STOP)
+    assert exchange.reports_position
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -106,14 +106,14 @@ def test_whatever_a_servo_says_there_is_an_order_for_it(name: str, data: bytes) 
 
 def test_only_an_answer_to_this_very_question_counts() -> None:
     data = registers("sts")
-    assert holds({3: answered(data)}, {3})[0].request == packet(3, WRITE, 42, *HERE)
+    assert holds({3: answered(data)}, {3})[0].wire == packet(3, WRITE, 42, *HERE)
     for other in (None, answered(HERE), answered(data[:40]), answered(data, node=4)):
-        assert holds({3: other}, {3})[0].request == packet(3, READ, 0, COUNT)
+        assert holds({3: other}, {3})[0].wire == packet(3, READ, 0, COUNT)
 
 
 def test_nobody_else_keeps_torque_and_those_who_hold_never_lose_it() -> None:
     frames, promise = stop({1: None, 3: None}, {3, 200})
-    requests = [frame.request for frame in frames]
+    requests = [frame.wire for frame in frames]
     assert requests[:4] == [
         packet(ALL, SYNC_WRITE, 40, 1, 1, 0),
         packet(1, WRITE, 40, 0),
@@ -122,7 +122,7 @@ def test_nobody_else_keeps_torque_and_those_who_hold_never_lose_it() -> None:
     ]
     limp = [node for request in requests[4:] for node in bytes(request)[7:-1:2]]  # type: ignore[arg-type]
     assert limp == [node for node in range(254) if node not in (1, 3, 200)]
-    assert {frame.rank for frame in frames} == {Priority.STOP}
+    assert {frame.priority for frame in frames} == {Priority.STOP}
     assert promise.endswith(PROMISE)
 
 

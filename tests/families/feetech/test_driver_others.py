@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 import motorbus
-from motorbus.core.operation import CanFrame, Progress
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.steps import Progress
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver import Node
 from motorbus.families.feetech.driver.others import others_than

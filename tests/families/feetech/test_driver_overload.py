@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Sleep
+from motorbus.core.steps import Sleep
 from motorbus.errors import DeviceError, MotorbusError, NoReply, RequestError
 from motorbus.families.feetech.driver import Recovery, recover_overload
 from motorbus.families.feetech.driver.overload import REST, TRIPS

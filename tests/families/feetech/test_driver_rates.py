@@ -8,7 +8,7 @@ import pytest
 
 import motorbus
 from motorbus import session
-from motorbus.core.operation import CanFrame
+from motorbus.core.can_frame import CanFrame
 from motorbus.errors import LinkError, RequestError
 from motorbus.families.feetech.table import BAUD_CODES, BAUD_CODES_OF
 from motorbus.simulation.named import Simulation

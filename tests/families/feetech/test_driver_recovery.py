@@ -11,7 +11,7 @@ import pytest
 
 import motorbus
 from motorbus import session
-from motorbus.core.operation import INTENT, JournalEntry
+from motorbus.core.steps import INTENT, JournalEntry
 from motorbus.errors import LinkError, NoReply, OutcomeUnknown, RequestError
 from motorbus.families.feetech.driver import Node, recover
 from motorbus.families.feetech.driver.jobs import SET_BAUD, SET_ID, Job, Place

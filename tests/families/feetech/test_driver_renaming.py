@@ -9,7 +9,8 @@ import pytest
 
 import motorbus
 from motorbus import session
-from motorbus.core.operation import Data, JournalEntry, Progress
+from motorbus.core.request import Data
+from motorbus.core.steps import JournalEntry, Progress
 from motorbus.errors import DeviceError, NoReply, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.feetech.driver import Node, set_id
 from motorbus.families.feetech.simulator.memory import Written

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import motorbus
-from motorbus.core.operation import Effect, Priority, TimeoutClass
+from motorbus.core.request import Effect, Priority, TimeoutClass
 from motorbus.errors import ChecksumError, NoReply, OutcomeUnknown
 from motorbus.families.feetech.driver import factory_restore
 from motorbus.families.feetech.driver.restoring import DEAF, factory_rates
@@ -40,10 +40,10 @@ WHOLE = (NOBODY, OFF, RESET, ping(3), NOBODY, NOBODY, HEAD)
 def test_torque_goes_off_and_nobody_else_is_on_the_bus() -> None:
     played = watch(factory_restore(prepared()), *WHOLE)
     assert played.alone == 1
-    assert played.exchanges[2].effect is Effect.PERSISTENT
-    assert played.exchanges[2].rank is Priority.CONFIGURATION
-    assert played.exchanges[2].timeout is TimeoutClass.STORE
-    assert not played.exchanges[2].repeatable
+    assert played.requests[2].effect is Effect.PERSISTENT
+    assert played.requests[2].priority is Priority.CONFIGURATION
+    assert played.requests[2].reply_within is TimeoutClass.STORE
+    assert not played.requests[2].repeatable
 
 
 def test_it_is_told_where_it_is_now() -> None:

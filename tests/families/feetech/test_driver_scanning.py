@@ -6,7 +6,8 @@ import pytest
 
 import motorbus
 from motorbus.core.family import Found
-from motorbus.core.operation import Priority, Progress, TimeoutClass
+from motorbus.core.request import Priority, TimeoutClass
+from motorbus.core.steps import Progress
 from motorbus.errors import ChecksumError, LinkError, LinkLost, RequestError
 from motorbus.families.feetech.driver import Skipped, Suspicion, scan
 from motorbus.families.feetech.driver.scanning import DRAIN
@@ -53,8 +54,8 @@ def test_every_id_is_asked_when_none_is_named() -> None:
 
 def test_a_scan_writes_nothing_and_yields_to_everything() -> None:
     played = watch(scan([1]), answers(1), tells(1))
-    assert {exchange.effect.name for exchange in played.exchanges} == {"NONE"}
-    assert (played.exchanges[0].timeout, played.exchanges[0].rank) == (
+    assert {request.effect.name for request in played.requests} == {"NONE"}
+    assert (played.requests[0].reply_within, played.requests[0].priority) == (
         TimeoutClass.SCAN,
         Priority.CONFIGURATION,
     )

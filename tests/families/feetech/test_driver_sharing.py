@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.core.operation import Effect, Progress
+from motorbus.core.request import Effect
+from motorbus.core.steps import Progress
 from motorbus.errors import NoReply, RequestError
 from motorbus.families.feetech.driver import Node, Suspicion, duplicates
 from motorbus.families.feetech.driver.sharing import POLLS
@@ -96,7 +97,7 @@ def test_it_ends_when_it_is_plain() -> None:
 def test_nothing_is_written_and_progress_is_told() -> None:
     answer = reads(3, 56, *range(15))
     played = watch(duplicates(Node(3), 2), answer, twice(answer), reads(3, 5, 3))
-    assert {exchange.effect for exchange in played.exchanges} == {Effect.NONE}
+    assert {request.effect for request in played.requests} == {Effect.NONE}
     assert [event.done for event in played.events if isinstance(event, Progress)] == [1, 2]
     quiet = watch(duplicates(Node(3), 2, quiet=True), answer, twice(answer), reads(3, 5, 3))
     assert quiet.events == []

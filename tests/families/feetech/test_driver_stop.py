@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Priority, Sleep
+from motorbus.core.request import Priority
+from motorbus.core.steps import Sleep
 from motorbus.errors import RequestError, VerificationFailed
 from motorbus.families.feetech import Servo
 from motorbus.families.feetech.driver import Node, Promise, move, stop
@@ -37,7 +38,7 @@ def stands(raw: int) -> Line:
 def test_stop_holds_where_the_servo_is_and_promises_no_more() -> None:
     wish = stop(prepared())
     played = watch(wish, prepares(), stands(777), writes(3, 42, *low_high(777)))
-    assert played.exchanges[2].rank is Priority.CONTROL
+    assert played.requests[2].priority is Priority.CONTROL
     hold = play(stop(prepared()), prepares(), stands(777), writes(3, 42, *low_high(777)))
     assert hold is Promise.HOLD_ACCEPTED
     assert "not verified" in Promise.HOLD_ACCEPTED.value
@@ -46,7 +47,7 @@ def test_stop_holds_where_the_servo_is_and_promises_no_more() -> None:
 def test_stop_is_not_refused_for_standing_outside_the_limits_with_torque() -> None:
     played = Played([prepares(at_12=0), stands(900), IS_ON, writes(3, 42, *low_high(900))])
     assert played.run(stop(prepared(at_12=0))) is Promise.OUTSIDE_ACCEPTED
-    (goal,) = played.exchanges[3].goals
+    (goal,) = played.requests[3].setpoints
     assert goal.low == goal.value == goal.high
     assert "only torque off ends that" in Promise.OUTSIDE_ACCEPTED.value
 
@@ -205,9 +206,9 @@ class Sleepy(Played):
         super().__init__(script)
         self.at, self.seconds, self.slept = at, seconds, 0
 
-    def _exchange(self, exchange: Any) -> Any:
-        told = super()._exchange(exchange)
-        if len(self.exchanges) == self.at + 1:
+    def _exchange(self, request: Any) -> Any:
+        told = super()._exchange(request)
+        if len(self.requests) == self.at + 1:
             self.now += self.seconds
             self.slept += 1
         return told
@@ -234,9 +235,9 @@ def test_a_goal_that_may_have_left_after_a_sleep_is_said_again_from_where_it_is_
 
 def test_a_stop_is_sent_however_old_its_readings_are() -> None:
     class Slow(Sleepy):
-        def _exchange(self, exchange: Any) -> Any:
-            self.at = len(self.exchanges)
-            return super()._exchange(exchange)
+        def _exchange(self, request: Any) -> Any:
+            self.at = len(self.requests)
+            return super()._exchange(request)
 
     host = Slow([prepares(), stands(700), stands(800), stands(900), writes(3, 42, *low_high(900))], 0, 1.0)
     assert host.run(stop(Node(3))) is Promise.HOLD_ACCEPTED

@@ -6,7 +6,8 @@ import pytest
 
 from motorbus import Robot
 from motorbus.bus.positions import LastPositions, addressed
-from motorbus.core.operation import Effect, Gather, Priority, Sleep
+from motorbus.core.request import Effect, Priority
+from motorbus.core.steps import Sleep, gather
 from motorbus.errors import ChecksumError, MotorbusError, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.feetech import Feetech
 from motorbus.families.feetech.driver import Node, disable_torque, disable_torque_all
@@ -37,13 +38,13 @@ def all_off(*ids: int) -> Line:
 
 
 def test_a_stranger_is_let_go_with_one_packet_that_passes_everyone() -> None:
-    (exchange,) = watch(disable_torque(Node(3)), off(3)).exchanges
-    assert (exchange.rank, exchange.effect) == (Priority.STOP, Effect.TORQUE)
+    (request,) = watch(disable_torque(Node(3)), off(3)).requests
+    assert (request.priority, request.effect) == (Priority.STOP, Effect.TORQUE)
 
 
 def test_each_frame_names_whom_it_lets_go_so_that_nobody_else_counts_as_stopped() -> None:
     silent, known = prepared(2, at_8=0), LastPositions(Feetech(), 1_000_000)
-    (let_go, _) = watch(disable_torque(silent), unheard(off(2)), reads(2, 40, 0)).exchanges
+    (let_go, _) = watch(disable_torque(silent), unheard(off(2)), reads(2, 40, 0)).requests
     assert addressed(let_go) == {2}
     (together,) = all_limp(as_nodes([2, 3]))
     known.sent(together)
@@ -59,7 +60,7 @@ def test_who_is_let_go_does_not_end_the_movement_of_another_and_does_not_hide_it
             await Sleep(0.5)
             await disable_torque_all([2, 3])
 
-        bus.run(Gather([type(first).move.function(first, 0.8), off()]))
+        bus.run(gather(type(first).move.function(first, 0.8), off()))
         assert first.position() == pytest.approx(0.8, abs=0.01)
         robot["a2"].device.write(status_return_level=0)
         robot["a2"].device.disable_torque()

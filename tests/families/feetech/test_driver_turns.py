@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from motorbus.core.operation import Effect, Priority
+from motorbus.core.request import Effect, Priority
 from motorbus.errors import DeviceError, RequestError, VerificationFailed
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver import Node, clear_turns, factory_restore
@@ -36,7 +36,7 @@ def test_torque_goes_off_first_and_nobody_else_is_on_the_bus() -> None:
     script = (prepares_as("hls"), at(9000), OFF, CLEAR, at(808))
     played = watch(clear_turns(Node(3)), *script)
     assert played.alone == 1
-    assert (played.exchanges[3].effect, played.exchanges[3].rank) == (
+    assert (played.requests[3].effect, played.requests[3].priority) == (
         Effect.PERSISTENT,
         Priority.CONFIGURATION,
     )

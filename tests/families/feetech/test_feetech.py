@@ -10,7 +10,7 @@ import pytest
 import motorbus
 from motorbus import families
 from motorbus.core.family import Family
-from motorbus.core.operation import Expected, Reply, TimeoutClass
+from motorbus.core.request import Expected, Reply, TimeoutClass
 from motorbus.families import feetech
 from motorbus.families.feetech import FAMILY, AsyncServo, Servo
 from motorbus.families.feetech.table import MODELS
@@ -43,8 +43,8 @@ def test_times_come_from_the_line() -> None:
 
 def test_the_echo_test_asks_for_one_byte_of_node_1() -> None:
     test = FAMILY.echo_test()
-    assert test.request == packet(1, 2, 5, 1)
-    assert test.timeout is TimeoutClass.SCAN
+    assert test.wire == packet(1, 2, 5, 1)
+    assert test.reply_within is TimeoutClass.SCAN
 
 
 def test_each_receiver_is_a_new_one() -> None:
@@ -56,7 +56,7 @@ def test_each_receiver_is_a_new_one() -> None:
 
 def test_stop_lets_go_of_every_node_it_is_given() -> None:
     stop = FAMILY.stop({3: None, 1: None})
-    assert [frame.replies for frame in stop.exchanges] == [(), (Expected(1, 1, 6),), (Expected(3, 3, 6),)]
+    assert [frame.expected for frame in stop.requests] == [(), (Expected(1, 1, 6),), (Expected(3, 3, 6),)]
     assert "limp" in stop.promise
 
 

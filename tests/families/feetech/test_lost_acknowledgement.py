@@ -58,9 +58,9 @@ def near(read: dict[str, Any], value: float) -> bool:
 def test_success_means_that_the_servo_did_it(model: str, name: str) -> None:
     command, done = COMMANDS[name]
     struck = 0
-    for exchange in EXCHANGES:
+    for request in EXCHANGES:
         with holding(model) as (simulation, servo):
-            simulation.faults = f"exchange {exchange}: drop"
+            simulation.faults = f"exchange {request}: drop"
             try:
                 command(servo)
             except MotorbusError:
@@ -69,7 +69,7 @@ def test_success_means_that_the_servo_did_it(model: str, name: str) -> None:
                 succeeded = True
             struck += simulation.faults.count
             simulation.faults = ""
-            assert done(servo) or not succeeded, f"reply {exchange} lost"
+            assert done(servo) or not succeeded, f"reply {request} lost"
     assert struck >= 1
     assert succeeded, "the last exchange is beyond the command, so nothing was lost"
 
@@ -77,12 +77,12 @@ def test_success_means_that_the_servo_did_it(model: str, name: str) -> None:
 @pytest.mark.parametrize("model", ["sts3215", "sm85blhv"])
 def test_a_step_is_never_made_twice(model: str) -> None:
     unknown = 0
-    for exchange in EXCHANGES:
+    for request in EXCHANGES:
         with holding(model) as (simulation, servo):
             servo.set_mode("step")
             servo.enable_torque()
             start = servo.position()
-            simulation.faults = f"exchange {exchange}: drop"
+            simulation.faults = f"exchange {request}: drop"
             try:
                 servo.step(0.2, wait=False)
             except OutcomeUnknown:

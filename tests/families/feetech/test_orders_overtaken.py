@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.core.operation import Sleep
+from motorbus.core.steps import Sleep
 from motorbus.errors import Interrupted, RequestError
 from motorbus.families.feetech import AsyncServo, Servo, action_all, sync_write, sync_write_positions
 from motorbus.families.feetech.table import Mode

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import INTENT
+from motorbus.core.steps import INTENT
 from motorbus.errors import NoReply, RequestError
 from tests.conftest import Figures
 from tests.families.feetech.cuts import NEVER, OLD, VERBS, Cut, World, cuts

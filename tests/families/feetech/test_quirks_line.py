@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.errors import NoReply, OutcomeUnknown, WireError
 from motorbus.families.feetech import FAMILY, sync_read, sync_read_positions
 from motorbus.families.feetech.simulator import simulate

@@ -12,8 +12,9 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.entry import Coding, Entry, Storage
-from motorbus.core.operation import Effect, SetBitrate
+from motorbus.core.register import Coding, Register, Storage
+from motorbus.core.request import Effect
+from motorbus.core.steps import SetBitrate
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.families.feetech.simulator import simulate
 from motorbus.families.feetech.table import BAUD_CODES, BAUD_CODES_OF, CONTROL, TABLES
@@ -45,7 +46,7 @@ SIGNED = [
 ]
 
 
-def rows_in_eeprom(name: str) -> list[Entry]:
+def rows_in_eeprom(name: str) -> list[Register]:
     """Those of this map that keep what is written to them."""
     return [row for row in TABLES[name].values() if row.writable and row.storage is Storage.EEPROM]
 
@@ -71,7 +72,7 @@ class Raw:
             self.host.say(request)
         self.host.wait(1.0)
 
-    def read(self, row: Entry) -> bytes:
+    def read(self, row: Register) -> bytes:
         """The bytes of a READ of just this row."""
         (reply,) = self.host.say(packet(self.servo.id, READ, row.address, row.size))
         return bytes.fromhex(reply)[5:-1]
@@ -86,18 +87,18 @@ class Raw:
         self.host.wait(1.0)
 
 
-def others(raw: Raw, row: Entry) -> list[int]:
+def others(raw: Raw, row: Register) -> list[int]:
     """Samples of this row other than what it has, for that proves nothing; nor 128 at the torque switch, an order."""
     held = raw.servo.memory[row.name]
     return [one for one in samples(row) if one != held and (row.name, one) != ("torque_enable", 128)]
 
 
-def obeyed(row: Entry) -> bool:
+def obeyed(row: Register) -> bool:
     """Whether the servo keeps what a host writes here; register 85 is read-only in the map, and lerobot writes it."""
     return row.writable or row.name == "max_acceleration"
 
 
-def bytes_of(row: Entry, raw: int) -> bytes:
+def bytes_of(row: Register, raw: int) -> bytes:
     """Made here from the facts of the row, not by it."""
     code = abs(raw) | (1 << row.sign_bit if raw < 0 and row.sign_bit is not None else 0)
     pair = code & 255, code >> 8
@@ -215,12 +216,12 @@ def there(request: pytest.FixtureRequest) -> Iterator[Bench]:
         yield made
 
 
-def table_of(there: Bench) -> dict[str, Entry]:
+def table_of(there: Bench) -> dict[str, Register]:
     return dict(TABLES[there.servo().identify().table])
 
 
 @pytest.mark.parametrize(("name", "row"), SIGNED)
-def test_a_negative_zero_is_zero(name: str, row: Entry) -> None:
+def test_a_negative_zero_is_zero(name: str, row: Register) -> None:
     """It occurs on the wire; nobody may see a value of it."""
     assert row.sign_bit is not None
     code = 1 << row.sign_bit
@@ -243,7 +244,7 @@ RESERVED = ("torque_enable", "lock")
 """Rows of which a plain write takes one value only: off, and closed."""
 
 
-def by_name(there: Bench) -> list[Entry]:
+def by_name(there: Bench) -> list[Register]:
     """Rows that a plain write takes."""
     return [
         row
@@ -252,7 +253,7 @@ def by_name(there: Bench) -> list[Entry]:
     ]
 
 
-def may_be_refused(servo: Any, row: Entry, raw: int) -> bool:
+def may_be_refused(servo: Any, row: Register, raw: int) -> bool:
     """A goal beyond the limits of the servo, which the gate keeps back, or one that would leave it without force."""
     if (row.name, raw) == POWERLESS:
         return True
@@ -335,7 +336,7 @@ def test_every_row_that_can_be_written_is_written_by_name_or_by_its_verb_or_neve
     assert {row.name for row in table_of(there).values() if row.writable} <= known
 
 
-def assert_kept(there: Bench, id: int, row: Entry, raw: int) -> None:
+def assert_kept(there: Bench, id: int, row: Register, raw: int) -> None:
     """It is there, it is locked in, and it outlives a power cycle."""
     simulated = there.simulated(id)
     assert (simulated.memory[row.name], simulated.memory["lock"]) == (raw, 1)

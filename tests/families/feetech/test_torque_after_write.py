@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.core.operation import Sleep
+from motorbus.core.steps import Sleep
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import AsyncServo, Servo
 from motorbus.families.feetech.driver import TorqueAfterWrite

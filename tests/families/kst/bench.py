@@ -12,22 +12,9 @@ from typing import Any, TypeVar
 
 from motorbus.bus.blocking import Bus
 from motorbus.bus.stop_socket import StopOutcome
-from motorbus.core.operation import (
-    ANY,
-    EVERY_LANE,
-    CanFrame,
-    Effect,
-    Emit,
-    Exchange,
-    Exclusive,
-    Gather,
-    Reply,
-    Response,
-    Runnable,
-    SetBitrate,
-    Sleep,
-    WaitFor,
-)
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import ANY, EVERY_LANE, Effect, Reply, Request, Response
+from motorbus.core.steps import Emit, Exclusive, Gather, Runnable, SetBitrate, Sleep, WaitFor
 from motorbus.errors import NoReply, OutcomeUnknown
 from motorbus.families.kst import FAMILY, Kst, Servo, wire
 from motorbus.families.kst.driver import Node
@@ -121,7 +108,7 @@ class Played:
 
     def __init__(self, script: Sequence[tuple[str, Any]]) -> None:
         self.script = list(script)
-        self.exchanges: list[Exchange[Any]] = []
+        self.requests: list[Request[Any]] = []
         self.events: list[object] = []
         self.rates: list[int] = []
         self.waited = 0.0
@@ -133,13 +120,13 @@ class Played:
         return played(runnable, self._carry_out)
 
     def _carry_out(self, step: Any) -> Any:
-        if isinstance(step, Exchange):
+        if isinstance(step, Request):
             return self._exchange(step)
         if isinstance(step, Exclusive):
             self.alone += 1
-            return self.run(step.operation)
+            return self.run(step.runnable)
         if isinstance(step, Gather):
-            return [self.run(operation) for operation in step.operations]
+            return [self.run(operation) for operation in step.runnables]
         if isinstance(step, SetBitrate):
             self.rates += [step.rate] if step.rate else []
             return 500_000
@@ -152,25 +139,25 @@ class Played:
             assert isinstance(step, WaitFor)
         return None
 
-    def _exchange(self, exchange: Exchange[Any]) -> Any:
-        self.exchanges.append(exchange)
-        assert self.script, f"nothing more was expected, but {exchange!r} was sent"
+    def _exchange(self, request: Request[Any]) -> Any:
+        self.requests.append(request)
+        assert self.script, f"nothing more was expected, but {request!r} was sent"
         sent, back = self.script.pop(0)
-        assert isinstance(exchange.request, CanFrame)
-        assert str(exchange.request) == sent
+        assert isinstance(request.wire, CanFrame)
+        assert str(request.wire) == sent
         self.now += 0.001
-        answer = Response(self._replies(exchange, back), (), self.now)
-        return answer if exchange.read is None else exchange.read(answer)
+        answer = Response(self._replies(request, back), (), self.now)
+        return answer if request.decode is None else request.decode(answer)
 
-    def _replies(self, exchange: Exchange[Any], back: Any) -> tuple[Reply, ...]:
+    def _replies(self, request: Request[Any], back: Any) -> tuple[Reply, ...]:
         lines = [back] if isinstance(back, str) else list(back or ())
-        replies = tuple(self._reply(exchange.lane, line) for line in lines)
-        if exchange.replies is ANY:
+        replies = tuple(self._reply(request.lane, line) for line in lines)
+        if request.expected is ANY:
             return replies
-        for due, reply in zip(exchange.replies, replies, strict=False):
+        for due, reply in zip(request.expected, replies, strict=False):
             assert (due.key, due.length) == (reply.key, len(reply.data)), "this reply is not due"
-        if len(replies) < len(exchange.replies):
-            changes = exchange.effect is not Effect.NONE or not exchange.repeatable
+        if len(replies) < len(request.expected):
+            changes = request.effect is not Effect.NONE or not request.repeatable
             raise OutcomeUnknown("no acknowledgement") if changes else NoReply("silence")
         return replies
 

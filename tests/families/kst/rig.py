@@ -10,8 +10,10 @@ from collections.abc import Mapping
 from random import Random
 
 from motorbus.core.can_bits import bits
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import SimulatedNode
-from motorbus.core.operation import CanFrame, Data, Gather
+from motorbus.core.request import Data
+from motorbus.core.steps import gather
 from motorbus.errors import MotorbusError
 from motorbus.families.kst import FAMILY, Servo
 from motorbus.families.kst.simulator import KstBus
@@ -87,7 +89,7 @@ class Rig:
         """So many positions of each node, all nodes at once."""
 
         async def together() -> None:
-            await Gather([self.reading(node, count) for node in self.devices])
+            await gather(*[self.reading(node, count) for node in self.devices])
 
         self.bus.run(together())
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.core.operation import CanFrame, Exchange
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Request
 from motorbus.families.kst import driver
 from motorbus.families.kst.driver import Dialect, Ear, Memory, Node
 from tests.families.kst.bench import bench, node, play
@@ -14,20 +15,20 @@ STATUS = "605#4005600000000000"
 
 
 def test_by_the_manual_it_tells_where_it_is_and_no_more() -> None:
-    exchange = driver.health(Node(5))
-    assert isinstance(exchange, Exchange)
-    assert exchange.tells_position
-    found = play(exchange, (POSITION, "4b02600084030000"))
+    request = driver.health(Node(5))
+    assert isinstance(request, Request)
+    assert request.reports_position
+    found = play(request, (POSITION, "4b02600084030000"))
     assert found.state.position == pytest.approx(1.5707963)
     assert (found.torque, found.blank, found.restarts) == (None, None, None)
     assert (found.state.current, found.state.temperature) == (None, None)
 
 
 def test_newer_firmware_tells_current_and_temperature_in_one_exchange() -> None:
-    exchange = driver.health(node("kst-ext"))
-    assert isinstance(exchange, Exchange)
-    assert not exchange.tells_position
-    found = play(exchange, (STATUS, "430560002c01f600"))
+    request = driver.health(node("kst-ext"))
+    assert isinstance(request, Request)
+    assert not request.reports_position
+    found = play(request, (STATUS, "430560002c01f600"))
     assert found.state.current == pytest.approx(3.0)
     assert found.state.temperature == -10.0
     assert found.state.position is None

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import ANY, Effect, TimeoutClass
+from motorbus.core.request import ANY, Effect, TimeoutClass
 from motorbus.errors import DeviceError, OutcomeUnknown, VerificationFailed
 from motorbus.families.kst import FAMILY, driver
 from motorbus.families.kst.driver.exchanges import order
@@ -32,10 +32,10 @@ def test_d11_a_save_expects_no_answer_and_takes_one_that_comes() -> None:
 
 
 def test_a_save_holds_its_lane_until_the_flash_is_written() -> None:
-    exchange = save_exchange(node())
-    assert (exchange.lane, exchange.replies, exchange.timeout) == (5, ANY, TimeoutClass.STORE)
-    assert (exchange.effect, exchange.repeatable) == (Effect.PERSISTENT, False)
-    assert FAMILY.turnaround(exchange) == pytest.approx(0.170)
+    request = save_exchange(node())
+    assert (request.lane, request.expected, request.reply_within) == (5, ANY, TimeoutClass.STORE)
+    assert (request.effect, request.repeatable) == (Effect.PERSISTENT, False)
+    assert FAMILY.turnaround(request) == pytest.approx(0.170)
     with bench(ids=(5, 6)) as there:
         begun = there.link.now()
         there.servo().save()

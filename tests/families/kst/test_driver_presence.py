@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.core.operation import ERROR_FLAG, CanFrame, Data
+from motorbus.core.can_frame import ERROR_FLAG, CanFrame
+from motorbus.core.request import Data
 from motorbus.errors import NoReply, RequestError
 from motorbus.families.kst.driver.presence import Presence, glance, settle_format, survey
 from motorbus.link.base import Delivery, PerfectLine, Side

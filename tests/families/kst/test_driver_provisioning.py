@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Data, Progress
+from motorbus.core.request import Data
+from motorbus.core.steps import Progress
 from motorbus.errors import NoReply, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.kst import PowerCycleNeeded, Provisioned, driver
 from motorbus.link.memory import MemoryLink

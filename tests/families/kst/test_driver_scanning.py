@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import Found
-from motorbus.core.operation import CanFrame, Data, Progress
+from motorbus.core.request import Data
+from motorbus.core.steps import Progress
 from motorbus.errors import LinkError, RequestError
 from motorbus.families.kst import Skipped, Suspicion
 from motorbus.families.kst.driver import scan

@@ -9,8 +9,9 @@ import pytest
 
 import motorbus
 from motorbus import families
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import Family
-from motorbus.core.operation import CanFrame, Reply
+from motorbus.core.request import Reply
 from motorbus.families import kst
 from motorbus.families.kst import FAMILY, AsyncServo, Servo, dialect_of, wire
 from motorbus.families.kst.driver import Ear

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from motorbus.bus.blocking import Bus
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.errors import LinkLost, MotorbusError
 from motorbus.families.kst import FAMILY, PowerCycleNeeded, Provisioned, Servo
 from motorbus.families.kst.simulator import KstBus

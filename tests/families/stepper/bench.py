@@ -7,7 +7,8 @@ from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from motorbus.bus.blocking import Bus
-from motorbus.core.operation import Data, Runnable
+from motorbus.core.request import Data
+from motorbus.core.steps import Runnable
 from motorbus.families.stepper import FAMILY, Controller
 from motorbus.families.stepper.simulator import Controller as SimulatedController
 from motorbus.families.stepper.simulator import simulate

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, TypeVar
 
 from motorbus.bus.blocking import Bus
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.errors import LinkLost, MotorbusError
 from motorbus.families.stepper import FAMILY, Controller
 from motorbus.families.stepper.execution import Phase

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from motorbus.bus.blocking import Bus
-from motorbus.core.operation import Progress, Sleep
+from motorbus.core.steps import Progress, Sleep
 from motorbus.core.timing import Turned
 from motorbus.errors import Interrupted, MotorbusError
 from motorbus.families.stepper import Controller, driver

@@ -10,7 +10,8 @@ from contextlib import suppress
 from random import Random
 from typing import Any
 
-from motorbus.core.operation import Data, Exchange, Priority, Runnable
+from motorbus.core.request import Data, Priority, Request
+from motorbus.core.steps import Runnable
 from motorbus.errors import MotorbusError
 from motorbus.families.stepper import FAMILY, Controller, wire
 from motorbus.families.stepper.driver import commands, goals
@@ -186,12 +187,12 @@ class Rig:
 
     # -- how it is judged ---------------------------------------------------------------------------------------------
 
-    def _acknowledged(self, exchange: Exchange[None], name: str) -> bool:
+    def _acknowledged(self, request: Request[None], name: str) -> bool:
         """Whether it was acknowledged; FalseWord when it was and the controller has not heard it meanwhile."""
         heard = self.line.heard if isinstance(self.line, HeardLine) else None
         before = len(heard) if heard is not None else 0
-        done = self._judged(name, _sent(exchange), _longest(exchange))
-        if done is not None and heard is not None and exchange.request not in heard[before:]:
+        done = self._judged(name, _sent(request), _longest(request))
+        if done is not None and heard is not None and request.wire not in heard[before:]:
             raise FalseWord(f"{name} was acknowledged and never heard")
         return done is not None
 
@@ -214,15 +215,15 @@ class Rig:
         return sum(ledger.retries for ledger in self.bus.statistics.nodes.values())
 
 
-async def _sent(exchange: Exchange[None]) -> Any:
-    await exchange
+async def _sent(request: Request[None]) -> Any:
+    await request
     return True
 
 
-def _longest(exchange: Exchange[Any]) -> float:
+def _longest(request: Request[Any]) -> float:
     """s after which this exchange is over whatever the line does: each try with its quiet time and a probe."""
     probe = FAMILY.probe(1, 0)
     quiet = FAMILY.quiet_time(9600)
-    each = [FAMILY.air_time(one, 9600) + FAMILY.turnaround(one) + 0.02 for one in (exchange, probe)]
-    tries = 1 if exchange.rank is Priority.STOP else RETRIES + 2
+    each = [FAMILY.air_time(one, 9600) + FAMILY.turnaround(one) + 0.02 for one in (request, probe)]
+    tries = 1 if request.priority is Priority.STOP else RETRIES + 2
     return tries * (sum(each) + 2 * quiet) + quiet

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from motorbus.core.operation import Data, Gather, Procedure, Sleep
+from motorbus.core.request import Data
+from motorbus.core.steps import Gather, Procedure, Sleep, gather
 from motorbus.families.stepper import driver
 from motorbus.families.stepper.driver import Ran
 from motorbus.families.stepper.execution import Happening
@@ -51,7 +52,7 @@ class Running(Bench):
 
     def beside(self, *others: Procedure[Any], **options: Any) -> Ran:
         """The run, with other operations on the same bus."""
-        both: Gather[Any] = Gather([driver.run(self.device, self.number, **options), *others])
+        both: Gather[Any] = gather(driver.run(self.device, self.number, **options), *others)
         found = self.run(both)
         assert isinstance(found[0], Ran)
         return found[0]

@@ -18,7 +18,7 @@ import motorbus
 from motorbus import session
 from motorbus.cli import main
 from motorbus.cli.simulated import Simulated
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.families.stepper import Controller
 from motorbus.link.serial import SerialLink
 

@@ -9,7 +9,7 @@ import pytest
 
 import motorbus
 from motorbus.core.family import Found
-from motorbus.core.operation import Exchange, Reply, Response, TimeoutClass
+from motorbus.core.request import Reply, Request, Response, TimeoutClass
 from motorbus.errors import FramingError, OutcomeUnknown, RequestError, UnexpectedReply
 from motorbus.families.stepper import FAMILY, AsyncController, Controller, Program, Sends, driver
 from motorbus.families.stepper.driver import Node, presence, vote
@@ -23,9 +23,9 @@ READ_2 = "FF AA 3E 02 00 00 00 00 00 00 E9"
 DUMP_BYTES = 226
 
 
-def shown(exchange: Exchange[Any]) -> str:
-    assert isinstance(exchange.request, bytes)
-    return exchange.request.hex(" ").upper()
+def shown(request: Request[Any]) -> str:
+    assert isinstance(request.wire, bytes)
+    return request.wire.hex(" ").upper()
 
 
 def put(there: Bench, data: bytes) -> Program:
@@ -163,7 +163,7 @@ def test_an_input_is_read_by_one_exchange_that_is_kept() -> None:
     one, other = Node(), Node()
     kept = [driver.read_input(one, port) for port in range(1, 6)]
     assert [driver.read_input(one, port) for port in range(1, 6)] == kept
-    assert [shown(exchange)[6:14] for exchange in kept] == [f"00 0B 0{port}" for port in range(1, 6)]
+    assert [shown(request)[6:14] for request in kept] == [f"00 0B 0{port}" for port in range(1, 6)]
     assert driver.read_input(other, 1) is not kept[0]
 
 
@@ -184,12 +184,12 @@ def test_an_input_is_read_by_one_exchange_that_is_kept() -> None:
 def test_a_reply_that_is_not_due_is_told_byte_by_byte(
     name: str, values: dict[str, Any], came: str, says: str
 ) -> None:
-    exchange = command(Node(), name, bytes, **values)
-    assert exchange.read is not None
+    request = command(Node(), name, bytes, **values)
+    assert request.decode is not None
     with pytest.raises(UnexpectedReply) as raised:
-        exchange.read(Response((Reply(0, (), bytes.fromhex(came)),), (), 1.0))
+        request.decode(Response((Reply(0, (), bytes.fromhex(came)),), (), 1.0))
     assert raised.value.summary == f"the reply to {name} is not the one that is due: {says}"
-    assert (raised.value.sent, raised.value.received) == (exchange.request, bytes.fromhex(came))
+    assert (raised.value.sent, raised.value.received) == (request.wire, bytes.fromhex(came))
 
 
 # --- who is there -------------------------------------------------------------------------------------------
@@ -312,5 +312,5 @@ def test_a_command_takes_17_7_ms_of_the_line_and_a_dump_246_9() -> None:
     assert FAMILY.air_time(dump, 9600) * 1000 == pytest.approx(246.875, abs=0.001)
     assert FAMILY.turnaround(command) == 0.2
     assert FAMILY.turnaround(dump) + 0.2354167 == pytest.approx(0.6)
-    assert FAMILY.turnaround(Exchange(b"", timeout=TimeoutClass.STORE)) == 1.0
+    assert FAMILY.turnaround(Request(b"", reply_within=TimeoutClass.STORE)) == 1.0
     assert FAMILY.quiet_time(9600) == pytest.approx(0.2354167 + 0.05)

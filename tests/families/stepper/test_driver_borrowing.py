@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import INTENT, OUTCOME, Gather, JournalEntry, Progress, Sleep
+from motorbus.core.steps import INTENT, OUTCOME, JournalEntry, Progress, Sleep, gather
 from motorbus.errors import Interrupted, MotorbusError, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.stepper import Controller
 from motorbus.families.stepper.driver import jog, stop
@@ -135,7 +135,7 @@ def test_what_slows_down_has_its_time_before_anything_is_edited() -> None:
             phases.append(line.simulated.state.phase)
 
     def both(device: Controller) -> object:
-        return device.bus.run(Gather([jog(device, 3 * tau, 50.0), _stopped(device, 15.0)]))
+        return device.bus.run(gather(jog(device, 3 * tau, 50.0), _stopped(device, 15.0)))
 
     line.react = look
     failed(line.run(both), Interrupted)
@@ -279,7 +279,7 @@ def test_two_borrows_come_one_after_the_other() -> None:
 
     def both(device: Controller) -> object:
         other = Controller(device.bus)
-        return device.bus.run(Gather([jog(device, tau, 0.5), jog(other, -tau, 0.25)]))
+        return device.bus.run(gather(jog(device, tau, 0.5), jog(other, -tau, 0.25)))
 
     line.run(both)
     assert line.simulated.position == 400
@@ -301,7 +301,7 @@ def test_a_stop_of_somebody_else_ends_it(moment: float) -> None:
 
     def both(device: Controller) -> object:
         other = Controller(device.bus)
-        return device.bus.run(Gather([jog(device, tau, 50.0), _stopped(other, moment)]))
+        return device.bus.run(gather(jog(device, tau, 50.0), _stopped(other, moment)))
 
     failed(line.run(both), Interrupted, "the motion was stopped")
     assert (MOVE in starts(line.sent)) == (moment == 0.4)

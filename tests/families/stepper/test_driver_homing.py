@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Progress
+from motorbus.core.steps import Progress
 from motorbus.errors import MotorbusError, NotHomed, OutcomeUnknown, RequestError
 from motorbus.families.stepper import Controller
 from motorbus.families.stepper.driver import Homed

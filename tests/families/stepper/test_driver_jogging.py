@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Sleep
+from motorbus.core.steps import Sleep
 from motorbus.errors import Interrupted, OutcomeUnknown, RequestError
 from motorbus.families.stepper import Controller
 from motorbus.families.stepper.driver import Moved, Outcome, Ran

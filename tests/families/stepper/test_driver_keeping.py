@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import INTENT, OUTCOME, Gather, Procedure, Sleep, catch
+from motorbus.core.steps import INTENT, OUTCOME, Procedure, Sleep, catch, gather
 from motorbus.core.timing import Turned
 from motorbus.errors import Interrupted, LinkLost, MotorbusError, NotHomed, OutcomeUnknown, RequestError
 from motorbus.families.stepper import FAMILY, Controller, driver
@@ -211,7 +211,7 @@ def beside(line: Line1, partner: Partner, other: Any, angle: float = 5 * tau) ->
 
     def together(device: Controller) -> list[Any]:
         mine = driver.keep_time(device, angle, partner, velocity=10.0)
-        found: list[Any] = device.bus.run(Gather([catch(mine), catch(other(device))]))
+        found: list[Any] = device.bus.run(gather(catch(mine), catch(other(device))))
         return found
 
     told, too = line.run(together)  # type: ignore[misc]

@@ -10,7 +10,7 @@ import pytest
 
 import motorbus
 from motorbus import session
-from motorbus.core.operation import INTENT, OUTCOME, JournalEntry
+from motorbus.core.steps import INTENT, OUTCOME, JournalEntry
 from motorbus.errors import Interrupted, LinkError, OutcomeUnknown, RequestError
 from motorbus.families.stepper import Controller, driver
 from motorbus.families.stepper.driver import Outcome, Promise, Unrecorded

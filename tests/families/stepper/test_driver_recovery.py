@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import REACHED, Progress
+from motorbus.core.steps import REACHED, Progress
 from motorbus.errors import OutcomeUnknown, RequestError
 from motorbus.families.stepper import Controller
 from motorbus.families.stepper.execution import Phase

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.core.operation import ASKED, INTENT, Gather, JournalEntry, catch
+from motorbus.core.steps import ASKED, INTENT, Gather, JournalEntry, catch, gather
 from motorbus.errors import LimitExceeded, OutcomeUnknown, RequestError
 from motorbus.families.stepper import AsyncController, Behaviour, Controller, driver
 from motorbus.families.stepper.driver import Estimated, InputChanged, Outcome, Ran
@@ -168,7 +168,7 @@ def test_what_has_no_geometry_has_no_goal_and_is_not_started() -> None:
 def test_the_gate_is_asked_and_what_it_refuses_is_not_owed(monkeypatch: pytest.MonkeyPatch) -> None:
     with Running() as there:
 
-        def refuse(exchange: object, now: float) -> None:
+        def refuse(request: object, now: float) -> None:
             raise LimitExceeded("too far")
 
         monkeypatch.setattr(there.bus.interlock, "check", refuse)
@@ -209,7 +209,7 @@ def test_while_one_may_still_run_no_other_is_started() -> None:
 def test_of_two_that_are_asked_for_at_once_one_is_started() -> None:
     with Running() as there:
         other = catch(driver.run(there.device, 1))
-        both: Gather[Any] = Gather([driver.run(there.device, 1), other])
+        both: Gather[Any] = gather(driver.run(there.device, 1), other)
         ran, refused = there.run(both)
         assert ran.outcome is Outcome.COMPLETED
         assert isinstance(refused, RequestError)

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import ASKED, JournalEntry, catch
+from motorbus.core.steps import ASKED, JournalEntry, catch
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.stepper import Backup, Controller, Program
 from motorbus.families.stepper.driver.selecting import EditsLost, clear, is_blank, select

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from motorbus.core.operation import JournalEntry, Progress, catch
+from motorbus.core.steps import JournalEntry, Progress, catch
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.stepper import AsyncController, Controller, Program
 from motorbus.families.stepper.driver.writing import Planned, Proof, Written, write_project

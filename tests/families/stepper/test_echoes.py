@@ -10,7 +10,7 @@ from random import Random
 
 import pytest
 
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.errors import MotorbusError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.table import ORDERS

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Gather, Procedure, Progress, Sleep, catch
+from motorbus.core.steps import Procedure, Progress, Sleep, catch, gather
 from motorbus.errors import Interrupted, MotorbusError, OutcomeUnknown, RequestError
 from motorbus.families.stepper import Controller, driver
 from motorbus.families.stepper.driver import Moved, Outcome, Ran
@@ -123,8 +123,7 @@ def beside(line: Line1, *works: Callable[[Controller], Procedure[Any]]) -> list[
 
     def together(device: Controller) -> list[Any]:
         branches = [after(0.1 * number, Controller(device.bus), work) for number, work in enumerate(works)]
-        found: list[Any] = device.bus.run(Gather(branches))
-        return found
+        return list(device.bus.run(gather(*branches)))
 
     found = line.run(together)
     assert isinstance(found, list)

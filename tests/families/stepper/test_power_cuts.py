@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import catch
+from motorbus.core.steps import catch
 from motorbus.errors import MotorbusError, OutcomeUnknown, VerificationFailed
 from motorbus.families.stepper.driver.selecting import clear, save
 from motorbus.families.stepper.driver.writing import Proof, Written, write_project

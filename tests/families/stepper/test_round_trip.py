@@ -18,7 +18,7 @@ import pytest
 
 import motorbus
 from motorbus.bus.blocking import Bus
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.families.stepper import Controller, wire
 from motorbus.families.stepper.driver.writing import Difference, Planned, Written
 from motorbus.families.stepper.program import Program

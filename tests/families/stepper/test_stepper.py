@@ -22,11 +22,11 @@ def test_what_a_user_needs_is_there() -> None:
 
 
 def test_a_bus_without_settings_speaks_as_the_manual_says() -> None:
-    assert FAMILY.configured().stop({1: None}).exchanges[1].request[2] == 3
+    assert FAMILY.configured().stop({1: None}).requests[1].wire[2] == 3
     other = FAMILY.configured(motor="5")
     assert isinstance(other, Stepper)
-    assert other.stop({1: None}).exchanges[1].request[2] == 5
-    assert FAMILY.stop({1: None}).exchanges[1].request[2] == 3
+    assert other.stop({1: None}).requests[1].wire[2] == 5
+    assert FAMILY.stop({1: None}).requests[1].wire[2] == 3
 
 
 def test_each_bus_has_a_memory_of_its_own() -> None:
@@ -65,7 +65,7 @@ def test_a_bus_is_told_how_its_dumps_are_to_be_read() -> None:
 
 def test_settings_are_kept_apart_and_checked() -> None:
     both = FAMILY.configured(motor=7).configured(dump_order="big")
-    assert both.stop({1: None}).exchanges[1].request[2] == 7
+    assert both.stop({1: None}).requests[1].wire[2] == 7
     with pytest.raises(RequestError, match="dump_order='middle'") as caught:
         FAMILY.configured(dump_order="middle")
     assert caught.value.expected == "little or big"

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.core.operation import INTENT, JournalEntry
+from motorbus.core.steps import INTENT, JournalEntry
 from motorbus.errors import OutcomeUnknown, RequestError
 from motorbus.families.stepper.driver.writing import Proof
 from tests.families.stepper.bench import Tampering, bench

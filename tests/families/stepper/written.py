@@ -8,7 +8,7 @@ from itertools import product
 from math import inf
 from typing import Any, Final
 
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.families.stepper import Program
 from motorbus.families.stepper.simulator import Controller as Simulated
 from motorbus.families.stepper.simulator import StepperBus

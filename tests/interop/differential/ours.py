@@ -9,7 +9,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from motorbus.core.operation import CanFrame, Exchange, Exclusive, Expected, Response, Step
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Expected, Request, Response, Step
+from motorbus.core.steps import Exclusive
 from motorbus.errors import DeviceError, MotorbusError
 from motorbus.families.feetech import FAMILY as FEETECH
 from motorbus.families.feetech import wire
@@ -23,7 +25,7 @@ from tests.support.world import Tries
 def decoded(case: Case) -> Outcome:
     """A FEETECH stream. The value is shaped as the lines of `sdk_decoder.py` are."""
     request = case.request
-    exchange: Exchange[Response] = Exchange(
+    exchange: Request[Response] = Request(
         request.packet(), tuple(Expected(node, node, length) for node, length in request.due())
     )
     answer, fault = Tries(FEETECH, 1_000_000, echo=False).answered(exchange, [case.stream])
@@ -71,15 +73,15 @@ def _run(steps: Any, tries: Tries, frames: Iterator[Sequence[tuple[int, bytes]]]
         except StopIteration as end:
             return end.value
         if isinstance(step, Exclusive):
-            given = _run(step.operation, tries, _again(come, frames))
+            given = _run(step.runnable, tries, _again(come, frames))
             continue
-        assert isinstance(step, Exchange)
-        if step.request != said:
-            said, come = step.request, next(frames, ())
+        assert isinstance(step, Request)
+        if step.wire != said:
+            said, come = step.wire, next(frames, ())
         answer, fault = tries.answered(step, [CanFrame(identifier, data) for identifier, data in come])
         if answer is None:
             raise Failed(fault)
-        given = answer if step.read is None else step.read(answer)
+        given = answer if step.decode is None else step.decode(answer)
 
 
 def _again(

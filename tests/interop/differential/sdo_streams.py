@@ -11,7 +11,8 @@ from functools import cache
 from random import Random
 from typing import Final
 
-from motorbus.core.operation import CanFrame, Exchange, Expected
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Expected, Request
 from motorbus.families.kst import FAMILY, wire
 from motorbus.link.memory import MemoryLink
 from tests.interop.differential.cases import Frame, SdoCase, SdoRequest
@@ -35,7 +36,7 @@ def recorded() -> tuple[SdoCase, ...]:
     ]
     cases = []
     for request in (*reads, *writes):
-        bus.run(Exchange(packet(request), (_due(request),), lane=NODE))
+        bus.run(Request(packet(request), (_due(request),), lane=NODE))
         _, *arrived = trace
         frames = tuple((one.data.id, one.data.data) for one in arrived if isinstance(one.data, CanFrame))
         cases.append(SdoCase(request, (frames,), AS_RECORDED))

@@ -11,7 +11,8 @@ from functools import cache
 from random import Random
 from typing import Final
 
-from motorbus.core.operation import Exchange, Expected
+from motorbus.core import request as core_request
+from motorbus.core.request import Expected
 from motorbus.families.feetech import FAMILY, wire
 from motorbus.families.feetech.simulator import MODELS
 from motorbus.families.feetech.table import CONTROL, TABLES
@@ -37,7 +38,7 @@ def _session(name: str) -> Iterator[Case]:
     exclude_echo(bus)
     trace = bus.trace.subscribe()
     for request in _requests(name):
-        exchange: Exchange[object] = Exchange(
+        exchange: core_request.Request[object] = core_request.Request(
             request.packet(), tuple(Expected(node, node, length) for node, length in request.due())
         )
         bus.run(exchange)

@@ -13,7 +13,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from motorbus.core.entry import Entry, Storage
+from motorbus.core import register as core_register
+from motorbus.core.register import Storage
 from motorbus.families.feetech.table import CONTROL, TABLES
 from tests.interop.feetech.steps import Call, Held, Raised, Step, Through
 from tests.interop.feetech.twin import Kind
@@ -241,7 +242,7 @@ def ours(register: Register) -> str:
     return OURS.get(register.name, register.name)
 
 
-def row_at(register: Register, kind: Kind) -> Entry | None:
+def row_at(register: Register, kind: Kind) -> core_register.Register | None:
     """The row of our table that covers its address, whatever its name."""
     rows = TABLES[kind.map].values()
     return next((row for row in rows if row.address <= register.address < row.address + row.size), None)
@@ -264,7 +265,7 @@ def differences(register: Register, kind: Kind) -> list[str]:
     return found + _signs(register, row)
 
 
-def _signs(register: Register, row: Entry) -> list[str]:
+def _signs(register: Register, row: core_register.Register) -> list[str]:
     if row.sign_bit is None or row.low >= 0 or register.sign_bit == row.sign_bit:
         return []
     return [{"unsigned": "unsigned", "twos_complement": "twos-complement"}.get(register.encoding, "sign-bit")]

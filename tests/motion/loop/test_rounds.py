@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Data
 from motorbus.errors import Interrupted, LimitExceeded, LinkLost, MotorbusError, NoReply, RequestError
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.loop.faces import Loop

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import Quality
-from motorbus.core.operation import CanFrame
 from motorbus.errors import NoReply
 from motorbus.motion.loop.faces import Loop
 from motorbus.motion.loop.place import STALE

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motorbus.core.operation import Procedure
+from motorbus.core.steps import Procedure
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.motion.machine import AxisSpec
 from motorbus.motion.moving.along import Led, Paced, judged

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Data, Progress
+from motorbus.core.request import Data
+from motorbus.core.steps import Progress
 from motorbus.errors import Interrupted
 from motorbus.link.base import Delivery, Side
 from motorbus.motion.moving.stream import HELD_UP

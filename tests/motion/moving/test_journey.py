@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Progress
+from motorbus.core.steps import Progress
 from motorbus.errors import Interrupted, LinkLost, NoReply, RequestError, Stalled
 from motorbus.session.robot import AsyncRobot, Robot
 from motorbus.simulation.named import Simulation

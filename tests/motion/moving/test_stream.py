@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Data, Progress
+from motorbus.core.request import Data
+from motorbus.core.steps import Progress
 from motorbus.errors import Interrupted, LimitExceeded, NoReply, RequestError, Stalled
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.moving.stream import SETTLE, Fate, Grid, grains, rate_for

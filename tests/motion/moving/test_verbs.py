@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import Progress
+from motorbus.core.steps import Progress
 from motorbus.errors import LimitExceeded, NotHomed, RequestError
 from motorbus.motion.moving.verbs import Crisp
 from motorbus.motion.profile import Limiting, Limits, Move, synchronised

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from motorbus.core.entry import Access, Coding, Entry, Storage
-from motorbus.core.operation import Effect
+from motorbus.core.register import Access, Coding, Register, Storage
+from motorbus.core.request import Effect
 from motorbus.errors import RequestError
 from motorbus.families.feetech.table import ALARM_BITS, STS
 from tests.families.feetech.maps import spread
@@ -212,9 +212,9 @@ def test_where_sources_disagree_the_row_says_so() -> None:
 # --- signs --------------------------------------------------------------------------------------------------
 
 
-def signed(bit: int, size: int) -> Entry:
+def signed(bit: int, size: int) -> Register:
     most = (1 << bit) - 1
-    return Entry(
+    return Register(
         name=f"sm{bit}",
         address=0,
         size=size,
@@ -233,7 +233,7 @@ SIGNED = [signed(15, 2), signed(11, 2), signed(10, 2), signed(7, 1)]
 
 @pytest.mark.parametrize("row", SIGNED, ids=lambda row: row.name)
 @given(data=st.data())
-def test_every_signed_number_comes_back(row: Entry, data: st.DataObject) -> None:
+def test_every_signed_number_comes_back(row: Register, data: st.DataObject) -> None:
     raw = data.draw(st.integers(row.low, row.high))
     coded = row.encode(raw)
     bit = row.sign_bit or 0
@@ -243,19 +243,19 @@ def test_every_signed_number_comes_back(row: Entry, data: st.DataObject) -> None
 
 @pytest.mark.parametrize("row", SIGNED, ids=lambda row: row.name)
 @given(raw=st.integers(-(1 << 20), 1 << 20))
-def test_a_magnitude_that_would_spill_into_the_sign_is_refused(row: Entry, raw: int) -> None:
+def test_a_magnitude_that_would_spill_into_the_sign_is_refused(row: Register, raw: int) -> None:
     assume(not row.low <= raw <= row.high)
     with pytest.raises(RequestError, match="out of range"):
         row.encode(raw)
 
 
 @pytest.mark.parametrize("row", SIGNED, ids=lambda row: row.name)
-def test_a_negative_zero_is_zero(row: Entry) -> None:
+def test_a_negative_zero_is_zero(row: Register) -> None:
     assert row.decode((1 << (row.sign_bit or 0)).to_bytes(row.size, "little")) == 0
 
 
 @pytest.mark.parametrize("row", STS.values(), ids=lambda row: row.name)
-def test_every_row_brings_its_raw_values_back(row: Entry) -> None:
+def test_every_row_brings_its_raw_values_back(row: Register) -> None:
     for raw in spread(row):
         coded = row.encode(raw)
         assert len(coded) == row.size

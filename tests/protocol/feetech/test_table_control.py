@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.core.entry import Storage
+from motorbus.core.register import Storage
 from motorbus.families.feetech.table import CONTROL, TABLES, Middle, Mode, mode_of
 
 

@@ -10,8 +10,8 @@ from itertools import pairwise
 
 import pytest
 
-from motorbus.core.entry import Access, Coding, Entry, Storage, Table
-from motorbus.core.operation import Effect
+from motorbus.core.register import Access, Coding, Register, RegisterMap, Storage
+from motorbus.core.request import Effect
 from motorbus.families.feetech.table import HLS, SCS, SCS2, SMBL, SMCL, STS, TABLES
 from tests.families.feetech.maps import spread
 from tests.protocol.feetech.typed_rows import COMMON, IN_DOUBT, ROWS
@@ -46,7 +46,7 @@ def typed(register_map: str) -> list[str]:
     return sorted((line for line in lines if line), key=lambda line: int(line.split()[0]))
 
 
-def told(row: Entry) -> str:
+def told(row: Register) -> str:
     storage = {Storage.EEPROM: "E", Storage.RAM: "S", Storage.FACTORY: "F"}[row.storage]
     sign = "-" if row.sign_bit is None else row.sign_bit
     return f"{row.address} {row.name} {row.size} {storage} {row.access.value} {sign} {row.low} {row.high}"
@@ -62,7 +62,7 @@ def test_there_are_six_maps_and_the_usual_one_comes_first() -> None:
 
 
 @OF_EACH
-def test_the_map_has_these_rows_and_no_others(table: Table) -> None:
+def test_the_map_has_these_rows_and_no_others(table: RegisterMap) -> None:
     assert [told(row) for row in table.values()] == typed(table.name)
 
 
@@ -103,14 +103,14 @@ def test_the_address_of_the_lock_is_another_thing_in_half_of_the_maps() -> None:
 
 
 @OF_EACH
-def test_rows_do_not_overlap_and_have_one_or_two_bytes(table: Table) -> None:
+def test_rows_do_not_overlap_and_have_one_or_two_bytes(table: RegisterMap) -> None:
     assert {row.size for row in table.values()} == {1, 2}
     for before, after in pairwise(table.values()):
         assert before.address + before.size <= after.address
 
 
 @OF_EACH
-def test_eeprom_lies_below_40_ram_below_77_and_the_rest_is_the_makers(table: Table) -> None:
+def test_eeprom_lies_below_40_ram_below_77_and_the_rest_is_the_makers(table: RegisterMap) -> None:
     for row in table.values():
         expected = (
             Storage.EEPROM if row.address < 40 else Storage.RAM if row.address < 77 else Storage.FACTORY
@@ -119,12 +119,12 @@ def test_eeprom_lies_below_40_ram_below_77_and_the_rest_is_the_makers(table: Tab
 
 
 @OF_EACH
-def test_one_byte_order_holds_for_all_rows(table: Table) -> None:
+def test_one_byte_order_holds_for_all_rows(table: RegisterMap) -> None:
     assert {row.order for row in table.values()} == {"big" if table.name in ("scs", "scs2") else "little"}
 
 
 @OF_EACH
-def test_defaults_and_choices_are_in_range(table: Table) -> None:
+def test_defaults_and_choices_are_in_range(table: RegisterMap) -> None:
     for row in table.values():
         assert row.default is None or row.low <= row.default <= row.high, row.name
         assert all(row.low <= choice <= row.high for choice in row.choices), row.name
@@ -132,7 +132,7 @@ def test_defaults_and_choices_are_in_range(table: Table) -> None:
 
 
 @OF_EACH
-def test_what_must_not_be_copied_between_servos_is_protected(table: Table) -> None:
+def test_what_must_not_be_copied_between_servos_is_protected(table: RegisterMap) -> None:
     protected = {row.name for row in table.values() if row.protected}
     own = {"id", "baud_rate", "phase", "homing_offset", "second_id"} & set(table)
     assert protected == own | {
@@ -141,7 +141,7 @@ def test_what_must_not_be_copied_between_servos_is_protected(table: Table) -> No
 
 
 @OF_EACH
-def test_every_write_says_the_worst_it_can_do(table: Table) -> None:
+def test_every_write_says_the_worst_it_can_do(table: RegisterMap) -> None:
     moving = {
         *("goal_position", "goal_time", "goal_velocity", "goal_torque", "operating_mode", "homing_offset"),
         *("angular_resolution", "phase", "control_loop"),
@@ -161,7 +161,7 @@ def test_every_write_says_the_worst_it_can_do(table: Table) -> None:
 
 
 @OF_EACH
-def test_every_row_says_where_it_is_from_and_not_from_a_table_of_another_series(table: Table) -> None:
+def test_every_row_says_where_it_is_from_and_not_from_a_table_of_another_series(table: RegisterMap) -> None:
     for row in table.values():
         assert len(row.source) > 10
         assert table is STS or "STS3215 memory table" not in row.source, row.name
@@ -169,12 +169,12 @@ def test_every_row_says_where_it_is_from_and_not_from_a_table_of_another_series(
 
 
 @OF_EACH
-def test_what_is_in_doubt_is_marked_and_nothing_else_is(table: Table) -> None:
+def test_what_is_in_doubt_is_marked_and_nothing_else_is(table: RegisterMap) -> None:
     assert {row.address for row in table.values() if row.conflict} == set(IN_DOUBT[table.name])
 
 
 @OF_EACH
-def test_a_mark_says_who_says_what_and_what_was_chosen(table: Table) -> None:
+def test_a_mark_says_who_says_what_and_what_was_chosen(table: RegisterMap) -> None:
     for row in table.values():
         if row.conflict:
             said, chosen, what = row.conflict.partition(" Chosen: ")
@@ -198,7 +198,7 @@ WHO = (
 
 
 @OF_EACH
-def test_a_note_without_a_mark_never_names_two_who_disagree(table: Table) -> None:
+def test_a_note_without_a_mark_never_names_two_who_disagree(table: RegisterMap) -> None:
     for row in table.values():
         assert "chosen" not in row.note.lower(), row.name
         assert sum(who in row.note for who in WHO) < 2, row.name
@@ -208,7 +208,7 @@ def test_a_note_without_a_mark_never_names_two_who_disagree(table: Table) -> Non
 
 
 @OF_EACH
-def test_every_row_brings_its_raw_values_back(table: Table) -> None:
+def test_every_row_brings_its_raw_values_back(table: RegisterMap) -> None:
     for row in table.values():
         for raw in spread(row):
             coded = row.encode(raw)
@@ -235,7 +235,7 @@ def test_signed_rows_are_sign_magnitude_and_no_others_are() -> None:
 
 
 @OF_EACH
-def test_notes_speak_only_of_registers_that_the_map_has(table: Table) -> None:
+def test_notes_speak_only_of_registers_that_the_map_has(table: RegisterMap) -> None:
     every = {row.name for other in TABLES.values() for row in other.values()}
     for row in table.values():
         named = {word.strip(".,:;()") for word in f"{row.note} {row.conflict}".split()} & every - {

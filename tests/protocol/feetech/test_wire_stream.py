@@ -15,8 +15,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import Receiver
-from motorbus.core.operation import CanFrame, Noise, Reply
+from motorbus.core.request import Noise, Reply
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.wire import stream
 from tests.protocol.feetech.vectors import REPLIES, name_of

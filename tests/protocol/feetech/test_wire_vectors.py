@@ -7,7 +7,7 @@ from itertools import product
 
 import pytest
 
-from motorbus.core.operation import Noise, Reply
+from motorbus.core.request import Noise, Reply
 from motorbus.errors import ChecksumError, RequestError
 from motorbus.families.feetech import wire
 from tests.protocol.feetech.vectors import (

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import Explanation
-from motorbus.core.operation import CanFrame
 from motorbus.families.kst import wire
 from motorbus.families.kst.explain import explain
 from motorbus.families.kst.table import PROFILES

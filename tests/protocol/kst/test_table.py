@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.entry import Access, Coding, Entry, Storage
-from motorbus.core.operation import Effect
+from motorbus.core.register import Access, Coding, Register, Storage
+from motorbus.core.request import Effect
 from motorbus.core.units import parse
 from motorbus.errors import RequestError
 from motorbus.families.kst.table import (
@@ -84,7 +84,7 @@ every_profile = pytest.mark.parametrize("profile", PROFILES.values(), ids=list(P
 with_status = pytest.mark.parametrize("name", ["kst-ext", "kingmax", "xqpower"])
 
 
-def rows() -> Iterator[Entry]:
+def rows() -> Iterator[Register]:
     for table in TABLES.values():
         yield from table.values()
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame
+from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
 from motorbus.errors import RequestError
 from motorbus.families.kst import wire
 
@@ -33,7 +33,7 @@ FRAMES = st.builds(
 def test_an_upload_comes_out_as_it_went_in(node: int, index: int, subindex: int, extended: bool) -> None:
     frame = wire.encode_upload(node, index, subindex, extended=extended)
     assert len(frame.data) == wire.LENGTH
-    expected = wire.Request(node, "upload", index, subindex, b"", False, 0, extended)
+    expected = wire.SdoRequest(node, "upload", index, subindex, b"", False, 0, extended)
     assert wire.decode_request(frame) == expected
 
 
@@ -43,21 +43,21 @@ def test_a_download_comes_out_as_it_went_in(
 ) -> None:
     frame = wire.encode_download(node, index, subindex, data, sized=sized, extended=extended)
     whole = data if sized else data.ljust(4, b"\0")
-    expected = wire.Request(node, "download", index, subindex, whole, sized, 0, extended)
+    expected = wire.SdoRequest(node, "download", index, subindex, whole, sized, 0, extended)
     assert wire.decode_request(frame) == expected
 
 
 @given(NODES, TOGGLES, st.booleans())
 def test_a_wish_for_a_segment_comes_out_as_it_went_in(node: int, toggle: int, extended: bool) -> None:
     frame = wire.encode_segment(node, toggle, extended=extended)
-    assert wire.decode_request(frame) == wire.Request(node, "segment", 0, 0, b"", False, toggle, extended)
+    assert wire.decode_request(frame) == wire.SdoRequest(node, "segment", 0, 0, b"", False, toggle, extended)
 
 
 @given(NODES, INDEXES, SUBINDEXES, st.integers(0, 0xFFFF_FFFF))
 def test_an_abort_comes_out_as_it_went_in(node: int, index: int, subindex: int, code: int) -> None:
     ours = wire.decode_request(wire.encode_abort(node, index, subindex, code))
     wired = code.to_bytes(4, "little")
-    assert ours == wire.Request(node, "abort", index, subindex, wired, False, 0, False)
+    assert ours == wire.SdoRequest(node, "abort", index, subindex, wired, False, 0, False)
     theirs = wire.encode_abort_reply(node, index, subindex, code)
     assert wire.decode_reply(theirs.data) == wire.SdoReply("abort", index, subindex, code=code)
 

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Notification
+from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
+from motorbus.core.request import Notification
 from motorbus.errors import RequestError
 from motorbus.families.kst import wire
 

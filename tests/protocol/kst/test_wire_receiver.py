@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Event, Noise, Notification, Reply
+from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
+from motorbus.core.request import Event, Noise, Notification, Reply
 from motorbus.families.kst import wire
 from tests.protocol.kst.test_wire import FRAMES, NODES
 

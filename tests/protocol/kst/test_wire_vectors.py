@@ -6,7 +6,8 @@ from collections import Counter
 
 import pytest
 
-from motorbus.core.operation import CanFrame, Noise, Notification, Reply
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Noise, Notification, Reply
 from motorbus.families.kst import wire
 from tests.protocol.kst.vectors import (
     ALL,

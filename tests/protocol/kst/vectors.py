@@ -11,7 +11,7 @@ import json
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from motorbus.core.operation import CanFrame
+from motorbus.core.can_frame import CanFrame
 
 FOLDER = Path(__file__).parent.parent.parent / "vectors" / "kst"
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.entry import Access, Storage
-from motorbus.core.operation import Effect, TimeoutClass
+from motorbus.core.register import Access, Storage
+from motorbus.core.request import Effect, TimeoutClass
 from motorbus.core.units import QUANTITIES
 from motorbus.errors import RequestError
 from motorbus.families.stepper import table, wire

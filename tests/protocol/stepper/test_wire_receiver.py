@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.operation import CanFrame, Event, Noise, Notification, Reply
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Event, Noise, Notification, Reply
 from motorbus.families.stepper import wire
 from tests.protocol.stepper.vectors import DUMP_B, REPLIES, behaviour
 

@@ -7,7 +7,7 @@ from hashlib import sha256
 
 import pytest
 
-from motorbus.core.operation import Noise, Notification, Reply
+from motorbus.core.request import Noise, Notification, Reply
 from motorbus.families.stepper import wire
 from tests.protocol.stepper.vectors import (
     ALL,

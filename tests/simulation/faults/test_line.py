@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Data
 from motorbus.errors import RequestError
 from motorbus.link.base import Delivery, Side
 from motorbus.simulation.faults import WORDS, Fault, FaultyLine, Script

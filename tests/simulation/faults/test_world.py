@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from motorbus import families
-from motorbus.core.operation import CanFrame
+from motorbus.core.can_frame import CanFrame
 from motorbus.errors import LinkLost, RequestError
 from motorbus.families.stepper.wire import encode
 from motorbus.link.base import Side

@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from motorbus.core.operation import CanFrame
+from motorbus.core.can_frame import CanFrame
 from motorbus.errors import RequestError
 from motorbus.families.feetech.simulator import simulate
 from tests.simulators.feetech.host import (

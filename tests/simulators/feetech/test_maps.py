@@ -7,7 +7,7 @@ from itertools import product
 
 import pytest
 
-from motorbus.core.entry import Entry, Storage
+from motorbus.core.register import Register, Storage
 from motorbus.families.feetech.simulator.feedback import FEEDBACK
 from motorbus.families.feetech.table import TABLES, alarms
 from tests.simulators.feetech.host import ALL, READ, WRITE, Host, packet
@@ -24,13 +24,13 @@ def host_of(name: str, **options: object) -> Host:
     return Host((1,), USUAL[name], **options)
 
 
-def other_value(row: Entry, now: int) -> int:
+def other_value(row: Register, now: int) -> int:
     """A value the row allows and does not have."""
     wanted = row.high if now != row.high else row.low
     return 1 if row.name == "torque_enable" else wanted
 
 
-def raw(host: Host, row: Entry) -> int:
+def raw(host: Host, row: Register) -> int:
     (reply,) = host.say(packet(1, READ, row.address, row.size))
     return row.decode(bytes.fromhex(reply)[5:-1])
 
@@ -41,7 +41,7 @@ def test_there_is_a_model_for_each_map() -> None:
     }
 
 
-def settable(row: Entry) -> bool:
+def settable(row: Register) -> bool:
     return row.writable or row.name == "max_acceleration"  # lerobot writes it
 
 

@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from motorbus.core.entry import Coding, Storage
+from motorbus.core.register import Coding, Storage
 from motorbus.families.feetech.simulator.flash import Commit, Flash
 from motorbus.families.feetech.simulator.memory import Layout, Memory, Written, code
 from motorbus.families.feetech.table import STS, TABLES

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.core.entry import Storage
+from motorbus.core.register import Storage
 from motorbus.errors import RequestError
 from motorbus.families.feetech.simulator import simulate
 from motorbus.families.feetech.simulator.model import MODELS, model, models

@@ -5,7 +5,7 @@ Frames are text, as candump writes them: identifier (3 digits, or 8 for 29 bits)
 
 from __future__ import annotations
 
-from motorbus.core.operation import CanFrame
+from motorbus.core.can_frame import CanFrame
 from motorbus.families.kst.simulator import KstBus, Servo, simulate
 
 ERROR = "20000088#0000000000000000"

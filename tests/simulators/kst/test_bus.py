@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.core.frame import Audience
-from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Data
+from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, Audience, CanFrame
+from motorbus.core.request import Data
 from motorbus.errors import RequestError
 from motorbus.families.kst.simulator import simulate
 from tests.simulators.kst.host import ERROR, Host

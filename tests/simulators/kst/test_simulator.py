@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.operation import CanFrame
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.switches import options as options_of
 from motorbus.errors import RequestError
 from motorbus.families.kst.simulator import OPTIONS, KstBus, simulate

@@ -7,7 +7,7 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motorbus.core.operation import Noise, Reply
+from motorbus.core.request import Noise, Reply
 from motorbus.core.switches import options as options_of
 from motorbus.families.stepper import table, wire
 from motorbus.families.stepper.execution import Phase

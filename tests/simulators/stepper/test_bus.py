@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.core.operation import CanFrame
+from motorbus.core.can_frame import CanFrame
 from motorbus.errors import RequestError
 from motorbus.families.stepper.simulator import Change, simulate
 from motorbus.link.memory import MemoryLink

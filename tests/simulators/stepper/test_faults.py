@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.core.operation import Noise, Reply
+from motorbus.core.request import Noise, Reply
 from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.simulator import Switches

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from typing import Any, NamedTuple
 
-from motorbus.core.operation import Exchange, Expected, Reply, Response, TimeoutClass
+from motorbus.core.request import Expected, Reply, Request, Response, TimeoutClass
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import Servo, wire
 from motorbus.families.feetech.driver.exchanges import (
@@ -48,7 +48,7 @@ def reading(count: int) -> Kind:
         raw = rig.stir()
         memory = rig.servos[1].memory
         block = read_block(Servo(rig.bus, 1), 56, count, bytes)
-        plain: Exchange[Response] = Exchange(block.request, block.replies, repeatable=True)
+        plain: Request[Response] = Request(block.wire, block.expected, repeatable=True)
         told = rig.bus.run(plain).replies[0].data
         assert told[4] == 0, "an alarm that nobody has"
         assert told[5:-1] == (rig.code(raw) + memory.read(58, FEEDBACK)[: max(0, count - 2)])[:count]
@@ -56,7 +56,7 @@ def reading(count: int) -> Kind:
     return Kind(act, 8, 6 + count)
 
 
-def _written(rig: Rig, exchange: Exchange[Any], held: Callable[[], object], new: object) -> None:
+def _written(rig: Rig, exchange: Request[Any], held: Callable[[], object], new: object) -> None:
     others = {id: bytes(servo.memory.live) for id, servo in rig.servos.items() if id not in GROUP}
     old = held()
     try:
@@ -132,7 +132,7 @@ def sync_read(rig: Rig) -> None:
     """A node may be missing; one that is there is right."""
     raw = rig.stir()
     dues = tuple(Expected(node, node, 8) for node in GROUP)
-    answer: Response = rig.bus.run(Exchange[Response](wire.sync_read(56, 2, GROUP), dues, repeatable=True))
+    answer: Response = rig.bus.run(Request[Response](wire.sync_read(56, 2, GROUP), dues, repeatable=True))
     told = {reply.data[2]: reply.data[5:7] for reply in answer.replies}
     assert told == dict.fromkeys(set(GROUP) - set(answer.missing), rig.code(raw))
 
@@ -200,14 +200,14 @@ def _switches(rig: Rig) -> dict[int, int]:
 def limp(rig: Rig) -> None:
     """What an emergency stop says to each by its name."""
     memory = rig.servos[1].memory
-    exchange = stop({1: None}).exchanges[1]
+    exchange = stop({1: None}).requests[1]
     _written(rig, exchange, lambda: memory.live[TORQUE], 0)
 
 
 def limp_unanswered(number: int, whom: Collection[int]) -> Kind:
     """What it says to many at once: nobody answers, so they are all let go, or have not heard it."""
-    exchange = (stop({}) if len(whom) == len(IDS) else stop(dict.fromkeys(whom), hold=(4,))).exchanges[number]
-    assert isinstance(exchange.request, bytes)
+    exchange = (stop({}) if len(whom) == len(IDS) else stop(dict.fromkeys(whom), hold=(4,))).requests[number]
+    assert isinstance(exchange.wire, bytes)
 
     def act(rig: Rig) -> None:
         before = _switches(rig)
@@ -216,7 +216,7 @@ def limp_unanswered(number: int, whom: Collection[int]) -> Kind:
         after = {id: 0 if id in whom else torque for id, torque in before.items()}
         assert _switches(rig) in (before, after), "somebody else has obeyed, or only some"
 
-    return Kind(act, len(exchange.request), 0, _stiff)
+    return Kind(act, len(exchange.wire), 0, _stiff)
 
 
 def ask_to_hold(rig: Rig) -> None:
@@ -235,7 +235,7 @@ def hold(rig: Rig) -> None:
     raw, memory = rig.stir(), rig.servos[1].memory
     told = Reply(1, 1, wire.encode_status(1, 0, _image(rig, raw)))
     (exchange,) = holds({1: Response((told,), (), rig.link.now())}, (1,))
-    assert exchange.request == wire.write(1, GOAL, rig.code(raw))
+    assert exchange.wire == wire.write(1, GOAL, rig.code(raw))
     _written(rig, exchange, lambda: memory.read(GOAL, 2), rig.code(raw))
 
 

@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from motorbus.core.entry import changed
-from motorbus.core.operation import Response, Runnable
+from motorbus.core.register import changed
+from motorbus.core.request import Response
+from motorbus.core.steps import Runnable
 from motorbus.errors import DeviceError, MotorbusError, NoReply
 from motorbus.families.kst import (
     FAMILY,
@@ -223,9 +224,9 @@ def broadcast_saving(rig: KstRig) -> None:
 def stopping(rig: KstRig) -> None:
     """What an emergency stop says to a servo: where are you, and stay there. Success means that this is its target."""
     raw = rig.stir()
-    (ask,) = stop({NODE: None}, rig.dialect).exchanges
+    (ask,) = stop({NODE: None}, rig.dialect).requests
     answer: Response = rig.run(ask)
-    (hold,) = stop({NODE: answer}, rig.dialect).exchanges
+    (hold,) = stop({NODE: answer}, rig.dialect).requests
     _written(rig, lambda: rig.run(hold), "goal_position", raw)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from motorbus.core.operation import Exchange, Expected, Response
+from motorbus.core.request import Expected, Request, Response
 from motorbus.families.feetech import FAMILY, wire
 from motorbus.families.feetech.simulator import FeetechBus
 from motorbus.link.base import Line, PerfectLine
@@ -53,6 +53,6 @@ class Rig:
 
 
 def ping(rig: Rig) -> None:
-    exchange: Exchange[Response] = Exchange(wire.ping(1), (Expected(1, 1, 6),), repeatable=True)
-    answer = rig.bus.run(exchange)
+    request: Request[Response] = Request(wire.ping(1), (Expected(1, 1, 6),), repeatable=True)
+    answer = rig.bus.run(request)
     assert answer.replies[0].data == wire.encode_status(1, 0)

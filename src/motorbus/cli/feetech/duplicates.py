@@ -8,7 +8,7 @@ from motorbus.cli.exits import Exit
 from motorbus.cli.feetech.orders import app
 from motorbus.cli.feetech.servo import BusOption, Device, on_servo
 from motorbus.cli.parameters import Silent
-from motorbus.core.operation import Progress
+from motorbus.core.steps import Progress
 from motorbus.families.feetech import driver
 from motorbus.families.feetech.driver.sharing import POLLS
 

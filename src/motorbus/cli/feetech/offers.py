@@ -9,7 +9,7 @@ from motorbus.families.feetech import driver
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from motorbus.core.entry import Value
+    from motorbus.core.register import Value
 
 
 def say(event: object) -> str:

@@ -16,7 +16,7 @@ from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.output import Output
 from motorbus.cli.parameters import DryRun, Flag
 from motorbus.cli.target import Target, check_names, device, face, opened, table_of, target
-from motorbus.core.operation import Sleep
+from motorbus.core.steps import Sleep
 from motorbus.errors import RequestError
 from motorbus.families.feetech import driver
 

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 from motorbus.cli.exits import Exit
 from motorbus.cli.feetech.orders import Silent, app
-from motorbus.core.entry import Coding
+from motorbus.core.register import Coding
 from motorbus.errors import RequestError
 from motorbus.families.feetech.table import MODELS, TABLES, model_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from motorbus.core.entry import Entry, Table
+    from motorbus.core.register import Register, RegisterMap
     from motorbus.families.feetech.table import Model
 
 _COLUMNS = (
@@ -75,18 +75,18 @@ def models(*, output: Silent) -> Exit:
     return Exit.OK
 
 
-def database(tables: list[Table]) -> dict[str, Any]:
+def database(tables: list[RegisterMap]) -> dict[str, Any]:
     """These maps as plain data: everything that their rows say."""
     return {"maps": [_map(table) for table in tables]}
 
 
-def _table(name: str) -> Table:
+def _table(name: str) -> RegisterMap:
     if name.lower() not in TABLES:
         raise RequestError(f"there is no register map {name!r}", expected=f"one of {', '.join(TABLES)}")
     return TABLES[name.lower()]
 
 
-def _map(table: Table) -> dict[str, Any]:
+def _map(table: RegisterMap) -> dict[str, Any]:
     (order,) = {row.order for row in table.values()}
     return {
         "name": table.name,
@@ -96,7 +96,7 @@ def _map(table: Table) -> dict[str, Any]:
     }
 
 
-def _facts(row: Entry) -> dict[str, Any]:
+def _facts(row: Register) -> dict[str, Any]:
     return {
         "name": row.name,
         "address": row.address,
@@ -120,7 +120,7 @@ def _facts(row: Entry) -> dict[str, Any]:
     }
 
 
-def _cells(row: Entry) -> list[object]:
+def _cells(row: Register) -> list[object]:
     sign = f"bit {row.sign_bit}" if row.coding is Coding.SIGN_MAGNITUDE else ""
     unit = f"{row.scale:.6g} {row.unit}" if row.unit else ""
     effect = row.effect.name.lower() if row.writable else ""
@@ -138,7 +138,7 @@ def _cells(row: Entry) -> list[object]:
     ]
 
 
-def meanings(row: Entry) -> Iterator[str]:
+def meanings(row: Register) -> Iterator[str]:
     """What single values and single bits of a row mean, and that it may not be copied between servos."""
     yield from (f"{value} {meaning}" for value, meaning in row.choices.items())
     yield from (f"bit {bit} {meaning}" for bit, meaning in row.bits.items())

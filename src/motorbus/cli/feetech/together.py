@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from motorbus.cli.several import carried_out, or_all_stop
-from motorbus.core.operation import ANY, Exchange, Gather, Priority, Response
+from motorbus.core.request import ANY, Priority, Request, Response
+from motorbus.core.steps import gather
 from motorbus.families.feetech import driver, wire
 from motorbus.families.feetech.driver.arrival import arrive
 from motorbus.families.feetech.driver.bound import ask_bound
@@ -68,7 +69,7 @@ async def _gone(servos: Sequence[driver.Servo], blocks: Sequence[Any], orders: S
     for servo, order in zip(servos, orders, strict=True):
         assert servo.table is not None
         arrivals.append(or_all_stop(arrive(servo, servo.table, order)))
-    await Gather(arrivals)
+    await gather(*arrivals)
 
 
 def ping_everyone(bus: Bus) -> list[int]:
@@ -79,4 +80,4 @@ def ping_everyone(bus: Bus) -> list[int]:
     def read(answer: Response) -> list[int]:
         return sorted({reply.data[2] for reply in answer.replies})
 
-    return bus.run(Exchange(request, ANY, read, rank=Priority.POLL))
+    return bus.run(Request(request, ANY, read, priority=Priority.POLL))

@@ -13,7 +13,7 @@ from motorbus.cli.feetech.servo import BusOption, Device, assigned, facts, on_se
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.target import table_of
 from motorbus.core import units
-from motorbus.core.entry import Storage
+from motorbus.core.register import Storage
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.tuning import GAINS, PROTECTION, limiting
 from motorbus.families.feetech.table import STS

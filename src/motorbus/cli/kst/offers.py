@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from motorbus.bus.blocking import Bus
-    from motorbus.core.entry import Entry
+    from motorbus.core.can_frame import CanFrame
     from motorbus.core.family import Family
-    from motorbus.core.operation import CanFrame
+    from motorbus.core.register import Register
 
 COMMANDS: Final = {
     "set_node_id()": "`motorbus kst node-id BUS#ID NEW`",
@@ -87,7 +87,7 @@ def report_frames(family: Family, node: int) -> list[CanFrame]:
     ]
 
 
-def meaning(row: Entry, raw: int) -> str:
+def meaning(row: Register, raw: int) -> str:
     """A version is text, a status current and temperature; everything else as its row says."""
     if row.name in VERSIONS:
         return text(row, raw)

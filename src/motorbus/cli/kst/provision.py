@@ -18,7 +18,7 @@ from motorbus.cli.kst.servo import BusOption, Device, app, named, one_of_ours
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.target import face, opened
 from motorbus.core import units
-from motorbus.core.operation import Progress
+from motorbus.core.steps import Progress
 from motorbus.errors import RequestError
 from motorbus.families.kst import driver
 

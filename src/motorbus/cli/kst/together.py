@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from motorbus.cli.several import carried_out, or_all_stop
 from motorbus.core.interrupted import Moving, stopped_if_interrupted
-from motorbus.core.operation import Gather
+from motorbus.core.steps import gather
 from motorbus.families.kst import driver
 from motorbus.families.kst.driver.arrival import Move, arrive
 from motorbus.families.kst.driver.motion import TOLERANCE, counts, goal_of, send_goal
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from motorbus.bus.blocking import Bus
     from motorbus.cli.dry import DryBus
-    from motorbus.core.operation import Goal
+    from motorbus.core.setpoint import Setpoint
 
 
 def move_together(bus: Bus | DryBus, goals: Mapping[int, float], *, wait: bool = True) -> None:
@@ -40,14 +40,14 @@ async def _move_together(servos: Sequence[driver.Servo], to: Sequence[float], wa
     await stopped_if_interrupted(_gone(servos, goals), *devices)
 
 
-async def _gone(servos: Sequence[driver.Servo], goals: Sequence[Goal]) -> None:
+async def _gone(servos: Sequence[driver.Servo], goals: Sequence[Setpoint]) -> None:
     await send_goal(servos[0], goals[0])
     await or_all_stop(_sent(servos[1:], goals[1:]))
     moves = [Move(goal.value, TOLERANCE, None) for goal in goals]
     pairs = zip(servos, moves, strict=True)
-    await Gather([or_all_stop(arrive(servo, move)) for servo, move in pairs])
+    await gather(*[or_all_stop(arrive(servo, move)) for servo, move in pairs])
 
 
-async def _sent(servos: Sequence[driver.Servo], goals: Sequence[Goal]) -> None:
+async def _sent(servos: Sequence[driver.Servo], goals: Sequence[Setpoint]) -> None:
     for servo, goal in zip(servos, goals, strict=True):
         await send_goal(servo, goal)

@@ -16,7 +16,7 @@ from motorbus.cli.stepper.events import say
 from motorbus.cli.stepper.files import NAME
 from motorbus.cli.target import face, opened, target
 from motorbus.cli.wording import in_words_of_the_shell
-from motorbus.core.operation import Exclusive, Progress, discard
+from motorbus.core.steps import Exclusive, Progress, discard
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.stepper import FAMILY, Controller
 from motorbus.families.stepper.driver import Node
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Output
-    from motorbus.core.operation import Runnable
+    from motorbus.core.steps import Runnable
 
 T = TypeVar("T")
 

@@ -10,7 +10,7 @@ from motorbus.errors import RequestError
 from motorbus.families.stepper.table import PARAMETERS, allowed
 
 if TYPE_CHECKING:
-    from motorbus.core.entry import Entry
+    from motorbus.core.register import Register
 
 SWITCH: Final = {"on": 1, "off": 0}
 _NEAR: Final = 1e-6
@@ -45,7 +45,7 @@ def expected(name: str) -> str:
     return allowed(name) + (f"; or {', '.join(words)}" if words else "")
 
 
-def _counted(row: Entry, text: str) -> int:
+def _counted(row: Register, text: str) -> int:
     exact = units.parse(text, units.QUANTITIES[row.unit]) / row.scale
     if abs(exact - round(exact)) > _NEAR:
         raise RequestError(

@@ -25,7 +25,7 @@ from motorbus.families.stepper.driver import Node, commands, reading
 from motorbus.families.stepper.table import check
 
 if TYPE_CHECKING:
-    from motorbus.core.operation import Procedure
+    from motorbus.core.steps import Procedure
 
 
 @app.command(

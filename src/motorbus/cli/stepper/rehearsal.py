@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from motorbus.core.family import Family
-    from motorbus.core.operation import Data
+    from motorbus.core.request import Data
 
 
 def as_written(

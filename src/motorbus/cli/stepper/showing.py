@@ -10,7 +10,7 @@ from motorbus.cli.files import usable
 from motorbus.cli.plain import plain
 from motorbus.cli.stepper.runs import heard
 from motorbus.cli.target import face
-from motorbus.core.operation import Progress
+from motorbus.core.steps import Progress
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.stepper import Program
 from motorbus.families.stepper.driver import running, writing

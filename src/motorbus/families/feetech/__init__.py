@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any, Final
 
-from motorbus.core.entry import Table
 from motorbus.core.family import (
     Devices,
     Explanation,
@@ -22,7 +21,9 @@ from motorbus.core.family import (
     Simulator,
     Stop,
 )
-from motorbus.core.operation import Exchange, Procedure, Response, Runnable
+from motorbus.core.register import RegisterMap
+from motorbus.core.request import Request, Response
+from motorbus.core.steps import Procedure, Runnable
 from motorbus.errors import RequestError
 from motorbus.families.feetech import driver, wire
 from motorbus.families.feetech.driver import (
@@ -133,7 +134,7 @@ class Feetech:
     """The family of FEETECH servos; see `motorbus.core.family.Family` for each member."""
 
     name: Final = "feetech"
-    tables: Final[Mapping[str, Table]] = TABLES
+    tables: Final[Mapping[str, RegisterMap]] = TABLES
     devices: Final = Devices(Servo, AsyncServo, ASSURANCE)
 
     def __init__(self, hold: frozenset[int] = frozenset()) -> None:
@@ -175,16 +176,16 @@ class Feetech:
     def lane(self, node: int) -> int:
         return 0
 
-    def air_time(self, exchange: Exchange[Any], rate: int) -> float:
-        return line.air_time(exchange, rate)
+    def air_time(self, request: Request[Any], rate: int) -> float:
+        return line.air_time(request, rate)
 
-    def turnaround(self, exchange: Exchange[Any]) -> float:
-        return line.turnaround(exchange)
+    def turnaround(self, request: Request[Any]) -> float:
+        return line.turnaround(request)
 
     def quiet_time(self, rate: int) -> float:
         return line.quiet_time(rate)
 
-    def echo_test(self) -> Exchange[Any]:
+    def echo_test(self) -> Request[Any]:
         return line.echo_test()
 
     def explain(self, data: bytes) -> list[Explanation]:
@@ -195,7 +196,7 @@ class Feetech:
     def receiver(self) -> Receiver:
         return wire.StatusReceiver()
 
-    def probe(self, node: int, attempt: int) -> Exchange[bool]:
+    def probe(self, node: int, attempt: int) -> Request[bool]:
         return line.probe(node, attempt)
 
     def stop(self, nodes: Mapping[int, Response | None]) -> Stop:

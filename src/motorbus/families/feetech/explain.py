@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from motorbus.core.entry import Entry, Table
 from motorbus.core.family import Explanation, Part
-from motorbus.core.operation import Noise
+from motorbus.core.register import Register, RegisterMap
+from motorbus.core.request import Noise
 from motorbus.families.feetech.table import STS, TABLES, alarms, choose
 from motorbus.families.feetech.wire import (
     BROADCAST,
@@ -45,12 +45,12 @@ class _Said:
     """What was said before: the last instruction packet, what each servo still owes, and the maps of those who have
     told who they are; `usual` is the map of the others."""
 
-    usual: Table
+    usual: RegisterMap
     last: bytes = b""
     asked: dict[int, _Asked] = field(default_factory=dict)
-    maps: dict[int, Table] = field(default_factory=dict)
+    maps: dict[int, RegisterMap] = field(default_factory=dict)
 
-    def table(self, id: int) -> Table:
+    def table(self, id: int) -> RegisterMap:
         """The register map by which to name what this servo is told or tells."""
         return self.maps.get(id, self.usual)
 
@@ -61,7 +61,7 @@ class _Said:
             self.maps[id] = TABLES[chosen.table]
 
 
-def explain(data: bytes, table: Table = STS) -> list[Explanation]:
+def explain(data: bytes, table: RegisterMap = STS) -> list[Explanation]:
     """Every packet and every run of stray bytes in `data`, in order; together they hold all of its bytes.
 
     The parts of a packet cover it byte by byte, each with its place in the packet. `fault` is "" for a good
@@ -121,7 +121,7 @@ def _told(data: bytes, title: str, fifth: Part, parts: list[Part], fault: str = 
     return Explanation(data, title, (*_head(data), fifth, *parts, _sum(data)), fault)
 
 
-def _as_status(data: bytes, table: Table) -> str:
+def _as_status(data: bytes, table: RegisterMap) -> str:
     count = len(data) - 6
     carried = f" with {_bytes(count)}" if count else ""
     return f"status packet of servo {data[2]}{carried}: {_alarms(data[4], table)}"
@@ -131,7 +131,7 @@ def _as_instruction(data: bytes) -> str:
     return f"{instruction_name(data[4])} to {'everyone' if data[2] == BROADCAST else f'servo {data[2]}'}"
 
 
-def _alarms(error: int, table: Table = STS) -> str:
+def _alarms(error: int, table: RegisterMap = STS) -> str:
     return f"alarm {', '.join(alarms(error, table.name))}" if error else "no alarm"
 
 
@@ -190,7 +190,7 @@ def _parameters(id: int, code: int, parameters: bytes, said: _Said) -> list[Part
     return _data(5, parameters)
 
 
-def _span(parameters: bytes, table: Table) -> list[Part]:
+def _span(parameters: bytes, table: RegisterMap) -> list[Part]:
     address, count = parameters[:2]
     names = [row.name for row in table.values() if address <= row.address < address + count]
     covered = f": {', '.join(names)}" if names else ""
@@ -214,11 +214,11 @@ def _sync_write(parameters: bytes, said: _Said) -> list[Part]:
     return parts
 
 
-def _address(address: int, table: Table) -> Part:
+def _address(address: int, table: RegisterMap) -> Part:
     return Part(5, bytes((address,)), "address", f"register {address}, {_register(address, table)}")
 
 
-def _register(address: int, table: Table) -> str:
+def _register(address: int, table: RegisterMap) -> str:
     """The name of the register at this address, or of the one whose second byte lies there."""
     if row := table.at(address):
         return row.name
@@ -230,7 +230,7 @@ def _register(address: int, table: Table) -> str:
     )
 
 
-def _values(start: int, address: int, data: bytes, table: Table) -> list[Part]:
+def _values(start: int, address: int, data: bytes, table: RegisterMap) -> list[Part]:
     """The bytes from register `address` on, cut into registers."""
     parts: list[Part] = []
     at = 0
@@ -247,7 +247,7 @@ def _values(start: int, address: int, data: bytes, table: Table) -> list[Part]:
     return parts
 
 
-def _value(row: Entry, data: bytes) -> str:
+def _value(row: Register, data: bytes) -> str:
     raw = row.decode(data)
     if raw in row.choices:
         return f"{raw} ({row.choices[raw]})"

@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any, Final
 
-from motorbus.core.entry import Table
 from motorbus.core.family import (
     Devices,
     Explanation,
@@ -22,7 +21,9 @@ from motorbus.core.family import (
     Simulator,
     Stop,
 )
-from motorbus.core.operation import Exchange, Procedure, Response, Runnable
+from motorbus.core.register import RegisterMap
+from motorbus.core.request import Request, Response
+from motorbus.core.steps import Procedure, Runnable
 from motorbus.errors import RequestError
 from motorbus.families.kst import driver, wire
 from motorbus.families.kst.driver import (
@@ -118,7 +119,7 @@ class Kst:
     """
 
     name: Final = "kst"
-    tables: Final[Mapping[str, Table]] = TABLES
+    tables: Final[Mapping[str, RegisterMap]] = TABLES
     devices: Final = Devices(Servo, AsyncServo, ASSURANCE)
 
     def __init__(self, dialect: Dialect = driver.PLAIN, window: int = driver.WINDOW) -> None:
@@ -161,11 +162,11 @@ class Kst:
     def lane(self, node: int) -> int:
         return node
 
-    def air_time(self, exchange: Exchange[Any], rate: int) -> float:
-        return line.air_time(exchange, rate)
+    def air_time(self, request: Request[Any], rate: int) -> float:
+        return line.air_time(request, rate)
 
-    def turnaround(self, exchange: Exchange[Any]) -> float:
-        return line.turnaround(exchange, self._dialect.profile.flash_wait)
+    def turnaround(self, request: Request[Any]) -> float:
+        return line.turnaround(request, self._dialect.profile.flash_wait)
 
     def quiet_time(self, rate: int) -> float:
         return line.quiet_time(rate)
@@ -184,7 +185,7 @@ class Kst:
             return wire.FrameReceiver(dialect.formats)
         return driver.Ear(dialect.formats, dialect.memory)
 
-    def probe(self, node: int, attempt: int) -> Exchange[bool]:
+    def probe(self, node: int, attempt: int) -> Request[bool]:
         return line.probe(Node(node, self._dialect), attempt)
 
     def stop(self, nodes: Mapping[int, Response | None]) -> Stop:

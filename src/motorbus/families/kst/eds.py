@@ -15,7 +15,7 @@ from itertools import groupby
 from textwrap import wrap
 from typing import Final, NamedTuple, TypeAlias
 
-from motorbus.core.entry import Access, Coding, Entry, Storage, changed
+from motorbus.core.register import Access, Coding, Register, Storage, changed
 from motorbus.families.kst.table import DEFAULT_NODE, RATES, Profile
 
 
@@ -45,7 +45,7 @@ _COMPOUND: Final = {0x1010: ("store_parameters", _ARRAY), 0x1018: ("identity_obj
 _WIDEST: Final = 200
 
 _absent = partial(
-    Entry,
+    Register,
     access=Access.READ,
     storage=Storage.FACTORY,
     default=0,
@@ -161,12 +161,12 @@ def _comments(profile: Profile, with_mandatory: bool) -> str:
     return _section("Comments", {"Lines": len(lines), **numbered})
 
 
-def _said(row: Entry) -> str:
+def _said(row: Register) -> str:
     """What there is to know of it, and what its sources disagree about."""
     return "; ".join(filter(None, (row.note, row.conflict)))
 
 
-def _lists(profile: Profile, rows: list[Entry]) -> Iterator[str]:
+def _lists(profile: Profile, rows: list[Register]) -> Iterator[str]:
     """The three lists, each followed by the objects in it."""
     kinds = {
         "MandatoryObjects": _is_mandatory,
@@ -194,7 +194,7 @@ def _is_optional(index: int) -> bool:
     return not _is_mandatory(index) and not _is_makers(index)
 
 
-def _object(profile: Profile, index: int, rows: list[Entry]) -> Iterator[str]:
+def _object(profile: Profile, index: int, rows: list[Register]) -> Iterator[str]:
     if index not in _COMPOUND:
         yield from (_section(f"{index:04X}", _variable(profile, row)) for row in rows)
         return
@@ -219,7 +219,7 @@ def _count(highest: int) -> Keys:
     }
 
 
-def _variable(profile: Profile, row: Entry) -> Keys:
+def _variable(profile: Profile, row: Register) -> Keys:
     letters = row in profile.version_rows
     signed = row.coding is Coding.TWOS_COMPLEMENT
     kind = _VISIBLE_STRING if letters else (_SIGNED if signed else _UNSIGNED)[row.size]
@@ -235,21 +235,21 @@ def _variable(profile: Profile, row: Entry) -> Keys:
     return {**keys, "Description": _meaning(row)}
 
 
-def _limits(row: Entry) -> Keys:
+def _limits(row: Register) -> Keys:
     """In decimal, for hexadecimal is read as two's complement by some and not by others; none where all goes."""
     if row.coding is Coding.UNSIGNED and (row.low, row.high) == (0, (1 << 8 * row.size) - 1):
         return {}
     return {"LowLimit": row.low, "HighLimit": row.high}
 
 
-def _factor(profile: Profile, row: Entry) -> Keys:
+def _factor(profile: Profile, row: Register) -> Keys:
     """Degrees for people: the scale of a row in radians is no short number, that in degrees is."""
     if row.unit == "rad":
         return {"Factor": 1 / profile.counts_per_degree, "Unit": "deg"}
     return {"Factor": row.scale, "Unit": row.unit} if row.unit else {}
 
 
-def _meaning(row: Entry) -> str:
+def _meaning(row: Register) -> str:
     return " | ".join(
         filter(
             None,

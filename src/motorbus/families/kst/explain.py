@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from motorbus.core.entry import Entry
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import Explanation, Part
-from motorbus.core.operation import CanFrame
+from motorbus.core.register import Register
 from motorbus.families.kst.phrases import Field, Told, angle, counted, degrees, faulted, reserved
 from motorbus.families.kst.table import KST_EXT, PROFILES, Profile, current, temperature, version
 from motorbus.families.kst.unasked import unasked
@@ -23,8 +23,8 @@ from motorbus.families.kst.wire import (
     REPLY,
     REPORT_LENGTH,
     REQUEST,
-    Request,
     SdoReply,
+    SdoRequest,
     abort_text,
     decode_reply,
     decode_request,
@@ -109,7 +109,7 @@ def _request(frame: CanFrame, who: str, identifier: str, profile: Profile) -> To
 
 
 def _asked(
-    request: Request, row: Entry | None, data: bytes, profile: Profile
+    request: SdoRequest, row: Register | None, data: bytes, profile: Profile
 ) -> tuple[str, str, list[Field]]:
     """What is asked, what the specifier means, and the fields of the last four bytes."""
     name = _name(row, request)
@@ -141,7 +141,7 @@ def _reply(data: bytes, who: str, identifier: str, profile: Profile) -> Told:
 
 
 def _answered(
-    reply: SdoReply, row: Entry | None, data: bytes, profile: Profile
+    reply: SdoReply, row: Register | None, data: bytes, profile: Profile
 ) -> tuple[str, str, list[Field]]:
     """What is said, what the specifier means, and the fields of the last four bytes."""
     name = _name(row, reply)
@@ -192,16 +192,16 @@ def _stated(size: int | None) -> str:
     return "length not stated" if size is None else counted(size)
 
 
-def _row(profile: Profile, index: int, subindex: int) -> Entry | None:
+def _row(profile: Profile, index: int, subindex: int) -> Register | None:
     """The object as the profile has it, else as newer servos do."""
     return profile.table.at(index, subindex) or KST_EXT.at(index, subindex)
 
 
-def _name(row: Entry | None, said: Request | SdoReply) -> str:
+def _name(row: Register | None, said: SdoRequest | SdoReply) -> str:
     return row.name if row else f"0x{said.index:04X}:{said.subindex}"
 
 
-def _object(profile: Profile, row: Entry | None, said: Request | SdoReply) -> Iterator[Field]:
+def _object(profile: Profile, row: Register | None, said: SdoRequest | SdoReply) -> Iterator[Field]:
     if row is None:
         name = "no object that is known"
     else:
@@ -221,7 +221,7 @@ def _code(data: bytes) -> str:
     return f"0x{code:08X}: {abort_text(code)}" if code in ABORTS else abort_text(code)
 
 
-def _values(profile: Profile, row: Entry | None, data: bytes, stated: int | None) -> Iterator[Field]:
+def _values(profile: Profile, row: Register | None, data: bytes, stated: int | None) -> Iterator[Field]:
     """The four data bytes: what belongs to the object, and the rest. Without a stated length the object has its own."""
     size = stated or (row.size if row else _VALUE)
     value = data[:size]
@@ -237,12 +237,12 @@ def _values(profile: Profile, row: Entry | None, data: bytes, stated: int | None
         yield reserved(rest)
 
 
-def _number(row: Entry | None, data: bytes) -> str:
+def _number(row: Register | None, data: bytes) -> str:
     number = f"{int.from_bytes(data, 'little')} ({data.hex(' ').upper()})"
     return f"{number}, but {row.name} has {counted(row.size)}" if row else number
 
 
-def _status(profile: Profile, row: Entry, data: bytes) -> Iterator[Field]:
+def _status(profile: Profile, row: Register, data: bytes) -> Iterator[Field]:
     """Current and temperature; with the scale of newer servos where the profile has no status of its own."""
     known = profile if profile.status_row else PROFILES["kst-ext"]
     raw = row.decode(data)
@@ -251,7 +251,7 @@ def _status(profile: Profile, row: Entry, data: bytes) -> Iterator[Field]:
     yield reserved(data[3:])
 
 
-def _meaning(profile: Profile, row: Entry, data: bytes) -> str:
+def _meaning(profile: Profile, row: Register, data: bytes) -> str:
     raw = row.decode(data)
     if row.unit == "rad":
         shown = angle(profile, raw)
@@ -272,11 +272,11 @@ def _meaning(profile: Profile, row: Entry, data: bytes) -> str:
     return f"{shown}, outside {low} to {high} of profile {whose}"
 
 
-def _ambiguous(profile: Profile, row: Entry) -> bool:
+def _ambiguous(profile: Profile, row: Register) -> bool:
     """The manual reads position and status by one and the same frame; later servos have a status of its own."""
     return row.name == "present_position" and profile.status_row is None
 
 
-def _letters(row: Entry, raw: int, data: bytes) -> str:
+def _letters(row: Register, raw: int, data: bytes) -> str:
     """A signature: the letters themselves, and whether they are the right ones."""
     return f'"{version(data)}"' + ("" if raw in row.choices else ", the wrong letters: nothing is stored")

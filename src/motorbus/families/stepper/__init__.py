@@ -26,7 +26,6 @@ from copy import deepcopy
 from functools import cached_property
 from typing import Any, Final
 
-from motorbus.core.entry import Table
 from motorbus.core.family import (
     Devices,
     Explanation,
@@ -38,7 +37,9 @@ from motorbus.core.family import (
     Simulator,
     Stop,
 )
-from motorbus.core.operation import Exchange, Procedure, Response, Runnable
+from motorbus.core.register import RegisterMap
+from motorbus.core.request import Request, Response
+from motorbus.core.steps import Procedure, Runnable
 from motorbus.errors import RequestError
 from motorbus.families.stepper import driver, wire
 from motorbus.families.stepper.driver import (
@@ -133,7 +134,7 @@ class Stepper:
     """
 
     name: Final = "stepper"
-    tables: Final[Mapping[str, Table]] = TABLES
+    tables: Final[Mapping[str, RegisterMap]] = TABLES
     devices: Final = Devices(Controller, AsyncController, ASSURANCE)
 
     def __init__(
@@ -171,16 +172,16 @@ class Stepper:
     def lane(self, node: int) -> int:
         return 0
 
-    def air_time(self, exchange: Exchange[Any], rate: int) -> float:
-        return line.air_time(exchange, rate)
+    def air_time(self, request: Request[Any], rate: int) -> float:
+        return line.air_time(request, rate)
 
-    def turnaround(self, exchange: Exchange[Any]) -> float:
-        return line.turnaround(exchange)
+    def turnaround(self, request: Request[Any]) -> float:
+        return line.turnaround(request)
 
     def quiet_time(self, rate: int) -> float:
         return line.quiet_time(rate)
 
-    def echo_test(self) -> Exchange[bytes]:
+    def echo_test(self) -> Request[bytes]:
         return driver.dump_once(self._node(), 1)
 
     def explain(self, data: bytes) -> list[Explanation]:
@@ -191,7 +192,7 @@ class Stepper:
     def receiver(self) -> Receiver:
         return wire.Receiver()
 
-    def probe(self, node: int, attempt: int) -> Exchange[bool]:
+    def probe(self, node: int, attempt: int) -> Request[bool]:
         return presence.probe(self._node(node), attempt)
 
     def stop(self, nodes: Mapping[int, Response | None]) -> Stop:

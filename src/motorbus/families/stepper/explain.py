@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
-from motorbus.core.entry import Entry
 from motorbus.core.family import Explanation, Part
+from motorbus.core.register import Register
 from motorbus.errors import RequestError
 from motorbus.families.stepper import table, wire
 from motorbus.families.stepper.program.dumps import faults
@@ -202,7 +202,7 @@ def _reply(data: bytes) -> Explanation:
 
 
 def _value(name: str, raw: int, command: wire.Command | None = None) -> str:
-    row: Entry = table.PARAMETERS[name]
+    row: Register = table.PARAMETERS[name]
     if name == "port" and command is not None and command.name == "set_output":
         return {4: "4 (all outputs)", 5: "5 (both LEDs)"}.get(raw, str(raw))
     if name == "step_angle":
@@ -243,7 +243,7 @@ def _dump(data: bytes, order: table.Order) -> Explanation:
     return _made(data, f"dump of project {data[3]}, {count}", fields, "; ".join(wrong))
 
 
-def _row(image: bytes, rows: tuple[Entry, ...], number: int, order: table.Order) -> Iterator[Field]:
+def _row(image: bytes, rows: tuple[Register, ...], number: int, order: table.Order) -> Iterator[Field]:
     where = f"step {number}" if number else "project"
     start = at = number * wire.ROW_LENGTH
     for row in rows:

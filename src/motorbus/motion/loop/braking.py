@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from motorbus.core.operation import Exchange
+from motorbus.core.request import Request
 from motorbus.errors import Interrupted, LimitExceeded, MotorbusError
 from motorbus.motion.abreast import Abreast, settled
 from motorbus.motion.loop.cycle import Part
@@ -45,7 +45,7 @@ def _brakes(part: Part) -> bool:
 
 async def _cycle(parts: Mapping[str, Part], moment: float, failures: dict[str, MotorbusError]) -> None:
     """One cycle of it; who was told something from elsewhere meanwhile does not keep the others from braking."""
-    orders: dict[str, Sequence[Exchange[Any]]] = {}
+    orders: dict[str, Sequence[Request[Any]]] = {}
     for bus, part in parts.items():
         try:
             orders[bus] = part.orders(1)

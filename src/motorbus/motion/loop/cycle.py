@@ -1,7 +1,7 @@
 """One cycle of a loop on one bus: goals out, positions in. This is the hot path; whatever can be known before is.
 
-The exchanges are those of the family's `Train`, and how they are sent decides the bus: on one lane they follow each
-other, on several they are all in flight at once. A device that does not answer costs its own reading and no other.
+The requests are those of the family's `PositionStream`, and the bus decides how to send them: on one lane they follow
+each other, on several they are all in flight at once. A device that does not answer costs its own reading and no other.
 """
 
 from __future__ import annotations
@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 from motorbus.bus.base import BaseBus
 from motorbus.bus.blocking import Bus
-from motorbus.core.family import Positions, Quality, Train
-from motorbus.core.operation import Exchange, Gather, Sleep, catch
+from motorbus.core.family import Positions, PositionStream, Quality
+from motorbus.core.request import Request
+from motorbus.core.steps import Sleep, catch, gather
 from motorbus.errors import (
     Faulted,
     LimitExceeded,
@@ -55,7 +56,7 @@ class Part:
         bus: BaseBus,
         origin: float,
         places: Sequence[Place],
-        train: Train,
+        train: PositionStream,
         watch: Watch | None = None,
     ) -> None:
         self.bus: Final = bus
@@ -66,7 +67,7 @@ class Part:
         self.reads: Final = tuple(train.positions)
         self.exactly = False
         self.began = self.ended = 0.0
-        self.abreast: Final = len({exchange.lane for exchange in self.reads}) > 1
+        self.abreast: Final = len({request.lane for request in self.reads}) > 1
         self.command = Command(())
         self.refused: list[LimitExceeded] = []
         self.watch = watch
@@ -83,7 +84,7 @@ class Part:
 
     # -- a cycle -------------------------------------------------------------------------------------------------------
 
-    def orders(self, periods: int) -> Sequence[Exchange[Any]]:
+    def orders(self, periods: int) -> Sequence[Request[Any]]:
         """The exchanges that order the next small goal of all who are led; see `refused`.
 
         Raises RequestError when one of them was set up anew, and takes goals of another kind now.
@@ -102,12 +103,12 @@ class Part:
         self.to = to
         return self.ordering(to)
 
-    def ordering(self, to: Mapping[int, float]) -> Sequence[Exchange[Any]]:
+    def ordering(self, to: Mapping[int, float]) -> Sequence[Request[Any]]:
         """The exchanges that order these angles (rad), by node. Raises RequestError as `orders`."""
         if not to:
             return ()
         guarded = self.command.guarded
-        return [guarded(exchange) for exchange in self.train.goals(to)]
+        return [guarded(request) for request in self.train.goals(to)]
 
     def withheld(self) -> list[str]:
         """Take out of the last orders, which have not left, who cannot be believed since; their names.
@@ -139,7 +140,7 @@ class Part:
         self.unsure = bool(self.left_out)
         return to
 
-    async def cycle(self, orders: Sequence[Exchange[Any]], moment: float) -> list[Any]:
+    async def cycle(self, orders: Sequence[Request[Any]], moment: float) -> list[Any]:
         """Send these from a moment of robot time on, then ask for all positions; what came of each exchange.
 
         Raises Faulted and Overloaded as `Watch.take`, before anything of this has left.
@@ -154,11 +155,11 @@ class Part:
         told: list[Any] = []
         wanted = (*orders, *self.reads)
         if self.abreast:
-            told = await Gather([_kept(exchange) for exchange in wanted])
+            told = list(await gather(*[_kept(request) for request in wanted]))
         else:
-            for exchange in wanted:
+            for request in wanted:
                 try:
-                    told.append(await exchange)
+                    told.append(await request)
                 except LOST as error:
                     told.append(error)
         self.ended = self.link.now() - self.origin
@@ -346,7 +347,7 @@ def _claimed(fresh: Iterable[Place]) -> Command:
     return command
 
 
-async def _begun(train: Train, command: Command, watch: Watch | None) -> list[float]:
+async def _begun(train: PositionStream, command: Command, watch: Watch | None) -> list[float]:
     """Torque on, and as quick in following as the axis may be; where the device of each stands then (rad)."""
 
     async def ready() -> None:
@@ -359,22 +360,22 @@ async def _begun(train: Train, command: Command, watch: Watch | None) -> list[fl
         await command.watched(ready())
         if watch is not None:
             await watch.begin(command.axes)
-        return await Gather([axis.able["position"](axis.device) for axis in command.axes])
+        return list(await gather(*[axis.able["position"](axis.device) for axis in command.axes]))
     except BaseException:
         for axis in command.held():  # they may have torque, and go nowhere
             axis.arrives()
         raise
 
 
-async def train_of(bus: BaseBus, axes: Sequence[AxisVerbs]) -> Train:
+async def train_of(bus: BaseBus, axes: Sequence[AxisVerbs]) -> PositionStream:
     """These axes of one bus, ready to be asked and told in a loop; nothing is written."""
-    train: Train = await axes[0].able["train"]([axis.device for axis in axes], rate=bus.rate)
+    train: PositionStream = await axes[0].able["train"]([axis.device for axis in axes], rate=bus.rate)
     return train
 
 
-async def _kept(exchange: Exchange[Any]) -> Any:
+async def _kept(request: Request[Any]) -> Any:
     """Its value, or the error by which it was lost; every other error is raised when all have ended."""
-    found = await catch(exchange)
+    found = await catch(request)
     if isinstance(found, MotorbusError) and not isinstance(found, LOST):
         raise found
     return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from motorbus.core.entry import shown
+from motorbus.core.register import shown
 from motorbus.core.units import MAX_RATE, MIN_RATE
 from motorbus.errors import Interrupted, NoReply, RequestError
 from motorbus.motion.limits import check_number

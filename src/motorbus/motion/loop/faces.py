@@ -30,7 +30,7 @@ from contextlib import contextmanager
 from typing import Any, Concatenate, Generic, NamedTuple, ParamSpec, Protocol, Self, TypeVar, overload
 
 from motorbus.bus.blocking import Bus
-from motorbus.core.verbs import Said
+from motorbus.core.device import DeviceMethod
 from motorbus.errors import MotorbusError
 from motorbus.motion.abreast import Abreast, AsyncConductor, BlockingConductor, Led, LedAsync, Works
 from motorbus.motion.body import Body
@@ -319,7 +319,7 @@ class Errand(NamedTuple, Generic[T]):
     policy: Policy = "reject"
 
 
-class looped(Said[P, T]):  # noqa: N801 - reads as a word in a list of verbs
+class looped(DeviceMethod[P, T]):  # noqa: N801 - reads as a word in a list of verbs
     """Makes a method of a function that gives an `Errand`: blocking on what is `Led`, awaitable on `LedAsync`."""
 
     returns = "Errand"

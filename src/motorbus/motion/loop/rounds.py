@@ -15,7 +15,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 from motorbus.bus.blocking import Bus, exchange_on
-from motorbus.core.operation import Emit, Exchange
+from motorbus.core.request import Request
+from motorbus.core.steps import Emit
 from motorbus.errors import Faulted, Interrupted, LinkLost, MotorbusError, Overloaded, RequestError
 from motorbus.motion import limits
 from motorbus.motion.abreast import Abreast, settled
@@ -238,7 +239,7 @@ class Rounds:
                 self.parts[name].ended = self.parts[name].now
         return {name: found[name] for name in buses}
 
-    def _orders(self, periods: int) -> dict[str, Sequence[Exchange[Any]]]:
+    def _orders(self, periods: int) -> dict[str, Sequence[Request[Any]]]:
         try:
             orders = {bus: part.orders(periods) for bus, part in self.parts.items()}
         except MotorbusError:  # nothing leaves, on any bus

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from motorbus.core.entry import shown
+from motorbus.core.register import shown
 from motorbus.errors import RequestError
 from motorbus.motion.machine.keys import AXIS
 from motorbus.motion.machine.model import HIGHEST_NODE, AxisSpec, Description

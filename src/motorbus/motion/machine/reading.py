@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple, TypeAlias
 import msgspec
 
 from motorbus.core import units
-from motorbus.core.entry import is_number
+from motorbus.core.register import is_number
 from motorbus.errors import RequestError
 from motorbus.motion.machine import keys
 from motorbus.motion.machine.agreement import check, no_axis

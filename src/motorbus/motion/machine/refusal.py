@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from os import PathLike
 from typing import Any
 
-from motorbus.core.entry import shown
+from motorbus.core.register import shown
 from motorbus.errors import LinkError, RequestError
 
 _BARE = re.compile(r"[A-Za-z0-9_-]{1,40}")

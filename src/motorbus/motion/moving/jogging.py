@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import copysign, isfinite
 from typing import TYPE_CHECKING
 
-from motorbus.core.operation import Emit
+from motorbus.core.steps import Emit
 from motorbus.errors import RequestError
 from motorbus.motion import limits, reckoning
 from motorbus.motion.clamping import Clamped, Policy, check_policy, kept

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from motorbus.core.operation import Gather
+from motorbus.core.steps import gather
 from motorbus.errors import Interrupted, MotorbusError, RequestError
 from motorbus.motion.abreast import Abreast
 from motorbus.motion.command import Command
@@ -81,7 +81,7 @@ class Journey:
     async def on(self, bus: str) -> list[Gone]:
         """All that is to do on one bus."""
         there = {party: axes for party, axes in self._parties.items() if axes[0].spec.bus == bus}
-        return await Gather([parts.part(self, party, axes) for party, axes in there.items()])
+        return list(await gather(*[parts.part(self, party, axes) for party, axes in there.items()]))
 
     def combine(self, results: Mapping[str, Any]) -> Moved:
         """What came of the whole. Raises what went wrong first, with a note for each axis that did not stop."""

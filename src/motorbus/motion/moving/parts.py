@@ -10,7 +10,7 @@ from inspect import CORO_CLOSED, getcoroutinestate
 from typing import TYPE_CHECKING, Any, Final
 
 from motorbus.core.family import Positions
-from motorbus.core.operation import Emit, Gather, Procedure, Progress, Sleep, catch, with_cleanup
+from motorbus.core.steps import Emit, Procedure, Progress, Sleep, catch, gather, with_cleanup
 from motorbus.core.timing import Turned
 from motorbus.errors import MotorbusError, NoReply, RequestError
 from motorbus.motion import capabilities as single
@@ -141,7 +141,7 @@ class LedPart:
 
     async def _again(self, train: Any) -> None:
         """Ask where they are: others may have needed long, and no goal leaves by what was so a while ago."""
-        await Gather([catch(one) for one in train.positions])
+        await gather(*[catch(one) for one in train.positions])
 
     async def _train(self) -> Any:
         """Those who are led, with all known of them that a cycle needs."""
@@ -157,7 +157,7 @@ class LedPart:
     async def _looked(self, train: Any) -> tuple[float, dict[str, Fact]]:
         """At which rate they can be led (Hz), where they stand, and how far and how finely their devices go."""
         angles = await self._angles(train)
-        found = await Gather([limits.of_device(axis) for axis in self._axes])
+        found = await gather(*[limits.of_device(axis) for axis in self._axes])
         devices = {axis.spec.node: device for axis, device in zip(self._axes, found, strict=True)}
         possible = {node: _inside(angles[node], device) for node, device in devices.items()}
         steps = grains(train, possible)
@@ -240,7 +240,7 @@ class OwnPart:
             self.gone = self._stayed(stood)
             return
         turned = self._turned(way)
-        told = await Gather([turned, self._watched(turned)])
+        told = await gather(turned, self._watched(turned))
         assert told[0] is not None
         self.gone = self._arrived(stood, told[0])
 

@@ -16,8 +16,8 @@ from math import ceil, floor, inf
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from motorbus.bus.base import BaseBus
-from motorbus.core.family import Positions, Train
-from motorbus.core.operation import Emit, Gather, Procedure, Progress, Sleep
+from motorbus.core.family import Positions, PositionStream
+from motorbus.core.steps import Emit, Procedure, Progress, Sleep, gather
 from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, Refused, RequestError
 from motorbus.motion import limits
 from motorbus.motion.command import Command
@@ -96,7 +96,9 @@ class Grid(NamedTuple):
         return min(max(slot + 1, ceil(since / self.period - 1e-6)), self.last)
 
 
-def rate_for(bus: BaseBus, train: Train, angles: Mapping[int, float], asked: float | None = None) -> float:
+def rate_for(
+    bus: BaseBus, train: PositionStream, angles: Mapping[int, float], asked: float | None = None
+) -> float:
     """Hz at which the axes of a train are led; where nobody has asked for one see `USUAL` and `SHARE`.
 
     `angles` are goals that they could be told, by id (rad): for counting, each is as long as any other. Raises
@@ -116,12 +118,12 @@ def rate_for(bus: BaseBus, train: Train, angles: Mapping[int, float], asked: flo
     return asked
 
 
-def grains(train: Train, angles: Mapping[int, float]) -> dict[int, float]:
+def grains(train: PositionStream, angles: Mapping[int, float]) -> dict[int, float]:
     """By id, the smallest step (rad) that each can be told from its angle (rad): goals say what will be told."""
     return {node: _grain(train, node, angle) for node, angle in angles.items()}
 
 
-def _grain(train: Train, node: int, angle: float) -> float:
+def _grain(train: PositionStream, node: int, angle: float) -> float:
     here = _told(train, node, angle)
     step = FINEST
     while step < FAR:
@@ -132,13 +134,13 @@ def _grain(train: Train, node: int, angle: float) -> float:
     return FAR
 
 
-def _told(train: Train, node: int, angle: float) -> float | None:
+def _told(train: PositionStream, node: int, angle: float) -> float | None:
     """What it is told for an angle (rad); None for one that it cannot be told."""
     try:
-        (exchange,) = train.goals({node: angle})
+        (request,) = train.goals({node: angle})
     except LimitExceeded:
         return None
-    return next((goal.value for goal in exchange.goals), None)
+    return next((goal.value for goal in request.setpoints), None)
 
 
 class Stream:
@@ -152,7 +154,7 @@ class Stream:
     def __init__(
         self,
         axes: Sequence[AxisVerbs],
-        train: Train,
+        train: PositionStream,
         course: Course,
         *,
         rate: float,
@@ -198,7 +200,7 @@ class Stream:
         """
         self._start = start
         self._lead = lead
-        await Gather([self._ending(self._tell()), self._ending(self._look())])
+        await gather(self._ending(self._tell()), self._ending(self._look()))
         await self._settle()
         tracks = {name: _track(*rows) for name, rows in self._tracks.items()}
         cycles = Cycles(1 / self._grid.period, self._cycles, self._skipped, self._lost)

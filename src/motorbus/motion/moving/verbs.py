@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterable, Mapping
 from math import copysign, isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
-from motorbus.core.entry import shown
-from motorbus.core.operation import catch
+from motorbus.core.register import shown
+from motorbus.core.steps import catch
 from motorbus.errors import RequestError
 from motorbus.motion import limits, reckoning
 from motorbus.motion.abreast import Abreast

@@ -1,6 +1,6 @@
 """What is guaranteed of a machine, and what is not: the same facts for people, for programs, and for the documentation.
 
-Bounds are those of the machine file, what a device gives is what its family declares (`core.assurance`), and what
+Bounds are those of the machine file, what a device gives is what its family declares (`core.guarantees`), and what
 holds for every machine stands here. Nothing is opened and nothing is asked: it is what may be relied on beforehand.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from motorbus.core.assurance import Assurance, Given, Point
+from motorbus.core.guarantees import Guarantee, Guarantees, Level
 from motorbus.motion.limits import shown_rate
 from motorbus.motion.machine.model import VELOCITY
 from motorbus.motion.moving.stream import SHARE, USUAL
@@ -54,7 +54,7 @@ class Bus(NamedTuple):
     address: str
     family: str
     axes: tuple[str, ...]
-    points: Mapping[str, Point]
+    points: Mapping[str, Guarantee]
 
 
 class Assured(NamedTuple):
@@ -62,7 +62,7 @@ class Assured(NamedTuple):
 
     axes: tuple[Bounded, ...]
     buses: tuple[Bus, ...]
-    machine: Mapping[str, Point]
+    machine: Mapping[str, Guarantee]
 
 
 def cycle(highest_rate: float) -> float:
@@ -88,11 +88,11 @@ def assured(
     return Assured(axes, buses, MACHINE)
 
 
-def _points(said: Assurance | None) -> dict[str, Point]:
+def _points(said: Guarantees | None) -> dict[str, Guarantee]:
     return {} if said is None else dict(said.points())
 
 
-def _bounded(name: str, spec: AxisSpec, family: Family, said: Assurance | None, period: float) -> Bounded:
+def _bounded(name: str, spec: AxisSpec, family: Family, said: Guarantees | None, period: float) -> Bounded:
     stops = family.link.stops
     return Bounded(
         name,
@@ -103,15 +103,15 @@ def _bounded(name: str, spec: AxisSpec, family: Family, said: Assurance | None, 
         spec.show(spec.max_velocity * period) if said is not None and said.led else WHOLE,
         spec.exit,
         spec.estop or (stops[0] if stops else "stop"),
-        "on" if spec.guard and said is not None and said.strain.given is not Given.NO else NONE,
+        "on" if spec.guard and said is not None and said.strain.given is not Level.NO else NONE,
     )
 
 
-def _limits(spec: AxisSpec, said: Assurance | None) -> str:
+def _limits(spec: AxisSpec, said: Guarantees | None) -> str:
     if spec.low is not None and spec.high is not None:
         low, unit = spec.show(spec.low).split(" ")
         return f"{float(low):g} to {float(spec.show(spec.high).split(' ')[0]):g} {unit}"
-    return NONE if said is None or said.limits.given is Given.NO else "its device's"
+    return NONE if said is None or said.limits.given is Level.NO else "its device's"
 
 
 def unbounded(found: Assured) -> list[str]:
@@ -126,50 +126,50 @@ def unbounded(found: Assured) -> list[str]:
     return [f"{', '.join(names)}: {what}" for what, names in lacking.items() if names]
 
 
-MACHINE: Final[Mapping[str, Point]] = {
-    "one gate": Point(
-        Given.YES,
+MACHINE: Final[Mapping[str, Guarantee]] = {
+    "one gate": Guarantee(
+        Level.YES,
         "every order of this process passes it, raw ones and loops too: limits, step from the measured position, "
         "velocity, finite numbers. What is refused is not sent",
     ),
-    "velocity": Point(
-        Given.PARTLY,
+    "velocity": Guarantee(
+        Level.PARTLY,
         "held by what is led and by orders that say one; an order without one runs at the device's own speed, and may "
         f"lead {LATE:g} s of its velocity and {NEAR:g} rad from where it is measured to be, no farther",
     ),
-    "acceleration": Point(
-        Given.PARTLY,
+    "acceleration": Guarantee(
+        Level.PARTLY,
         "held by moves, trajectories and loops that follow; a device that is ordered by itself has its own ramp",
     ),
-    "stale positions": Point(
-        Given.YES,
+    "stale positions": Guarantee(
+        Level.YES,
         f"one older than {FRESH:g} s, or one that no motor can have come to, moves nothing; reckoned axes have none",
     ),
-    "on connect": Point(Given.YES, "opening, scanning and reading move nothing; torque on does not jump"),
-    "endless motion": Point(
-        Given.PARTLY,
+    "on connect": Guarantee(Level.YES, "opening, scanning and reading move nothing; torque on does not jump"),
+    "endless motion": Guarantee(
+        Level.PARTLY,
         "only while somebody attends, and stopped when he has ended or his lease is lost; but by the host alone",
     ),
-    "all or nothing": Point(
-        Given.PARTLY,
+    "all or nothing": Guarantee(
+        Level.PARTLY,
         "a move of several axes is refused as a whole, or sent; what is lost on its way is not unsent",
     ),
-    "exit policy": Point(
-        Given.PARTLY, "at the end, after an error, Ctrl-C, SIGTERM and a lost lease; not after SIGKILL"
+    "exit policy": Guarantee(
+        Level.PARTLY, "at the end, after an error, Ctrl-C, SIGTERM and a lost lease; not after SIGKILL"
     ),
-    "emergency stop": Point(
-        Given.PARTLY,
+    "emergency stop": Guarantee(
+        Level.PARTLY,
         "on all buses at once, ahead of everything, latched; it needs this process alive, its interpreter, its cables",
     ),
-    "the host dies": Point(
-        Given.NO,
+    "the host dies": Guarantee(
+        Level.NO,
         "SIGKILL, a crash, a power cut: nothing is sent any more, see each device for what it does then",
     ),
-    "a cable breaks": Point(
-        Given.NO, "what cannot be reached cannot be stopped, and does as when the host dies"
+    "a cable breaks": Guarantee(
+        Level.NO, "what cannot be reached cannot be stopped, and does as when the host dies"
     ),
-    "several hosts": Point(
-        Given.NO,
+    "several hosts": Guarantee(
+        Level.NO,
         "a port has one owner on one computer; who else is on the wire is not seen, and passes no gate of ours",
     ),
 }

@@ -13,7 +13,7 @@ from math import inf
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from motorbus.core.family import Health
-from motorbus.core.operation import Emit, catch
+from motorbus.core.steps import Emit, catch
 from motorbus.errors import Faulted, Refused
 from motorbus.motion.safety.gate import Gate
 

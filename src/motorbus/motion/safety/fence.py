@@ -11,7 +11,7 @@ from functools import partial
 from math import inf
 from typing import TYPE_CHECKING, Any
 
-from motorbus.core.operation import Runnable
+from motorbus.core.steps import Runnable
 from motorbus.errors import RequestError
 from motorbus.motion.reckoning import UNDER_WAY, Reckoning
 from motorbus.motion.safety.canary import unknown
@@ -20,7 +20,7 @@ from motorbus.motion.safety.guard import Bounds, Guard, untold
 
 if TYPE_CHECKING:
     from motorbus.bus.base import BaseBus
-    from motorbus.core.family import Readdressed
+    from motorbus.core.family import IdChanged
     from motorbus.motion.body import Body
     from motorbus.motion.capabilities import AxisVerbs
     from motorbus.motion.machine import AxisSpec
@@ -62,7 +62,7 @@ def _watched(bus: BaseBus, gate: Gate) -> None:
     bus.readdressed = partial(follow, bus, gate)
 
 
-def follow(bus: BaseBus, gate: Gate, event: Readdressed) -> None:
+def follow(bus: BaseBus, gate: Gate, event: IdChanged) -> None:
     """A device is about to answer to another id: its guard holds, and its fault counts, under that one as well.
 
     An id that the machine file has bounds for keeps those. Where nobody knows which device it is, it may be any: the

@@ -1,9 +1,8 @@
 """Devices that are ordered in one packet again and again, as a control loop orders them: all are judged in one pass.
 
-A gate asks the same of each of them in every cycle, and what their guards bound them by stays the same. So that is laid
-out once per `Aim`, and as long as their guards are those. What is found is what `Gate` and `Guard.is_fine` find one by
-one, in the same order, and each takes in its reading in the same moment; a test proves that. Here microseconds count,
-so what elsewhere would be four functions is one.
+A gate checks each of them in every cycle against bounds that stay the same, so the bounds are laid out once per
+`SetpointGroup`, for as long as the guards are the same. The result is what `Gate` and `Guard.is_fine` find one by one,
+in the same order; a test proves that. Microseconds count here, so this is one function and not four.
 """
 
 from __future__ import annotations
@@ -11,15 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
-from motorbus.core.aimed import Aim
 from motorbus.core.family import Quality
-from motorbus.core.operation import Exchange, Goal, Response
+from motorbus.core.request import Request, Response, SetpointGroup
+from motorbus.core.setpoint import Setpoint
 from motorbus.motion.safety.guard import Guard, untold
 from motorbus.motion.safety.track import FRESH, TREMBLING, Sample, Track
 
-Heard = tuple[Exchange[Any], Response]
+Heard = tuple[Request[Any], Response]
 """The last exchange that told where a node is, and its answer."""
-Where = Callable[[Exchange[Any], Response], Mapping[int, float]]
+Where = Callable[[Request[Any], Response], Mapping[int, float]]
 """Where those are (rad) whom an answer tells of."""
 
 FLOCKS: Final = 8
@@ -54,7 +53,9 @@ class Flock:
         """Whether their guards are those that it was made of."""
         return list(map(guards.get, self._ordered)) == self._guards
 
-    def are_fine(self, goals: Sequence[Goal], seen: Mapping[int, Heard], where: Where, now: float) -> bool:
+    def are_fine(
+        self, goals: Sequence[Setpoint], seen: Mapping[int, Heard], where: Where, now: float
+    ) -> bool:
         """Whether each of these leads to a place that is surely allowed; see `Guard.is_fine`.
 
         What was heard of each since is taken in on the way, up to the first that is not.
@@ -100,19 +101,19 @@ class Flocks:
     __slots__ = ("_known",)
 
     def __init__(self) -> None:
-        self._known: dict[Aim, Flock] = {}
+        self._known: dict[SetpointGroup, Flock] = {}
 
-    def of(self, aim: Aim | None, guards: Mapping[int, Guard]) -> Flock | None:
+    def of(self, aim: SetpointGroup | None, guards: Mapping[int, Guard]) -> Flock | None:
         """The one of this aim; None where one of them has no guard, or none that knows where it is."""
         flock = self._known.get(aim)  # type: ignore[arg-type]  # None is never there
         if flock is not None and flock.holds(guards):
             return flock
         return None if aim is None else self._laid(aim, guards)
 
-    def _laid(self, aim: Aim, guards: Mapping[int, Guard]) -> Flock | None:
+    def _laid(self, aim: SetpointGroup, guards: Mapping[int, Guard]) -> Flock | None:
         self._known.pop(aim, None)
         its, seats = [], []
-        for node in aim.ordered:
+        for node in aim.nodes:
             guard = guards.get(node)
             if guard is None or guard.track is None:
                 return None
@@ -120,5 +121,5 @@ class Flocks:
             seats.append(Seat(node, guard, guard.track, *guard.reach))
         if len(self._known) >= FLOCKS:
             self._known.clear()
-        flock = self._known[aim] = Flock(aim.ordered, its, seats)
+        flock = self._known[aim] = Flock(aim.nodes, its, seats)
         return flock

@@ -16,8 +16,9 @@ from copy import copy
 from math import inf, isfinite
 from typing import Any, Final
 
-from motorbus.core.goal import Later, Stays
-from motorbus.core.operation import EVERY_LANE, Effect, Exchange, Goal, Priority, Response, Runnable, Stops
+from motorbus.core.request import EVERY_LANE, Effect, Priority, Request, Response, Stops
+from motorbus.core.setpoint import Deferred, Setpoint, Stays
+from motorbus.core.steps import Runnable
 from motorbus.errors import LimitExceeded, Refused
 from motorbus.motion.safety.flock import Flocks
 from motorbus.motion.safety.guard import ENDLESS, PLACES, Guard, untold
@@ -29,7 +30,7 @@ from motorbus.motion.safety.waiting import Handed, Waiting
 
 ROUNDING = 1e-9  # relative; a limit converted to its unit and back still admits itself
 
-Seen = Mapping[int, "tuple[Exchange[Any], Response]"]
+Seen = Mapping[int, "tuple[Request[Any], Response]"]
 """By node, the last exchange that told where it is, and its answer."""
 
 
@@ -91,21 +92,21 @@ class Gate:
         """The error for a lease that is lost; None where it is not, or there is none."""
         return None if self.lease is None else self.lease.loss(self._now() - self.origin)
 
-    def required_reads(self, exchange: Exchange[Any]) -> list[Runnable[Any]]:
+    def required_reads(self, request: Request[Any]) -> list[Runnable[Any]]:
         """What must be asked before this order can be judged: where those are whose position is not known well enough.
 
         Whoever carries out orders asks for it and carries it out; what came of it the gate sees by itself.
         """
-        if not self.guards or exchange.rank is Priority.STOP:
+        if not self.guards or request.priority is Priority.STOP:
             return []
-        if exchange.later is not None and exchange.later.begins:
-            goals = _goals(self._waiting.of(exchange.later))
-        elif exchange.effect is not Effect.MOTION:
+        if request.deferred is not None and request.deferred.begins:
+            goals = _goals(self._waiting.of(request.deferred))
+        elif request.effect is not Effect.MOTION:
             return []
         else:
-            goals = exchange.goals
+            goals = request.setpoints
         found: dict[int, Runnable[Any]] = {}
-        everyone, now = exchange.lane == EVERY_LANE, self._now()
+        everyone, now = request.lane == EVERY_LANE, self._now()
         if not everyone and self._are_known(goals, now):
             return []
         for goal in self._of_everyone(goals) if everyone else goals:
@@ -119,10 +120,10 @@ class Gate:
                 found[goal.node] = guard.ask()
         return list(found.values())
 
-    def check(self, exchange: Exchange[Any], now: float) -> None:
+    def check(self, request: Request[Any], now: float) -> None:
         """Raise Refused if this must not leave now."""
-        if not (exchange.sure and self.passes(exchange)):
-            self(exchange)
+        if not (request.prechecked and self.passes(request)):
+            self(request)
 
     def stopped(self, nodes: Iterable[int]) -> None:
         """A stop of these nodes is about to leave; nothing is to be done for it here."""
@@ -131,17 +132,17 @@ class Gate:
         """Whether anybody may be moved at this moment: nobody is at fault, and a lease that there is holds."""
         return not self.faults and (self.lease is None or self.lease.lets_move(self._now() - self.origin))
 
-    def passes(self, exchange: Exchange[Any]) -> bool:
+    def passes(self, request: Request[Any]) -> bool:
         """Whether this may surely leave: then it is noted as given. Else nothing is, and the caller looks closely.
 
         It is the quick way of the orders of a control loop, and agrees with `required_reads` and a call of the gate.
         """
-        if not exchange.sure or not self.lets_move():
+        if not request.prechecked or not self.lets_move():
             return False
         if not self.guards:
             return not self.attended
-        goals, now = exchange.goals, self._now()
-        flock = self._flocks.of(exchange.aim, self.guards)
+        goals, now = request.setpoints, self._now()
+        flock = self._flocks.of(request.group, self.guards)
         if flock is not None and flock.are_fine(goals, self._seen, self._told_by, now):
             if self._tells:
                 flock.tell()
@@ -153,51 +154,51 @@ class Gate:
                 self.guards[goal[0]].ordered(True)
         return True
 
-    def __call__(self, exchange: Exchange[Any]) -> None:
-        later = exchange.later
-        if exchange.rank is Priority.STOP or (later is None and exchange.effect < Effect.TORQUE):
+    def __call__(self, request: Request[Any]) -> None:
+        later = request.deferred
+        if request.priority is Priority.STOP or (later is None and request.effect < Effect.TORQUE):
             return
         if later is None:
-            self._judge(exchange, exchange.goals)
+            self._judge(request, request.setpoints)
         elif later.begins:
-            self._judge(exchange, self._begun(exchange, later))
+            self._judge(request, self._begun(request, later))
             self._waiting.begin(later)
         else:
-            if exchange.effect >= Effect.TORQUE:
-                self._judge(exchange, exchange.goals, obeyed=False)
+            if request.effect >= Effect.TORQUE:
+                self._judge(request, request.setpoints, obeyed=False)
             if later.node is not None:
-                self._waiting.take(later, exchange.goals, self._stops(later.node))
+                self._waiting.take(later, request.setpoints, self._stops(later.node))
 
-    def _judge(self, exchange: Exchange[Any], goals: tuple[Goal, ...], *, obeyed: bool = True) -> None:
+    def _judge(self, request: Request[Any], goals: tuple[Setpoint, ...], *, obeyed: bool = True) -> None:
         """Judge it by these goals; those that are not `obeyed` yet set nothing moving and end nothing."""
         if (
             obeyed
             and goals
             and not self.faults
-            and exchange.lane != EVERY_LANE
+            and request.lane != EVERY_LANE
             and self._are_fine(goals, self._now())
         ):
             if self.lease is not None:
-                self._check_standing(exchange, goals)
+                self._check_standing(request, goals)
             if self._tells:
                 for goal in goals:
                     self.guards[goal[0]].ordered(True)
             return
-        if exchange.effect is Effect.MOTION and not goals:
+        if request.effect is Effect.MOTION and not goals:
             raise LimitExceeded(
                 "this write moves a motor and does not say where to",
-                sent=exchange.request,
+                sent=request.wire,
                 cause="the driver made an exchange with effect motion and without goals",
                 advice="use a move, or a write by register name; nothing was sent",
             )
         for goal in goals:
             _check(goal)
         if self.faults or self.lease is not None:
-            self._check_standing(exchange, goals)
+            self._check_standing(request, goals)
         if self.guards or self.attended:
             now = self._now()
-            leaving: list[tuple[Guard, Goal]] = []
-            for goal in self._of_everyone(goals) if exchange.lane == EVERY_LANE else goals:
+            leaving: list[tuple[Guard, Setpoint]] = []
+            for goal in self._of_everyone(goals) if request.lane == EVERY_LANE else goals:
                 guard = self.guards.get(goal.node)
                 if guard is not None:
                     self._look(goal.node, guard)
@@ -210,11 +211,11 @@ class Gate:
             for guard, goal in leaving:  # once all are judged: where it is is forgotten when it leaves
                 self._leaves(guard, goal)
         if self._tells and obeyed:
-            for goal in self._of_everyone(goals) if exchange.lane == EVERY_LANE else goals:
+            for goal in self._of_everyone(goals) if request.lane == EVERY_LANE else goals:
                 if goal.node in self.guards:
                     self.guards[goal.node].told(goal)
 
-    def _are_fine(self, goals: tuple[Goal, ...], now: float) -> bool:
+    def _are_fine(self, goals: tuple[Setpoint, ...], now: float) -> bool:
         """Whether each of these leads to a place that is surely allowed, in one pass; else who asks looks closely."""
         guards, seen = self.guards, self._seen
         for node, quantity, value, low, high, stays in goals:
@@ -228,7 +229,7 @@ class Gate:
                 return False
         return True
 
-    def _are_known(self, goals: tuple[Goal, ...], now: float) -> bool:
+    def _are_known(self, goals: tuple[Setpoint, ...], now: float) -> bool:
         """Whether it is known where each of these is, in one pass; else `look` finds out whom to ask."""
         guards, seen = self.guards, self._seen
         for goal in goals:
@@ -244,7 +245,7 @@ class Gate:
                 return False
         return True
 
-    def _leaves(self, guard: Guard, goal: Goal) -> None:
+    def _leaves(self, guard: Guard, goal: Setpoint) -> None:
         """It is told to move: whoever reckons where it is must know, and whether this goes on without an end."""
         guard.leaves()
         if goal.quantity in ENDLESS and goal.value:
@@ -252,10 +253,10 @@ class Gate:
 
     # -- what waited -------------------------------------------------------------------------------------------------
 
-    def _begun(self, exchange: Exchange[Any], later: Later) -> tuple[Goal, ...]:
+    def _begun(self, request: Request[Any], later: Deferred) -> tuple[Setpoint, ...]:
         """The goals that begin. Where anything bounds what may move it must be known what that is, and wanted still."""
         if not (self.guards or self.faults or self.attended or self.lease is not None):
-            return exchange.goals
+            return request.setpoints
         found = self._waiting.of(later)
         if found is None:
             raise nothing_known(later)
@@ -267,11 +268,11 @@ class Gate:
 
     # -- whether anything may move -----------------------------------------------------------------------------------
 
-    def _check_standing(self, exchange: Exchange[Any], goals: tuple[Goal, ...]) -> None:
+    def _check_standing(self, request: Request[Any], goals: tuple[Setpoint, ...]) -> None:
         if goals and all(goal.stays is Stays.STILL for goal in goals):
             return
-        everyone = exchange.lane == EVERY_LANE
-        for node in () if not self.faults else list(self.faults) if everyone else _named(exchange, goals):
+        everyone = request.lane == EVERY_LANE
+        for node in () if not self.faults else list(self.faults) if everyone else _named(request, goals):
             if node in self.faults:
                 raise Refused(
                     f"node {node} is at fault: {self.faults[node]}",
@@ -284,7 +285,9 @@ class Gate:
 
     # -- guards --------------------------------------------------------------------------------------------------------
 
-    def _check_guarded(self, guard: Guard | None, goal: Goal, now: float, all_: tuple[Goal, ...]) -> None:
+    def _check_guarded(
+        self, guard: Guard | None, goal: Setpoint, now: float, all_: tuple[Setpoint, ...]
+    ) -> None:
         endless = goal.quantity in ENDLESS
         if endless and goal.value:
             self._check_attended(goal, now)
@@ -298,13 +301,13 @@ class Gate:
             guard.check_known(goal.node, now)
             guard.check_goal(goal, paced=_paced(goal.node, all_))
 
-    def _of_everyone(self, goals: tuple[Goal, ...]) -> tuple[Goal, ...]:
+    def _of_everyone(self, goals: tuple[Setpoint, ...]) -> tuple[Setpoint, ...]:
         """What an order for everyone says to those with a guard as well whom it does not name: it moves them too."""
         named = {goal.node for goal in goals}
         more = (goals[0]._replace(node=node) for node in self.guards if node not in named) if goals else ()
         return (*goals, *more)
 
-    def _check_attended(self, goal: Goal, now: float) -> None:
+    def _check_attended(self, goal: Setpoint, now: float) -> None:
         if self.attended and (self.lease is None or not self.lease.is_attended(now - self.origin)):
             raise Refused(
                 f"node {goal.node}: goal {goal.quantity} has no end of its own, and nobody attends",
@@ -319,29 +322,29 @@ class Gate:
         found = self._seen.get(node)
         if found is None or guard.track is None or found[1] is guard.answer:
             return
-        exchange, answer = found
-        place = self._told_by(exchange, answer).get(node)
+        request, answer = found
+        place = self._told_by(request, answer).get(node)
         if place is not None:
             guard.track.take(place, answer.at)
         # last, so that an interrupt between these lines leaves it to be taken in once more
         guard.answer = answer
 
-    def _told_by(self, exchange: Exchange[Any], answer: Response) -> Mapping[int, float]:
+    def _told_by(self, request: Request[Any], answer: Response) -> Mapping[int, float]:
         """Where those are (rad) whom this answer tells of; that of the last one is kept."""
         if answer is not self._answer:
-            where = exchange.tells_position
+            where = request.reports_position
             self._places = {} if isinstance(where, bool) else where(answer)
             self._answer = answer
         return self._places
 
 
-def _stays(goal: Goal) -> bool:
+def _stays(goal: Setpoint) -> bool:
     """It is told to stay where it stands, or to rest: no guard has anything against that. What its numbers are says
     nothing: a device may have one place only that it allows."""
     return goal.stays is not None
 
 
-def _paced(node: int, goals: Iterable[Goal]) -> bool:
+def _paced(node: int, goals: Iterable[Setpoint]) -> bool:
     """Whether what is ordered of it says how fast it goes there at most, and no time by which it is to be there."""
     told = {goal.quantity for goal in goals if goal.node == node and (goal.quantity != "time" or goal.value)}
     return "speed" in told and "time" not in told
@@ -357,21 +360,21 @@ def _never() -> float:
     return inf
 
 
-def _named(exchange: Exchange[Any], goals: tuple[Goal, ...]) -> set[int]:
+def _named(request: Request[Any], goals: tuple[Setpoint, ...]) -> set[int]:
     """Whom it orders something, and who answers it."""
     nodes = {goal.node for goal in goals}
-    if exchange.later is not None and exchange.later.node is not None:
-        nodes.add(exchange.later.node)
-    if isinstance(exchange.replies, tuple):
-        nodes |= {due.node for due in exchange.replies}
+    if request.deferred is not None and request.deferred.node is not None:
+        nodes.add(request.deferred.node)
+    if isinstance(request.expected, tuple):
+        nodes |= {due.node for due in request.expected}
     return nodes
 
 
-def _goals(handed: Iterable[Handed] | None) -> tuple[Goal, ...]:
+def _goals(handed: Iterable[Handed] | None) -> tuple[Setpoint, ...]:
     return tuple(goal for one in handed or () for goal in one.goals)
 
 
-def _check(goal: Goal) -> None:
+def _check(goal: Setpoint) -> None:
     if not isfinite(goal.value):
         raise _refusal(goal, f"{goal.value} is not a finite number", "give a number")
     if goal.low is None or goal.high is None:
@@ -386,7 +389,7 @@ def _check(goal: Goal) -> None:
         )
 
 
-def _unit(goal: Goal) -> str:
+def _unit(goal: Setpoint) -> str:
     return {"position": "rad", "relative": "rad", "velocity": "rad/s", "current": "A"}.get(goal.quantity, "")
 
 
@@ -394,7 +397,7 @@ def _slack(limit: float) -> float:
     return ROUNDING * max(abs(limit), 1.0)
 
 
-def _refusal(goal: Goal, why: str, advice: str) -> LimitExceeded:
+def _refusal(goal: Setpoint, why: str, advice: str) -> LimitExceeded:
     return LimitExceeded(
         f"node {goal.node}: goal {goal.quantity} refused: {why}",
         expected=""

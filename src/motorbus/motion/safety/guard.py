@@ -9,8 +9,9 @@ from collections.abc import Callable
 from math import inf
 from typing import Any, Final, NamedTuple
 
-from motorbus.core.goal import Stays
-from motorbus.core.operation import Goal, Response, Runnable
+from motorbus.core.request import Response
+from motorbus.core.setpoint import Setpoint, Stays
+from motorbus.core.steps import Runnable
 from motorbus.errors import LimitExceeded, Refused
 from motorbus.motion.safety.track import FRESH, Track
 
@@ -132,7 +133,7 @@ class Guard:
             f"{self.name}: {self._told(why, now)}, so it must not be moved", node=node, **_EXPECTED[why]
         )
 
-    def check_goal(self, goal: Goal, *, paced: bool = False) -> None:
+    def check_goal(self, goal: Setpoint, *, paced: bool = False) -> None:
         """Raise LimitExceeded for a position, or a way, that leads out of the bounds or is too far for one step.
 
         Where nothing that comes with it bounds its speed it is not `paced`, and leads no farther than `Bounds.lead`.
@@ -159,7 +160,7 @@ class Guard:
         if way > self._lead and not paced:
             raise self._unpaced(goal, way)
 
-    def told(self, goal: Goal) -> None:
+    def told(self, goal: Setpoint) -> None:
         """It was ordered this: whoever has set the guard is to know. What only bounds a movement moves nothing."""
         stays = goal.stays is not None
         if goal.quantity == "relative" or stays:
@@ -201,7 +202,7 @@ class Guard:
             low, high = min(low, here - NOISE), max(high, here + NOISE)
         return low <= to <= high
 
-    def check_speed(self, goal: Goal) -> None:
+    def check_speed(self, goal: Setpoint) -> None:
         """Raise LimitExceeded for a velocity, or a bound of it, that is above the bound."""
         if abs(goal.value) > self.bounds.speed + UNIT:
             raise self._refused(
@@ -210,7 +211,7 @@ class Guard:
                 "be slower; where none was said, say a velocity",
             )
 
-    def _unpaced(self, goal: Goal, way: float) -> LimitExceeded:
+    def _unpaced(self, goal: Setpoint, way: float) -> LimitExceeded:
         lead, speed = self.bounds.lead, self.bounds.speed
         return self._refused(
             goal,
@@ -233,7 +234,7 @@ class Guard:
     def _range(self) -> str:
         return f"{self.show(self.bounds.low)} to {self.show(self.bounds.high)}"
 
-    def _refused(self, goal: Goal, why: str, advice: str, reason: str = "limits") -> LimitExceeded:
+    def _refused(self, goal: Setpoint, why: str, advice: str, reason: str = "limits") -> LimitExceeded:
         return LimitExceeded(
             f"{self.name}: {why}", reason=reason, advice=f"{advice}; nothing was sent", node=goal.node
         )

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from motorbus.core.goal import Later
-from motorbus.core.operation import Goal
+from motorbus.core.setpoint import Deferred, Setpoint
 from motorbus.errors import Refused
 
 
-def nobody_stops(goal: Goal) -> Refused:
+def nobody_stops(goal: Setpoint) -> Refused:
     """The error for endless motion of what nobody would stop."""
     return Refused(
         f"node {goal.node}: goal {goal.quantity} has no end of its own, and it is no axis that is open",
@@ -18,7 +17,7 @@ def nobody_stops(goal: Goal) -> Refused:
     )
 
 
-def nothing_known(later: Later) -> Refused:
+def nothing_known(later: Deferred) -> Refused:
     """The error for letting begin what nobody here has handed over."""
     whom = "anybody on this bus" if later.node is None else f"node {later.node}"
     return Refused(

@@ -12,7 +12,7 @@ from enum import Enum
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from motorbus.core.family import Quality
-from motorbus.core.operation import Runnable, Sleep, catch
+from motorbus.core.steps import Runnable, Sleep, catch
 from motorbus.errors import MotorbusError
 from motorbus.motion.capabilities import stop
 from motorbus.motion.moving.forgiving import LOST

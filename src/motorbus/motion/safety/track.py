@@ -13,7 +13,7 @@ from math import isfinite
 from typing import Final, NamedTuple
 
 from motorbus.core.family import Quality
-from motorbus.core.operation import Runnable, Sleep
+from motorbus.core.steps import Runnable, Sleep
 from motorbus.errors import WireError
 
 FASTEST: Final = 20.0

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from motorbus.core.operation import Stops
+from motorbus.core.request import Stops
 
 if TYPE_CHECKING:
     from motorbus.motion.capabilities import AxisVerbs

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.goal import Goal, Later
+from motorbus.core.setpoint import Deferred, Setpoint
 
 
 class Handed(NamedTuple):
     """Something that was handed over, or let begin; how often its node had been stopped by then."""
 
-    later: Later
-    goals: tuple[Goal, ...]
+    later: Deferred
+    goals: tuple[Setpoint, ...]
     stops: int
 
 
@@ -31,13 +31,13 @@ class Waiting:
         found._of.update(self._of)
         return found
 
-    def take(self, later: Later, goals: tuple[Goal, ...], stops: int) -> None:
+    def take(self, later: Deferred, goals: tuple[Setpoint, ...], stops: int) -> None:
         """Something leaves for a node, to wait there."""
         assert later.node is not None
         before, later.done = self._left(later.node), False
         self._of[later.node] = (*before, Handed(later, goals, stops))
 
-    def begin(self, later: Later) -> None:
+    def begin(self, later: Deferred) -> None:
         """What waits is told to begin. Until that is acknowledged it may have been lost, and wait still."""
         before = {node: self._left(node) for node in self._nodes(later)}
         later.done = False
@@ -45,12 +45,12 @@ class Waiting:
             if left:
                 self._of[node] = (*left, Handed(later, (), 0))
 
-    def of(self, later: Later) -> list[Handed] | None:
+    def of(self, later: Deferred) -> list[Handed] | None:
         """All that would begin; None when nobody knows of anything that waits there."""
         found = [one for node in self._nodes(later) for one in self._left(node)]
         return found or None
 
-    def _nodes(self, later: Later) -> list[int]:
+    def _nodes(self, later: Deferred) -> list[int]:
         return list(self._of) if later.node is None else [later.node]
 
     def _left(self, node: int) -> tuple[Handed, ...]:

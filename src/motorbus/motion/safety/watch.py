@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Final
 
 from motorbus.bus.base import BaseBus
 from motorbus.core.family import Health
-from motorbus.core.operation import Emit, Exchange, Sleep, catch
+from motorbus.core.request import Request
+from motorbus.core.steps import Emit, Sleep, catch
 from motorbus.errors import Faulted, MotorbusError, NoReply, Overloaded, WireError
 from motorbus.motion.safety import canary
 from motorbus.motion.safety.canary import HEALTH
@@ -85,7 +86,7 @@ class Watch:
 
     # -- whom to ask, and what the answer means ------------------------------------------------------------------------
 
-    def due(self, now: float, slack: float = inf) -> Exchange[Health] | None:
+    def due(self, now: float, slack: float = inf) -> Request[Health] | None:
         """What is to be asked next, None when nothing is: nobody's turn, or no room in the `slack` (s) of this cycle.
 
         `now` is s on the link's clock. Whoever has been due for long is asked whether there is room or not.
@@ -98,7 +99,7 @@ class Watch:
             return None
         wanted = self._axes[node].able["health"](self._axes[node].device)
         if not isinstance(
-            wanted, Exchange
+            wanted, Request
         ):  # others set it up anew, and it is not known well enough for the moment
             self._passed(node, now, 0.0)
             return None
@@ -196,10 +197,10 @@ class Watch:
 
     def _cost(self, node: int) -> float:
         wanted = self._axes[node].able["health"](self._axes[node].device)
-        return self._air(wanted) if isinstance(wanted, Exchange) else 0.0
+        return self._air(wanted) if isinstance(wanted, Request) else 0.0
 
-    def _air(self, exchange: Exchange[Health]) -> float:
-        return self._bus.family.air_time(exchange, self._bus.rate)
+    def _air(self, request: Request[Health]) -> float:
+        return self._bus.family.air_time(request, self._bus.rate)
 
 
 def _overloaded(axis: AxisVerbs, strain: Strain, now: float) -> Overloaded:

@@ -16,7 +16,7 @@ from math import isfinite
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from motorbus.core import units
-from motorbus.core.entry import shown
+from motorbus.core.register import shown
 from motorbus.errors import RequestError
 from motorbus.motion.machine.model import FARTHEST, NAME, POSITION
 from motorbus.motion.machine.refusal import listed, nearest

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterable
 from itertools import groupby
 from typing import Final, NamedTuple, TypeAlias
 
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Data
 from motorbus.simulation.faults.fault import Fault
 
 INSTANT: Final = 1e-6

@@ -12,7 +12,8 @@ from functools import partial
 from math import inf
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from motorbus.core.operation import ERROR_FLAG, CanFrame, Data
+from motorbus.core.can_frame import ERROR_FLAG, CanFrame
+from motorbus.core.request import Data
 from motorbus.errors import RequestError
 from motorbus.link.base import Delivery, Side
 from motorbus.simulation.faults.fault import SOMEWHERE, Fault

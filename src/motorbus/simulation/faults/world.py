@@ -15,7 +15,7 @@ from math import inf
 from typing import Any, NamedTuple, Protocol
 
 from motorbus.core.family import SimulatedNode, Simulator
-from motorbus.core.operation import Data
+from motorbus.core.request import Data
 from motorbus.errors import RequestError
 from motorbus.simulation.faults.fault import Fault
 from motorbus.simulation.told import told

@@ -1,7 +1,7 @@
 """What to say to FEETECH servos to get a thing done: one function for each, none of which sends anything itself.
 
 Functions of one servo take a `Node` (a `Servo` is one), functions of several take nodes or plain ids. Each returns
-an `Exchange`, or an operation that yields exchanges; a bus carries it out.
+a `Request`, or is a procedure that awaits steps; a bus carries it out.
 """
 
 from __future__ import annotations

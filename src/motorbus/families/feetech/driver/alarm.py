@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from motorbus.core.entry import Table
 from motorbus.core.family import State
+from motorbus.core.register import RegisterMap
 from motorbus.families.feetech.driver.exchanges import read_block
 from motorbus.families.feetech.driver.feedback import state_exchange
 from motorbus.families.feetech.driver.identity import known
@@ -44,7 +44,7 @@ async def alarms(node: Node) -> tuple[str, ...]:
     return in_words(state, bounds)
 
 
-async def bounds_of(node: Node, table: Table) -> Bounds:
+async def bounds_of(node: Node, table: RegisterMap) -> Bounds:
     """What this servo bears, as it is set now."""
 
     def take(data: bytes) -> Bounds:

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from motorbus.core.entry import Table
 from motorbus.core.family import State
-from motorbus.core.operation import Sleep
+from motorbus.core.register import RegisterMap
+from motorbus.core.steps import Sleep
 from motorbus.errors import MotionError, Stalled
 from motorbus.families.feetech.driver.blocked import Blocked, blocked
 from motorbus.families.feetech.driver.feedback import state_exchange
@@ -63,7 +63,7 @@ class Move(NamedTuple):
         return 1.0 + 2.0 * (way / speed + ramps)
 
 
-async def arrive(node: Node, table: Table, move: Move) -> None:
+async def arrive(node: Node, table: RegisterMap, move: Move) -> None:
     """Poll until the move is over. Raises Stalled, or MotionError when the time is up."""
     look = state_exchange(node, table)
     if move.turn is not None:

@@ -8,39 +8,43 @@ from __future__ import annotations
 
 from typing import Final
 
-from motorbus.core.assurance import Assurance, Given, Point
+from motorbus.core.guarantees import Guarantee, Guarantees, Level
 from motorbus.families.feetech.driver.holding import PROMISE as HELD
 from motorbus.families.feetech.driver.motion import Promise
 
-ASSURANCE: Final = Assurance(
-    measured=Point(Given.YES, "it tells it when it is asked; over one turn, unless it is set to count more"),
-    limits=Point(
-        Given.YES, "least and greatest position are kept in its EEPROM, and read before the first goal"
+ASSURANCE: Final = Guarantees(
+    measured=Guarantee(
+        Level.YES, "it tells it when it is asked; over one turn, unless it is set to count more"
     ),
-    stop=Point(Given.PARTLY, Promise.HOLD_ACCEPTED.value),
+    limits=Guarantee(
+        Level.YES, "least and greatest position are kept in its EEPROM, and read before the first goal"
+    ),
+    stop=Guarantee(Level.PARTLY, Promise.HOLD_ACCEPTED.value),
     estops={
-        "torque_off": Point(Given.PARTLY, Promise.TORQUE_OFF_ACCEPTED.value),
-        "hold": Point(Given.PARTLY, HELD),
+        "torque_off": Guarantee(Level.PARTLY, Promise.TORQUE_OFF_ACCEPTED.value),
+        "hold": Guarantee(Level.PARTLY, HELD),
     },
-    alone=Point(
-        Given.PARTLY,
+    alone=Guarantee(
+        Level.PARTLY,
         "led, it goes on to the last small goal, one cycle ahead of its course, makes up what it lags behind, and "
         "holds; moved by itself, it goes on to its goal",
     ),
-    ends=Point(
-        Given.PARTLY,
+    ends=Guarantee(
+        Level.PARTLY,
         "set_velocity, set_duty and set_current turn it until something else is said, also when the host is gone",
     ),
-    torque=Point(Given.YES, "torque off is said up to three times and read back; then an arm sags or falls"),
-    restart=Point(
-        Given.PARTLY,
+    torque=Guarantee(
+        Level.YES, "torque off is said up to three times and read back; then an arm sags or falls"
+    ),
+    restart=Guarantee(
+        Level.PARTLY,
         "looked at while it is led: torque that is off, or registers as power-up leaves them, are a fault; what comes "
         "and goes between two looks is not seen",
     ),
-    strain=Point(
-        Given.PARTLY,
+    strain=Guarantee(
+        Level.PARTLY,
         "it tells load and temperature, most tell current; its own protection comes later and lets it drop its load",
     ),
-    watchdog=Point(Given.NO, "none: it goes on doing the last thing it was told"),
+    watchdog=Guarantee(Level.NO, "none: it goes on doing the last thing it was told"),
     led=True,
 )

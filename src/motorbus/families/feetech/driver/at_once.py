@@ -14,9 +14,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple, TypeVar
 
-from motorbus.core.entry import Table, Value
-from motorbus.core.goal import Later
-from motorbus.core.operation import Exclusive, catch, with_cleanup
+from motorbus.core.register import RegisterMap, Value
+from motorbus.core.setpoint import Deferred
+from motorbus.core.steps import Exclusive, catch, with_cleanup
 from motorbus.errors import DeviceError, MotorbusError, RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import Block, acknowledged
@@ -35,7 +35,7 @@ class _Share(NamedTuple):
     """What one servo is to be handed."""
 
     node: Node
-    table: Table
+    table: RegisterMap
     block: Block
 
 
@@ -97,7 +97,7 @@ async def _released(
         raise
 
 
-async def _nothing_waits(node: Node, table: Table) -> None:
+async def _nothing_waits(node: Node, table: RegisterMap) -> None:
     if await waits(node, table) != IDLE:
         raise RequestError(
             f"a REG WRITE waits in node {node.node} already, and may not be replaced by another one",
@@ -144,5 +144,5 @@ async def _harmless(share: _Share) -> None:
     """Put in its place what does nothing. Said again when it is not acknowledged, for twice is as good as once."""
     block = Block(share.table["lock"].address, _CLOSED)
     request = wire.reg_write(share.node.node, block.address, block.data)
-    later = Later(share.node.node)
+    later = Deferred(share.node.node)
     await acknowledged(share.node, request, block, refusal=lambda _: None, later=later)

@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
-from motorbus.core.entry import Table
 from motorbus.core.family import State
-from motorbus.core.operation import catch
+from motorbus.core.register import RegisterMap
+from motorbus.core.steps import catch
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech.driver.alarm import bounds_of, in_words
 from motorbus.families.feetech.driver.identity import prepare, writable
@@ -53,7 +53,7 @@ async def blockers(node: Node) -> tuple[str, ...]:
     return (*_mode(node, raws), *_power(node, table, raws), *_alarms(table, raws))
 
 
-async def blocked(node: Node, table: Table, state: State) -> Blocked:
+async def blocked(node: Node, table: RegisterMap, state: State) -> Blocked:
     """What can be said about a servo that did not get where it should, of which this is the last sample.
 
     Never raises on account of the servo: what it does not answer is left out.
@@ -98,7 +98,7 @@ def _powerless(mode: Mode | None, name: str, protection: int) -> Iterator[str]:
         yield f"{what}, and its protection current is 0 as well: {other}, write(protection_current=…) one for good"
 
 
-def _power(node: Node, table: Table, raws: Mapping[str, int]) -> Iterator[str]:
+def _power(node: Node, table: RegisterMap, raws: Mapping[str, int]) -> Iterator[str]:
     if raws["torque_enable"] != 1:
         yield f"its torque is off (torque_enable {raws['torque_enable']}): enable_torque()"
     live = CONTROL[table.name].limit
@@ -109,7 +109,7 @@ def _power(node: Node, table: Table, raws: Mapping[str, int]) -> Iterator[str]:
         yield f"max_torque is 0, which bounds its torque{later}: write(max_torque=1.0)"
 
 
-def _alarms(table: Table, raws: Mapping[str, int]) -> Iterator[str]:
+def _alarms(table: RegisterMap, raws: Mapping[str, int]) -> Iterator[str]:
     names = table["hardware_error"].bits
     for bit, name in names.items():
         if not raws["hardware_error"] >> bit & 1:

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from motorbus.core.entry import Entry, Table
-from motorbus.core.operation import Emit
+from motorbus.core.register import Register, RegisterMap
+from motorbus.core.steps import Emit
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.exchanges import Block, read_block
 from motorbus.families.feetech.driver.node import Node
@@ -31,7 +31,7 @@ class Powerless(NamedTuple):
         )
 
 
-async def ask_bound(node: Node, table: Table, current: float | None = None) -> None:
+async def ask_bound(node: Node, table: RegisterMap, current: float | None = None) -> None:
     """Read the present bound unless it is known, or is about to be set; nothing where the map has none.
 
     Reports `Powerless` when it is 0. Raises RequestError when its protection current is 0 as well.
@@ -45,7 +45,7 @@ async def ask_bound(node: Node, table: Table, current: float | None = None) -> N
         await Emit(Powerless(node.node, float(row.to_value(raw))))
 
 
-def raw_bound(node: Node, row: Entry, current: float | None) -> int:
+def raw_bound(node: Node, row: Register, current: float | None) -> int:
     """The raw bound for an order: `current` (A), else what is set, else the protection current.
 
     Raises RequestError when that is 0, or is not known: an order may not make a servo powerless, and does not guess.
@@ -71,7 +71,7 @@ def raw_bound(node: Node, row: Entry, current: float | None) -> int:
 
 
 def leaving_current_mode(
-    node: Node, table: Table, wanted: Mode | None, blocks: Sequence[Block]
+    node: Node, table: RegisterMap, wanted: Mode | None, blocks: Sequence[Block]
 ) -> Sequence[Block]:
     """These blocks, which put a limp servo into another mode, with what makes a bound of its last goal current.
 

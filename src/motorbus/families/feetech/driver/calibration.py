@@ -17,8 +17,8 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from motorbus.core.entry import Entry, Table, is_number, shown
-from motorbus.core.operation import Effect, Priority, TimeoutClass
+from motorbus.core.register import Register, RegisterMap, is_number, shown
+from motorbus.core.request import Effect, Priority, TimeoutClass
 from motorbus.errors import DeviceError, MotorbusError, RequestError, VerificationFailed
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver import eeprom
@@ -70,8 +70,8 @@ class Zero(NamedTuple):
 class _Job(NamedTuple):
     """What is to be done, in raw counts, with the rows that it takes."""
 
-    position: Entry
-    offset: Entry
+    position: Register
+    offset: Register
     turn: int
     goal: int
     how: str
@@ -139,7 +139,7 @@ def _sensible(node: Node, to: float | None, how: str) -> None:
         )
 
 
-def _offset_row(node: Node, table: Table) -> Entry:
+def _offset_row(node: Node, table: RegisterMap) -> Register:
     if "homing_offset" in table:
         return table["homing_offset"]
     assert node.identity is not None
@@ -151,7 +151,7 @@ def _offset_row(node: Node, table: Table) -> Entry:
     )
 
 
-def _job(node: Node, table: Table, to: float | None, how: str) -> _Job:
+def _job(node: Node, table: RegisterMap, to: float | None, how: str) -> _Job:
     control = CONTROL[table.name]
     offset, position = _offset_row(node, table), table["present_position"]
     if node.known_mode is not Mode.POSITION:
@@ -243,7 +243,7 @@ def _turned(node: Node, job: _Job, pose: Pose) -> RequestError:
 # -- doing it ------------------------------------------------------------------------------------------------
 
 
-async def _pose(node: Node, position: Entry, offset: Entry) -> Pose:
+async def _pose(node: Node, position: Register, offset: Register) -> Pose:
     def told(data: bytes) -> int:
         return _offset_told(node, offset, data)
 
@@ -254,7 +254,7 @@ async def _pose(node: Node, position: Entry, offset: Entry) -> Pose:
     return Pose(here, held)
 
 
-def _offset_told(node: Node, row: Entry, data: bytes) -> int:
+def _offset_told(node: Node, row: Register, data: bytes) -> int:
     """The raw offset. Raises DeviceError for a number that the map of this servo cannot mean."""
     raw = row.decode(data)
     code = int.from_bytes(data, "little" if row.order == "little" else "big")
@@ -315,7 +315,7 @@ async def _ordered(node: Node, job: _Job, plan: _Plan) -> MotorbusError | None:
         block = Block(0, b"", Effect.PERSISTENT)
     doubt = None
     try:
-        await acknowledged(node, request, block, rank=Priority.CONFIGURATION, timeout=TimeoutClass.STORE)
+        await acknowledged(node, request, block, priority=Priority.CONFIGURATION, timeout=TimeoutClass.STORE)
     except DOUBTS as error:
         doubt = error
     if plan.way is Middle.SWITCH:

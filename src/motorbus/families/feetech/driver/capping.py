@@ -6,8 +6,8 @@ bounds the current. Source: `table.CONTROL`.
 
 from __future__ import annotations
 
-from motorbus.core.entry import Storage
-from motorbus.core.operation import Goal
+from motorbus.core.register import Storage
+from motorbus.core.setpoint import Setpoint
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.bound import raw_bound, refuse_current
 from motorbus.families.feetech.driver.exchanges import Block
@@ -55,5 +55,5 @@ async def cap_current(node: Node, current: float) -> None:
     row = table[node.control.current]
     raw = raw_bound(node, row, current)
     value = float(node.value(row, raw))
-    goal = Goal(node.node, "cap", value, 0.0, float(node.value(row, row.high)))
+    goal = Setpoint(node.node, "cap", value, 0.0, float(node.value(row, row.high)))
     await ordered(node, table, Block(row.address, row.encode(raw), row.effect, (goal,)))

@@ -7,16 +7,7 @@ parts it from the servo, leaves the journal open.
 
 from __future__ import annotations
 
-from motorbus.core.operation import (
-    ASKED,
-    INTENT,
-    Emit,
-    Exclusive,
-    JournalEntry,
-    SetBitrate,
-    catch,
-    with_cleanup,
-)
+from motorbus.core.steps import ASKED, INTENT, Emit, Exclusive, JournalEntry, SetBitrate, catch, with_cleanup
 from motorbus.errors import MotorbusError, RequestError, VerificationFailed
 from motorbus.families.feetech.driver.identity import learn
 from motorbus.families.feetech.driver.jobs import SET_ID, SHIPPED_ID, Course, Job, Place

@@ -7,11 +7,11 @@ copied, and is read from the rows; who adds a row that belongs to one servo mark
 
 from __future__ import annotations
 
-from motorbus.core.entry import Entry, Storage, Table
-from motorbus.core.operation import Effect
+from motorbus.core.register import Register, RegisterMap, Storage
+from motorbus.core.request import Effect
 
 
-def copyable(table: Table) -> tuple[Entry, ...]:
+def copyable(table: RegisterMap) -> tuple[Register, ...]:
     """The rows of this map that another servo with the same map may be given, in the order of their addresses.
 
     Settings in EEPROM only. Never what says who it is or how it is found (id, second id, rate, model, firmware), what
@@ -20,6 +20,6 @@ def copyable(table: Table) -> tuple[Entry, ...]:
     return tuple(row for row in table.values() if _copied(row))
 
 
-def _copied(row: Entry) -> bool:
+def _copied(row: Register) -> bool:
     setting = row.storage is Storage.EEPROM and row.readable and row.writable
     return setting and not row.protected and row.effect is not Effect.IDENTITY

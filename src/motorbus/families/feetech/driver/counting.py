@@ -20,8 +20,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from motorbus.core.entry import Table
-from motorbus.core.operation import Effect, Exchange, Priority, TimeoutClass, catch, with_cleanup
+from motorbus.core.register import RegisterMap
+from motorbus.core.request import Effect, Priority, Request, TimeoutClass
+from motorbus.core.steps import catch, with_cleanup
 from motorbus.errors import RequestError, VerificationFailed
 from motorbus.families.feetech.driver import eeprom
 from motorbus.families.feetech.driver.exchanges import PRESENT, Block, confirmed, read_block
@@ -112,7 +113,7 @@ async def set_many_turns(node: Node, on: bool, limits: tuple[float, float] | Non
     return Recounted(before, after, f"it is limp now; {_FORGETS}" if on else "it is limp now")
 
 
-def _image(node: Node) -> Exchange[bytes]:
+def _image(node: Node) -> Request[bytes]:
     """Registers 0 to 39, from which the node learns what it is and how it is set."""
 
     def take(image: bytes) -> bytes:
@@ -122,7 +123,7 @@ def _image(node: Node) -> Exchange[bytes]:
     return read_block(node, 0, IMAGE, take)
 
 
-def _counts(node: Node, table: Table, image: bytes) -> Exchange[ManyTurns]:
+def _counts(node: Node, table: RegisterMap, image: bytes) -> Request[ManyTurns]:
     row, position = table["phase"], table["present_position"]
 
     def take(data: bytes) -> ManyTurns:
@@ -139,7 +140,7 @@ def _counts(node: Node, table: Table, image: bytes) -> Exchange[ManyTurns]:
 
 
 def _limits(
-    node: Node, table: Table, on: bool, limits: tuple[float, float] | None, before: ManyTurns
+    node: Node, table: RegisterMap, on: bool, limits: tuple[float, float] | None, before: ManyTurns
 ) -> tuple[int, int]:
     """Both limits as they shall be, raw. They count as goals do, whatever the angular resolution."""
     if on:
@@ -161,7 +162,7 @@ def _limits(
     return raws
 
 
-def _refuse_one_turn(node: Node, table: Table) -> None:
+def _refuse_one_turn(node: Node, table: RegisterMap) -> None:
     if node.control.many_turns:
         return
     raise RequestError(
@@ -172,7 +173,7 @@ def _refuse_one_turn(node: Node, table: Table) -> None:
     )
 
 
-def _limits_wanted(node: Node, table: Table) -> RequestError:
+def _limits_wanted(node: Node, table: RegisterMap) -> RequestError:
     return RequestError(
         f"node {node.node} counts over many turns, so it has no limits, and nobody here knows which it shall have",
         expected=f"limits=(low, high), in rad; {_widest(node, table)}",
@@ -181,7 +182,7 @@ def _limits_wanted(node: Node, table: Table) -> RequestError:
     )
 
 
-def _no_limits(node: Node, table: Table, wished: tuple[float, float]) -> RequestError:
+def _no_limits(node: Node, table: RegisterMap, wished: tuple[float, float]) -> RequestError:
     return RequestError(
         f"node {node.node}: limits {wished[0]} to {wished[1]} rad are none",
         expected=f"the lower one first; {_widest(node, table)}",
@@ -190,7 +191,7 @@ def _no_limits(node: Node, table: Table, wished: tuple[float, float]) -> Request
     )
 
 
-def _widest(node: Node, table: Table) -> str:
+def _widest(node: Node, table: RegisterMap) -> str:
     """The limits it ships with, or the widest it can have where that has not been published."""
     rows = table["min_position_limit"], table["max_position_limit"]
     defaults = [row.default for row in rows if row.default is not None]
@@ -202,7 +203,7 @@ def _widest(node: Node, table: Table) -> str:
 # -- doing it ------------------------------------------------------------------------------------------------
 
 
-async def _recounted(node: Node, table: Table, on: bool, limits: tuple[int, int], image: bytes) -> None:
+async def _recounted(node: Node, table: RegisterMap, on: bool, limits: tuple[int, int], image: bytes) -> None:
     row, low, high = (table[name] for name in ("phase", "min_position_limit", "max_position_limit"))
     seen = image[low.address : row.address + row.size]
     again = await read_block(node, low.address, len(seen), bytes, timeout=TimeoutClass.STORE)
@@ -259,7 +260,7 @@ async def _restored(node: Node, lock: int, change: _Change) -> None:
     """Open the lock again, for whoever has lost its supply has closed it, let it go limp once more, for it may have
     begun with torque on, and write what was there."""
     opened = Block(lock, b"\0", Effect.PERSISTENT)
-    await confirmed(node, opened, rank=Priority.CONFIGURATION, timeout=TimeoutClass.STORE)
+    await confirmed(node, opened, priority=Priority.CONFIGURATION, timeout=TimeoutClass.STORE)
     await disable_torque(node)
     await eeprom.stored(node, Block(change.address, change.before, Effect.PERSISTENT))
 

@@ -8,8 +8,9 @@ Source: STS3215 memory table V3.6; FEETECH SDK headers; servolab, measured on ST
 
 from __future__ import annotations
 
-from motorbus.core.entry import Table, is_number, shown
-from motorbus.core.operation import Effect, Goal
+from motorbus.core.register import RegisterMap, is_number, shown
+from motorbus.core.request import Effect
+from motorbus.core.setpoint import Setpoint
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.families.feetech.driver.arrival import Move, arrive
 from motorbus.families.feetech.driver.bound import ask_bound, refuse_current
@@ -39,7 +40,7 @@ async def set_velocity(
     row = table["goal_velocity"]
     raw = node.raw(row, velocity)
     low, high = (float(node.value(row, bound)) for bound in (row.low, row.high))
-    goal = Goal(node.node, "velocity", float(node.value(row, raw)), low, high)
+    goal = Setpoint(node.node, "velocity", float(node.value(row, raw)), low, high)
     block = Block(row.address, row.encode(raw), row.effect, (goal,), under=node.settings)
     await ask_bound(node, table, current)
     if current is not None or not node.bound:
@@ -72,7 +73,7 @@ async def set_duty(node: Node, duty: float) -> None:
     _heed(node, Mode.PWM, "cannot be given a duty")
     row = table[node.control.duty]
     raw = round(duty / DUTY)
-    goal = Goal(node.node, "load", raw * DUTY, -1.0, 1.0)
+    goal = Setpoint(node.node, "load", raw * DUTY, -1.0, 1.0)
     await ordered(node, table, Block(row.address, row.encode(raw), row.effect, (goal,)))
 
 
@@ -95,7 +96,7 @@ async def set_current(node: Node, current: float) -> None:
             advice="nothing was sent",
             node=node.node,
         )
-    goal = Goal(node.node, "current", float(row.to_value(raw)), low, high)
+    goal = Setpoint(node.node, "current", float(row.to_value(raw)), low, high)
     await ordered(node, table, Block(row.address, row.encode(raw), row.effect, (goal,)))
 
 
@@ -136,13 +137,13 @@ async def step(
     await stops(_stepped(node, table, block, move._replace(start=start, turn=turn)), node)
 
 
-async def _stepped(node: Node, table: Table, block: Block, move: Move) -> None:
+async def _stepped(node: Node, table: RegisterMap, block: Block, move: Move) -> None:
     await confirmed(node, block)
     await arrive(node, table, move)
 
 
 def _step_block(
-    node: Node, table: Table, by: float, velocity: float | None, acceleration: float | None
+    node: Node, table: RegisterMap, by: float, velocity: float | None, acceleration: float | None
 ) -> Block:
     row = table["goal_position"]
     raw = node.raw(row, by)
@@ -156,7 +157,7 @@ def _step_block(
         )
     ramp = ramp_of(node, table, acceleration)
     more = burst(node, table, velocity, None)
-    goal = Goal(node.node, "relative", float(node.value(row, raw)), -most, most)
+    goal = Setpoint(node.node, "relative", float(node.value(row, raw)), -most, most)
     speed = table["goal_velocity"]
     goals = (goal, speed_goal(node, speed, speed.decode(more[-speed.size :])))
     return Block(

@@ -25,19 +25,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple, TypeVar
 
-from motorbus.core.entry import Entry, Storage, Table
-from motorbus.core.goal import Later
-from motorbus.core.operation import (
-    Effect,
-    Emit,
-    Exclusive,
-    Priority,
-    Procedure,
-    Stops,
-    TimeoutClass,
-    catch,
-    with_cleanup,
-)
+from motorbus.core.register import Register, RegisterMap, Storage
+from motorbus.core.request import Effect, Priority, Stops, TimeoutClass
+from motorbus.core.setpoint import Deferred
+from motorbus.core.steps import Emit, Exclusive, Procedure, catch, with_cleanup
 from motorbus.errors import MotorbusError, OutcomeUnknown, RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import (
@@ -86,7 +77,7 @@ class Torque:
         """Torque off again, and remember how many stops have left for this servo. Refused when others left since."""
         self._node = node.node
         block = limp(node.node)._replace(refusal=self._count)
-        await confirmed(node, block, rank=Priority.CONFIGURATION)
+        await confirmed(node, block, priority=Priority.CONFIGURATION)
 
     def _count(self, stops: Stops) -> MotorbusError | None:
         if self._stops < 0:
@@ -119,7 +110,12 @@ class Change(NamedTuple):
 
 
 async def store(
-    node: Node, table: Table, blocks: Sequence[Block], *, always: bool = False, torque: Torque | None = None
+    node: Node,
+    table: RegisterMap,
+    blocks: Sequence[Block],
+    *,
+    always: bool = False,
+    torque: Torque | None = None,
 ) -> bool:
     """Make these EEPROM registers hold this for good, with nobody else on the bus meanwhile; gives whether it wrote.
 
@@ -136,7 +132,7 @@ async def store(
 
 
 async def _stored_unlike(
-    node: Node, table: Table, blocks: Sequence[Block], always: bool, torque: Torque | None
+    node: Node, table: RegisterMap, blocks: Sequence[Block], always: bool, torque: Torque | None
 ) -> bool:
     lock = table["lock"].address
     changes: list[Change] = []
@@ -162,7 +158,7 @@ async def _stored_unlike(
     return True
 
 
-async def _unlike(node: Node, table: Table, block: Block, always: bool) -> list[Change]:
+async def _unlike(node: Node, table: RegisterMap, block: Block, always: bool) -> list[Change]:
     """The runs of whole registers in this block that are to be written; RAM, which wears nothing, as it is given."""
     rows = sorted(rows_in(table, block), key=lambda row: row.address)
     if not any(row.storage is Storage.EEPROM for row in rows):
@@ -189,7 +185,7 @@ async def _unlike(node: Node, table: Table, block: Block, always: bool) -> list[
     ]
 
 
-async def unlocked(node: Node, table: Table, work: Callable[[], Procedure[T]]) -> T:
+async def unlocked(node: Node, table: RegisterMap, work: Callable[[], Procedure[T]]) -> T:
     """Carry out `work` on a limp servo whose lock is open, with nobody else on the bus; the lock is closed again.
 
     Its settings are forgotten before anybody else has the bus again, so what others made by them meanwhile is refused.
@@ -198,7 +194,7 @@ async def unlocked(node: Node, table: Table, work: Callable[[], Procedure[T]]) -
 
 
 async def _guarded(
-    node: Node, table: Table, work: Callable[[], Procedure[T]], begun: Sequence[Change], torque: Torque
+    node: Node, table: RegisterMap, work: Callable[[], Procedure[T]], begun: Sequence[Change], torque: Torque
 ) -> T:
     lock, pending = table["lock"].address, table["reg_write_pending"].address
     trouble: list[BaseException] = []
@@ -215,13 +211,13 @@ async def _guarded(
         node.forget_settings()
 
 
-def rows_in(table: Table, block: Block) -> list[Entry]:
+def rows_in(table: RegisterMap, block: Block) -> list[Register]:
     """The rows that begin in this block."""
     end = block.address + len(block.data)
     return [row for row in table.values() if block.address <= row.address < end]
 
 
-def moves(table: Table, block: Block) -> bool:
+def moves(table: RegisterMap, block: Block) -> bool:
     """Whether one of the registers of this block would move a servo that has torque, which goes back inside limits."""
     return any(row.effect is Effect.MOTION or row.name in _LIMITS for row in rows_in(table, block))
 
@@ -257,7 +253,7 @@ async def _harmless(node: Node, pending: int) -> None:
     if await read_block(node, pending, 1, bytes, timeout=TimeoutClass.STORE) != _IDLE:
         request = wire.reg_write(node.node, LIMP.address, LIMP.data)
         block = Block(LIMP.address, LIMP.data)
-        await acknowledged(node, request, block, rank=Priority.CONFIGURATION, later=Later(node.node))
+        await acknowledged(node, request, block, priority=Priority.CONFIGURATION, later=Deferred(node.node))
 
 
 async def still_open(node: Node, lock: int) -> None:
@@ -290,7 +286,7 @@ async def stored(node: Node, block: Block) -> None:
 
 
 async def _put(node: Node, block: Block) -> None:
-    await confirmed(node, block, rank=Priority.CONFIGURATION, timeout=TimeoutClass.STORE)
+    await confirmed(node, block, priority=Priority.CONFIGURATION, timeout=TimeoutClass.STORE)
 
 
 async def _locked(

@@ -13,19 +13,18 @@ from operator import attrgetter
 from typing import Final, NamedTuple, TypeVar
 
 from motorbus import errors
-from motorbus.core.goal import Later
-from motorbus.core.operation import (
+from motorbus.core.request import (
     Effect,
-    Exchange,
+    ExactDecoder,
     Expected,
-    Goal,
+    Precondition,
     Priority,
-    Refusal,
+    Request,
     Response,
     Stops,
     TimeoutClass,
-    Whole,
 )
+from motorbus.core.setpoint import Deferred, Setpoint
 from motorbus.errors import (
     MotorbusError,
     NoReply,
@@ -65,10 +64,10 @@ class Block(NamedTuple):
     address: int
     data: bytes
     effect: Effect = Effect.NONE
-    goals: tuple[Goal, ...] = ()
+    goals: tuple[Setpoint, ...] = ()
     repeatable: bool = True
     under: Settings | None = None
-    refusal: Refusal | None = None
+    refusal: Precondition | None = None
 
 
 def read_block(
@@ -77,14 +76,14 @@ def read_block(
     count: int,
     take: Callable[[bytes], T],
     *,
-    rank: Priority = Priority.POLL,
+    priority: Priority = Priority.POLL,
     timeout: TimeoutClass = TimeoutClass.REPLY,
-    whole: Callable[[int], Whole[T] | None] = lambda _: None,
-) -> Exchange[T]:
+    whole: Callable[[int], ExactDecoder[T] | None] = lambda _: None,
+) -> Request[T]:
     """READ `count` bytes from `address` on; the value is what `take` makes of them.
 
     Its other form reads one byte more and leaves it unused: the length is all in a reply that tells it from the last.
-    One that is kept says by `whole` what a packet with so many bytes of data comes to; see `Exchange`.
+    One that is kept says by `whole` what a packet with so many bytes of data comes to; see `Request`.
     """
 
     def read(answer: Response) -> T:
@@ -92,18 +91,18 @@ def read_block(
         node.heard(frame[4], answer.at)
         return take(frame[5 : 5 + count])
 
-    def exchange(count: int, other: int) -> Exchange[T]:
+    def exchange(count: int, other: int) -> Request[T]:
         request, dues = _question(node, address, count)
-        return Exchange(
+        return Request(
             request,
             dues,
             read,
-            rank=rank,
-            timeout=timeout,
+            priority=priority,
+            reply_within=timeout,
             repeatable=True,
-            tells_position=told_by({node.node: node}, address, count),
-            other=lambda: exchange(other, count),
-            whole=whole(count),
+            reports_position=told_by({node.node: node}, address, count),
+            alternate=lambda: exchange(other, count),
+            decode_exact=whole(count),
         )
 
     return exchange(count, another(address, count))
@@ -121,7 +120,7 @@ def _question(node: Node, address: int, count: int) -> tuple[bytes, tuple[Expect
 def told_by(
     nodes: Mapping[int, Node], address: int, count: int
 ) -> bool | Callable[[Response], Mapping[int, float]]:
-    """What a read of these registers of these servos says of where they are; see `Exchange.tells_position`."""
+    """What a read of these registers of these servos says of where they are; see `Request.reports_position`."""
     return address == PRESENT and count > 1 and partial(places, nodes)
 
 
@@ -147,12 +146,12 @@ def acknowledged(
     request: bytes,
     block: Block | None = None,
     *,
-    rank: Priority = Priority.CONTROL,
+    priority: Priority = Priority.CONTROL,
     timeout: TimeoutClass = TimeoutClass.REPLY,
-    refusal: Refusal | None = None,
+    refusal: Precondition | None = None,
     after: Callable[[], None] = lambda: None,
-    later: Later | None = None,
-) -> Exchange[None]:
+    later: Deferred | None = None,
+) -> Request[None]:
     """A request that is answered by nothing but an acknowledgement; by silence at status return level 0.
 
     It is not sent once the settings of the servo are others than when it was made, unless `refusal` judges that.
@@ -166,21 +165,21 @@ def acknowledged(
         after()
 
     answers = node.settings is None or node.settings.answers_writes
-    return Exchange(
+    return Request(
         request,
         (Expected(node.node, node.node, ACKNOWLEDGED),) if answers else (),
         read,
-        rank=rank,
+        priority=priority,
         effect=block.effect if block else Effect.NONE,
-        goals=block.goals if block else (),
-        timeout=timeout,
+        setpoints=block.goals if block else (),
+        reply_within=timeout,
         repeatable=block is not None and block.repeatable,
-        refusal=refusal or _refusal_of(node, block),
-        later=later,
+        precondition=refusal or _refusal_of(node, block),
+        deferred=later,
     )
 
 
-def _refusal_of(node: Node, block: Block | None) -> Refusal:
+def _refusal_of(node: Node, block: Block | None) -> Precondition:
     changed = changed_since([(node, block.under if block else None)])
     if block is None or block.refusal is None:
         return changed
@@ -188,7 +187,7 @@ def _refusal_of(node: Node, block: Block | None) -> Refusal:
     return lambda stops: changed(stops) or own(stops)
 
 
-def changed_since(made: Iterable[tuple[Node, Settings | None]]) -> Refusal:
+def changed_since(made: Iterable[tuple[Node, Settings | None]]) -> Precondition:
     """Refuses an order for these servos once one has other settings than those, or than now (None): in another mode,
     with other limits or another zero it would mean something else. What is not known any more counts as other."""
     under = [(node, settings or node.settings) for node, settings in made]
@@ -226,13 +225,13 @@ def outdated(node: Node, what: str = "this order") -> RequestError:
 def unanswered(
     request: bytes,
     effect: Effect,
-    goals: tuple[Goal, ...] = (),
+    goals: tuple[Setpoint, ...] = (),
     *,
-    rank: Priority = Priority.CONTROL,
-    refusal: Refusal | None = None,
+    priority: Priority = Priority.CONTROL,
+    refusal: Precondition | None = None,
     after: Callable[[], None] = lambda: None,
-    later: Later | None = None,
-) -> Exchange[None]:
+    later: Deferred | None = None,
+) -> Request[None]:
     """A request to several servos, which none of them answers."""
 
     def read(_: Response) -> None:
@@ -240,32 +239,49 @@ def unanswered(
             later.done = True
         after()
 
-    return Exchange(request, (), read, rank=rank, effect=effect, goals=goals, refusal=refusal, later=later)
+    return Request(
+        request,
+        (),
+        read,
+        priority=priority,
+        effect=effect,
+        setpoints=goals,
+        precondition=refusal,
+        deferred=later,
+    )
 
 
 def write_block(
-    node: Node, block: Block, *, rank: Priority = Priority.CONTROL, timeout: TimeoutClass = TimeoutClass.REPLY
-) -> Exchange[None]:
+    node: Node,
+    block: Block,
+    *,
+    priority: Priority = Priority.CONTROL,
+    timeout: TimeoutClass = TimeoutClass.REPLY,
+) -> Request[None]:
     """WRITE adjoining registers. The acknowledgement proves receipt, not more."""
     return acknowledged(
-        node, wire.write(node.node, block.address, block.data), block, rank=rank, timeout=timeout
+        node, wire.write(node.node, block.address, block.data), block, priority=priority, timeout=timeout
     )
 
 
 async def confirmed(
-    node: Node, block: Block, *, rank: Priority = Priority.CONTROL, timeout: TimeoutClass = TimeoutClass.REPLY
+    node: Node,
+    block: Block,
+    *,
+    priority: Priority = Priority.CONTROL,
+    timeout: TimeoutClass = TimeoutClass.REPLY,
 ) -> None:
     """WRITE; when no acknowledgement is due, or none came, find out by reading back.
 
     Raises OutcomeUnknown when that cannot be found out, VerificationFailed when the write did not take effect.
     """
     doubt: MotorbusError | None = None
-    exchange = write_block(node, block, rank=rank, timeout=timeout)
+    exchange = write_block(node, block, priority=priority, timeout=timeout)
     try:
         await exchange
     except DOUBTS as error:
         doubt = error
-    if doubt is None and exchange.replies:
+    if doubt is None and exchange.expected:
         return
     if doubt is not None and not block.repeatable:
         raise doubt

@@ -10,9 +10,10 @@ from collections.abc import Callable
 from typing import Final, TypeVar
 
 from motorbus.core.agreed import agreed
-from motorbus.core.entry import Entry, Table
 from motorbus.core.family import State
-from motorbus.core.operation import Exchange, Runnable
+from motorbus.core.register import Register, RegisterMap
+from motorbus.core.request import Request
+from motorbus.core.steps import Runnable
 from motorbus.errors import DeviceError
 from motorbus.families.feetech.driver.exchanges import PRESENT, read_block
 from motorbus.families.feetech.driver.gauge import quantity
@@ -36,7 +37,7 @@ def telemetry(node: Node) -> Runnable[State]:
     return state_exchange(node, node.table)
 
 
-def state_exchange(node: Node, table: Table) -> Exchange[State]:
+def state_exchange(node: Node, table: RegisterMap) -> Request[State]:
     """As `telemetry`, of a servo that is known."""
 
     def take(data: bytes) -> State:
@@ -45,7 +46,7 @@ def state_exchange(node: Node, table: Table) -> Exchange[State]:
     return read_block(node, PRESENT, FEEDBACK, take)
 
 
-def state_of(node: Node, table: Table, data: bytes) -> State:
+def state_of(node: Node, table: RegisterMap, data: bytes) -> State:
     """What the bytes of the feedback block say."""
 
     def value(name: str) -> float | None:
@@ -74,7 +75,7 @@ async def _after(node: Node, say: Callable[[Node], Runnable[T]]) -> T:
     return await say(node)
 
 
-def _raw(row: Entry, data: bytes) -> int:
+def _raw(row: Register, data: bytes) -> int:
     return row.decode(data[row.address - PRESENT : row.address - PRESENT + row.size])
 
 
@@ -133,9 +134,9 @@ def _quantity(node: Node, name: str) -> Runnable[float]:
     def take(data: bytes) -> float:
         return float(node.value(row, row.decode(data)))
 
-    exchange = read_block(node, row.address, row.size, take, whole=lambda count: quantity(node, row, count))
-    node.kept[name] = node.settings, exchange
-    return exchange
+    request = read_block(node, row.address, row.size, take, whole=lambda count: quantity(node, row, count))
+    node.kept[name] = node.settings, request
+    return request
 
 
 def _untold(node: Node, what: str) -> DeviceError:

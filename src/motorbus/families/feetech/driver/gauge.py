@@ -12,8 +12,8 @@ from struct import Struct
 from typing import Final, Literal, NamedTuple
 from zlib import adler32
 
-from motorbus.core.entry import Coding, Entry
-from motorbus.core.operation import UNLIKE, Unlike, Whole
+from motorbus.core.register import Coding, Register
+from motorbus.core.request import ExactDecoder
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.node import CHANGES, PRESENT_POSITION, Node, Settings
 
@@ -35,7 +35,7 @@ class Measure(NamedTuple):
     """
 
     node: Node
-    row: Entry
+    row: Register
     settings: Settings
     plain: int
     scale: float
@@ -43,7 +43,7 @@ class Measure(NamedTuple):
     order: Literal["little", "big"]
 
 
-def measure(node: Node, row: Entry) -> Measure | None:
+def measure(node: Node, row: Register) -> Measure | None:
     """The one for a servo as it is now; None where nothing so simple holds."""
     settings = node.settings
     if settings is None or not _is_simple(row, settings):
@@ -53,18 +53,18 @@ def measure(node: Node, row: Entry) -> Measure | None:
     return Measure(node, row, settings, _plain(row), row.scale, factor, order)
 
 
-def _is_simple(row: Entry, settings: Settings) -> bool:
+def _is_simple(row: Register, settings: Settings) -> bool:
     return bool(row.unit) and not (settings.shift and row.name == PRESENT_POSITION)
 
 
-def _plain(row: Entry) -> int:
+def _plain(row: Register) -> int:
     """A code below this is its own raw value."""
     if row.sign_bit is not None:
         return 1 << row.sign_bit
     return 1 << 8 * row.size - (row.coding is Coding.TWOS_COMPLEMENT)
 
 
-def quantity(node: Node, row: Entry, count: int) -> Whole[float] | None:
+def quantity(node: Node, row: Register, count: int) -> ExactDecoder[float] | None:
     """What a status packet says that brings this row, and perhaps a byte more: its value in the row's unit."""
     settings = node.settings
     if settings is None or row.size > 2 or not _is_simple(row, settings):
@@ -76,13 +76,13 @@ def quantity(node: Node, row: Entry, count: int) -> Whole[float] | None:
 
     seen: object = None  # `CHANGES.now` when it was found to have those settings
 
-    def whole(data: bytes, at: float) -> float | Unlike:
+    def whole(data: bytes, at: float) -> float | None:
         nonlocal seen
         if len(data) != size or data[:5] != begin or adler32(data) & 255 != SOUND:
-            return UNLIKE
+            return None
         if (now := CHANGES.now) is not seen:
             if node.settings is not settings:
-                return UNLIKE
+                return None
             seen = now
         raw = data[low] | data[high] << 8 if wide else data[5]
         if raw >= plain:
@@ -133,14 +133,14 @@ class Packets:
         return total & low == self._rest
 
 
-def blocks(nodes: Sequence[Node], count: int, size: int) -> Whole[dict[int, bytes]]:
+def blocks(nodes: Sequence[Node], count: int, size: int) -> ExactDecoder[dict[int, bytes]]:
     """The first `count` bytes of data of each, by id, where each packet brings `size`."""
     packets = Packets([node.node for node in nodes], size)
     parts, end = list(zip(nodes, packets.parts, strict=True)), 5 + count
 
-    def whole(data: bytes, at: float) -> dict[int, bytes] | Unlike:
+    def whole(data: bytes, at: float) -> dict[int, bytes] | None:
         if not packets.are_sound(data):
-            return UNLIKE
+            return None
         found = {}
         for node, part in parts:
             found[node.node] = data[part][5:end]

@@ -10,8 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple, TypeVar
 
-from motorbus.core.entry import Table, Value, shown
-from motorbus.core.operation import Exchange, Expected, Goal, Response, Whole, catch
+from motorbus.core.register import RegisterMap, Value, shown
+from motorbus.core.request import ExactDecoder, Expected, Request, Response
+from motorbus.core.setpoint import Setpoint
+from motorbus.core.steps import catch
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import (
@@ -108,13 +110,13 @@ async def _sync_read_span(
 
 def block_of_each(
     nodes: Sequence[Node], address: int, count: int, *, kept: bool = False
-) -> Exchange[dict[int, bytes]]:
+) -> Request[dict[int, bytes]]:
     """SYNC READ one block of each; the value holds the bytes of those who answered. `kept`: it is run again."""
 
     def read(answer: Response) -> dict[int, bytes]:
         return {id: data[:count] for id, data in _heard(by_id, answer)}
 
-    def whole(size: int) -> Whole[dict[int, bytes]] | None:
+    def whole(size: int) -> ExactDecoder[dict[int, bytes]] | None:
         return blocks(nodes, count, size) if kept and size > 0 else None
 
     by_id = {node.node: node for node in nodes}
@@ -127,8 +129,8 @@ def sync_exchange(
     count: int,
     read: Callable[[Response], T],
     places: Callable[[Response], Mapping[int, float]] | None = None,
-    whole: Callable[[int], Whole[T] | None] = lambda _: None,
-) -> Exchange[T]:
+    whole: Callable[[int], ExactDecoder[T] | None] = lambda _: None,
+) -> Request[T]:
     """SYNC READ one block of each of these, in this order; its other form reads a byte more (see `read_block`), where
     there is one more to read.
 
@@ -138,15 +140,15 @@ def sync_exchange(
     by_id = {node.node: node for node in nodes}
     ids = list(by_id)
 
-    def exchange(count: int, other: int | None) -> Exchange[T]:
-        return Exchange(
+    def exchange(count: int, other: int | None) -> Request[T]:
+        return Request(
             wire.sync_read(address, count, ids),
             tuple(Expected(id, id, wire.OVERHEAD + count) for id in ids),
             read,
             repeatable=True,
-            tells_position=places or told_by(by_id, address, count),
-            other=None if other is None else lambda: exchange(other, count),
-            whole=whole(count),
+            reports_position=places or told_by(by_id, address, count),
+            alternate=None if other is None else lambda: exchange(other, count),
+            decode_exact=whole(count),
         )
 
     more = another(address, count)
@@ -210,8 +212,8 @@ def _heard(by_id: Mapping[int, Node], answer: Response) -> Iterator[tuple[int, b
         yield frame[2], frame[5:-1]
 
 
-def _by_table(nodes: Iterable[Node]) -> Iterator[tuple[Table, list[Node]]]:
-    groups: dict[str, tuple[Table, list[Node]]] = {}
+def _by_table(nodes: Iterable[Node]) -> Iterator[tuple[RegisterMap, list[Node]]]:
+    groups: dict[str, tuple[RegisterMap, list[Node]]] = {}
     for node in nodes:
         assert node.table is not None
         key = f"{node.table.name} {node.table['present_position'].order}"
@@ -255,18 +257,18 @@ async def sync_write(
     await written_all(list(sync_writes(nodes, blocks)))
 
 
-async def written_all(exchanges: Sequence[Exchange[None]]) -> None:
+async def written_all(requests: Sequence[Request[None]]) -> None:
     """These one after the other; an error of a later one is told with a note that the first ones have left."""
-    for sent, exchange in enumerate(exchanges):
+    for sent, request in enumerate(requests):
         try:
-            await exchange
+            await request
         except MotorbusError as error:
             if sent:
-                error.add_note(f"{sent} of {len(exchanges)} packets had left before this one")
+                error.add_note(f"{sent} of {len(requests)} packets had left before this one")
             raise
 
 
-def sync_writes(nodes: Sequence[Node], blocks: Sequence[Block]) -> Iterator[Exchange[None]]:
+def sync_writes(nodes: Sequence[Node], blocks: Sequence[Block]) -> Iterator[Request[None]]:
     """These blocks as few SYNC WRITEs as can carry them: one for each place and length, unless they are too many.
 
     One is not sent once a servo that it or a later one is for has other settings than when it was made; and each is
@@ -275,7 +277,7 @@ def sync_writes(nodes: Sequence[Node], blocks: Sequence[Block]) -> Iterator[Exch
     parts = list(_parts(nodes, blocks))
     for index, part in enumerate(parts):
         left = [one for later in parts[index:] for one in later]
-        goals: tuple[Goal, ...] = tuple(goal for _, block in left for goal in block.goals)
+        goals: tuple[Setpoint, ...] = tuple(goal for _, block in left for goal in block.goals)
         items = [(node.node, block.data) for node, block in part]
         yield unanswered(
             wire.sync_write(part[0][1].address, items),

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from motorbus.core.entry import Table
 from motorbus.core.family import Health, State
-from motorbus.core.operation import Runnable
+from motorbus.core.register import RegisterMap
+from motorbus.core.steps import Runnable
 from motorbus.families.feetech.driver.exchanges import PRESENT, read_block
 from motorbus.families.feetech.driver.feedback import FEEDBACK, state_of
 from motorbus.families.feetech.driver.identity import known
@@ -45,13 +45,13 @@ async def _met(node: Node) -> Health:
     return await health(node)
 
 
-def _health(node: Node, table: Table, data: bytes) -> Health:
+def _health(node: Node, table: RegisterMap, data: bytes) -> Health:
     told = [name for name in ("goal_velocity", node.control.acceleration) if name]
     blank = all(_raw(table, name, data) == (table[name].default or 0) for name in told)
     state: State = state_of(node, table, data[PRESENT - TORQUE_ENABLE :])
     return Health(state, torque=data[0] == ON, blank=blank)
 
 
-def _raw(table: Table, name: str, data: bytes) -> int:
+def _raw(table: RegisterMap, name: str, data: bytes) -> int:
     row = table[name]
     return row.decode(data[row.address - TORQUE_ENABLE : row.address - TORQUE_ENABLE + row.size])

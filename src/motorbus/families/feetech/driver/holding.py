@@ -12,8 +12,8 @@ from collections.abc import Collection, Iterable, Mapping
 from typing import Final
 
 from motorbus.core import units
-from motorbus.core.goal import Goal, Stays
-from motorbus.core.operation import Exchange, Expected, Priority, Response
+from motorbus.core.request import Expected, Priority, Request, Response
+from motorbus.core.setpoint import Setpoint, Stays
 from motorbus.errors import RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import PRESENT, Block
@@ -50,7 +50,7 @@ def held_ids(said: str | Iterable[int]) -> frozenset[int]:
     return frozenset(found)
 
 
-def holds(nodes: Mapping[int, Response | None], hold: Collection[int]) -> list[Exchange[Response]]:
+def holds(nodes: Mapping[int, Response | None], hold: Collection[int]) -> list[Request[Response]]:
     """What holds these: who has just told all that matters is held, each other one is asked for it."""
     found = []
     for number in sorted(hold):
@@ -59,14 +59,14 @@ def holds(nodes: Mapping[int, Response | None], hold: Collection[int]) -> list[E
     return found
 
 
-def ask(node: int) -> Exchange[Response]:
+def ask(node: int) -> Request[Response]:
     """READ of all that decides what holds this servo."""
-    return Exchange(
+    return Request(
         wire.read(node, 0, COUNT),
         (Expected(node, node, wire.OVERHEAD + COUNT),),
-        rank=Priority.STOP,
+        priority=Priority.STOP,
         repeatable=True,
-        tells_position=True,
+        reports_position=True,
     )
 
 
@@ -84,7 +84,7 @@ def resting(number: int, image: bytes) -> Block:
         return LIMP
     if settings.mode is Mode.VELOCITY:
         row = table["goal_velocity"]
-        goal = Goal(number, "velocity", 0.0, 0.0, 0.0, Stays.STILL)
+        goal = Setpoint(number, "velocity", 0.0, 0.0, 0.0, Stays.STILL)
         return Block(row.address, row.encode(0), row.effect, (goal,))
     if settings.mode is not Mode.POSITION or (settings.many_turns and not settings.accumulates):
         return LIMP
@@ -92,7 +92,7 @@ def resting(number: int, image: bytes) -> Block:
     told = table["present_position"].decode(image[PRESENT:COUNT])
     raw = max(row.low, min(told, row.high))  # beyond what any goal can be it can only come back
     here = float(node.value(row, raw))
-    goal = Goal(number, "position", here, here, here, Stays.STILL)
+    goal = Setpoint(number, "position", here, here, here, Stays.STILL)
     return Block(row.address, row.encode(raw), row.effect, (goal,))
 
 
@@ -104,12 +104,12 @@ def _image(node: int, answer: Response | None) -> bytes | None:
     return None
 
 
-def _order(node: int, block: Block) -> Exchange[Response]:
-    return Exchange(
+def _order(node: int, block: Block) -> Request[Response]:
+    return Request(
         wire.write(node, block.address, block.data),
         (Expected(node, node, wire.OVERHEAD),),
-        rank=Priority.STOP,
+        priority=Priority.STOP,
         effect=block.effect,
-        goals=block.goals,
+        setpoints=block.goals,
         repeatable=True,
     )

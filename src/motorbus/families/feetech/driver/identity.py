@@ -11,9 +11,9 @@ from __future__ import annotations
 from functools import cache
 from typing import Final
 
-from motorbus.core.entry import Access, Entry, Table, changed
 from motorbus.core.family import Identity
-from motorbus.core.operation import Exchange, Expected, Priority, TimeoutClass
+from motorbus.core.register import Access, Register, RegisterMap, changed
+from motorbus.core.request import Expected, Priority, Request, TimeoutClass
 from motorbus.errors import DeviceError, NoReply
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import ACKNOWLEDGED, acknowledged, read_block
@@ -50,20 +50,20 @@ async def ping(node: Node) -> bool:
     return True
 
 
-def ping_exchange(node: Node, *, scanning: bool = False) -> Exchange[None]:
+def ping_exchange(node: Node, *, scanning: bool = False) -> Request[None]:
     """PING; silence raises NoReply. `scanning` waits shortly and asks once, for silence is usual then."""
-    exchange = acknowledged(node, wire.ping(node.node))
-    return Exchange(
-        exchange.request,
+    request = acknowledged(node, wire.ping(node.node))
+    return Request(
+        request.wire,
         (Expected(node.node, node.node, ACKNOWLEDGED),),  # PING is answered at every status return level
-        exchange.read,
-        rank=Priority.CONFIGURATION if scanning else Priority.POLL,
-        timeout=TimeoutClass.SCAN if scanning else TimeoutClass.REPLY,
+        request.decode,
+        priority=Priority.CONFIGURATION if scanning else Priority.POLL,
+        reply_within=TimeoutClass.SCAN if scanning else TimeoutClass.REPLY,
         repeatable=True,
     )
 
 
-def identify(node: Node) -> Exchange[Identity]:
+def identify(node: Node) -> Request[Identity]:
     """Firmware, byte order, model and register map, in one READ of registers 0 to 4."""
 
     def take(head: bytes) -> Identity:
@@ -72,7 +72,7 @@ def identify(node: Node) -> Exchange[Identity]:
     return read_block(node, 0, _HEAD, take)
 
 
-def prepare(node: Node) -> Exchange[Identity]:
+def prepare(node: Node) -> Request[Identity]:
     """Read whatever motion and prepared group operations need: identity, limits, mode and units, in one READ.
 
     It is always the same one for a servo, and kept: who polls one that is not there asks it again and again.
@@ -87,7 +87,7 @@ def prepare(node: Node) -> Exchange[Identity]:
     return kept
 
 
-async def known(node: Node) -> Table:
+async def known(node: Node) -> RegisterMap:
     """The register map of this servo; asks it when its settings are not known yet."""
     if node.table is not None and node.settings is not None:
         return node.table
@@ -97,7 +97,7 @@ async def known(node: Node) -> Table:
     return node.table
 
 
-async def writable(node: Node) -> Table:
+async def writable(node: Node) -> RegisterMap:
     """As `known`, for those who will write. Raises DeviceError when the map is not known."""
     table = await known(node)
     refuse_unless_writable(node)
@@ -150,16 +150,16 @@ def _choice(head: bytes) -> Choice:
 
 
 @cache
-def common_table(order: str) -> Table:
+def common_table(order: str) -> RegisterMap:
     """The rows that all register maps share, read-only; what differs between maps in unit is a plain number."""
-    return Table(
+    return RegisterMap(
         "common",
         [_commoner(row, order) for row in STS.values() if row.name in _COMMON],
         title="what all FEETECH register maps share; nothing may be written",
     )
 
 
-def _commoner(row: Entry, order: str) -> Entry:
+def _commoner(row: Register, order: str) -> Register:
     if row.unit in _ONE_UNIT_IN_ALL_MAPS:
         return changed(row, access=Access.READ, order=order)
     return changed(row, access=Access.READ, order=order, unit="", scale=1.0)

@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
-from motorbus.core.entry import Table
-from motorbus.core.family import Readdressed
-from motorbus.core.operation import OUTCOME, REACHED, Effect, Emit, JournalEntry
+from motorbus.core.family import IdChanged
+from motorbus.core.register import RegisterMap
+from motorbus.core.request import Effect
+from motorbus.core.steps import OUTCOME, REACHED, Emit, JournalEntry
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.exchanges import Block
 from motorbus.families.feetech.driver.identity import identity_of
@@ -59,7 +60,7 @@ class Job(NamedTuple):
         return ID if self.verb == SET_ID else BAUD
 
     @property
-    def table(self) -> Table:
+    def table(self) -> RegisterMap:
         """The register map of the servo."""
         return TABLES[identity_of(self.old.id, self.image[:_HEAD]).table]
 
@@ -180,7 +181,7 @@ class Course:
 
     async def _readdressed(self) -> None:
         if self.job.new.id != self.job.old.id:
-            await Emit(Readdressed(self.job.old.id, self.job.new.id))
+            await Emit(IdChanged(self.job.old.id, self.job.new.id))
 
     async def end(self, outcome: str) -> None:
         """Record how it ended: "new" or "old"."""

@@ -10,8 +10,8 @@ from functools import cache
 from typing import Any, Final
 
 from motorbus.core.family import Stop
-from motorbus.core.goal import torque_off
-from motorbus.core.operation import ANY, Exchange, Expected, Priority, Response, TimeoutClass
+from motorbus.core.request import ANY, Expected, Priority, Request, Response, TimeoutClass
+from motorbus.core.setpoint import torque_off
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.holding import PROMISE, holds
 from motorbus.families.feetech.driver.motion import Promise
@@ -45,25 +45,25 @@ PROBES: Final = (3, 9, 10, 12, 13, 14, *range(16, 27))
 of the lengths in common use: 1, 2, 4, 5 (identify), 6, 7 (commands), 8, 11, 15 (feedback), 40 (settings)."""
 
 
-def air_time(exchange: Exchange[Any], rate: int) -> float:
+def air_time(request: Request[Any], rate: int) -> float:
     """s on the wire for the request and all replies due; nothing for pauses, which may be none (register 7)."""
-    if exchange.replies is ANY:
+    if request.expected is ANY:
         replies = (wire.MAX_ID + 1) * wire.OVERHEAD
     else:
         replies = 0
-        for _, _, length in exchange.replies:
+        for _, _, length in request.expected:
             replies += length
-    return (len(exchange.request) + replies) * BITS / rate
+    return (len(request.wire) + replies) * BITS / rate
 
 
-def turnaround(exchange: Exchange[Any]) -> float:
+def turnaround(request: Request[Any]) -> float:
     """s that servos may think: once about the request, and a return delay before each reply."""
-    if exchange.replies is ANY:
+    if request.expected is ANY:
         return COLLISION
-    if exchange.timeout is TimeoutClass.SCAN:
+    if request.reply_within is TimeoutClass.SCAN:
         return SCAN
-    thinking = PROCESSING if exchange.timeout is TimeoutClass.REPLY else STORE
-    return thinking + RETURN_DELAY * len(exchange.replies)
+    thinking = PROCESSING if request.reply_within is TimeoutClass.REPLY else STORE
+    return thinking + RETURN_DELAY * len(request.expected)
 
 
 def quiet_time(rate: int) -> float:
@@ -74,30 +74,30 @@ def quiet_time(rate: int) -> float:
     return _LONGEST * BITS / rate + RETURN_DELAY + 2 * _ADAPTER + _SCHEDULING
 
 
-def echo_test() -> Exchange[None]:
+def echo_test() -> Request[None]:
     """READ of one byte, the id of node 1: the echo has eight bytes and an answer seven."""
-    return Exchange(
+    return Request(
         wire.read(1, ID, 1),
         (Expected(1, 1, wire.OVERHEAD + 1),),
         _nothing,
-        timeout=TimeoutClass.SCAN,
+        reply_within=TimeoutClass.SCAN,
         repeatable=True,
     )
 
 
-def probe(node: int, attempt: int) -> Exchange[bool]:
+def probe(node: int, attempt: int) -> Request[bool]:
     """READ that begins with the id register, in a length that few other reads have; True when the id is right."""
     return _probe(node, PROBES[attempt % len(PROBES)])
 
 
 @cache
-def _probe(node: int, count: int) -> Exchange[bool]:
+def _probe(node: int, count: int) -> Request[bool]:
     """Kept, for there are few: of a servo that stays silent many are looked at each time."""
 
     def read(answer: Response) -> bool:
         return bool(answer.replies) and answer.replies[0].data[5] == node
 
-    return Exchange(
+    return Request(
         wire.read(node, ID, count), (Expected(node, node, wire.OVERHEAD + count),), read, repeatable=True
     )
 
@@ -115,35 +115,35 @@ def stop(nodes: Mapping[int, Response | None], hold: Collection[int] = ()) -> St
     return Stop(frames, f"{Promise.TORQUE_OFF_ACCEPTED.value}; {PROMISE}")
 
 
-def _everyone() -> Exchange[Response]:
-    return Exchange(
+def _everyone() -> Request[Response]:
+    return Request(
         wire.write(wire.BROADCAST, LIMP.address, LIMP.data),
         (),
-        rank=Priority.STOP,
+        priority=Priority.STOP,
         effect=LIMP.effect,
         repeatable=True,
     )
 
 
-def _at_once(nodes: Sequence[int]) -> Iterator[Exchange[Response]]:
+def _at_once(nodes: Sequence[int]) -> Iterator[Request[Response]]:
     """Torque off to these and to nobody else, as many frames as that takes; nobody answers."""
     for start in range(0, len(nodes), AT_ONCE):
         ids = nodes[start : start + AT_ONCE]
-        yield Exchange(
+        yield Request(
             wire.sync_write(LIMP.address, [(node, LIMP.data) for node in ids]),
             (),
-            rank=Priority.STOP,
+            priority=Priority.STOP,
             effect=LIMP.effect,
-            goals=tuple(map(torque_off, ids)),
+            setpoints=tuple(map(torque_off, ids)),
             repeatable=True,
         )
 
 
-def _limp(node: int) -> Exchange[Response]:
-    return Exchange(
+def _limp(node: int) -> Request[Response]:
+    return Request(
         wire.write(node, LIMP.address, LIMP.data),
         (Expected(node, node, wire.OVERHEAD),),
-        rank=Priority.STOP,
+        priority=Priority.STOP,
         effect=LIMP.effect,
         repeatable=True,
     )

@@ -10,9 +10,10 @@ from collections.abc import Iterable, Mapping, Sequence, Set, Sized
 from functools import partial
 from typing import Final, Literal
 
-from motorbus.core.entry import Entry, shown
 from motorbus.core.family import Positions
-from motorbus.core.operation import UNLIKE, Exchange, Response, Unlike, Whole, catch
+from motorbus.core.register import Register, shown
+from motorbus.core.request import ExactDecoder, Request, Response
+from motorbus.core.steps import catch
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, places, read_block, settings_of_now
 from motorbus.families.feetech.driver.gauge import Packets, measure
@@ -24,7 +25,7 @@ from motorbus.families.feetech.driver.orders import position_goal
 _made: Final = tuple.__new__
 
 
-def sync_read_positions(servos: Sequence[Node], *, rate: int = RATE, air: float = AIR) -> Exchange[Positions]:
+def sync_read_positions(servos: Sequence[Node], *, rate: int = RATE, air: float = AIR) -> Request[Positions]:
     """The present positions of all of these in one exchange, which may be kept and run again.
 
     Raises RequestError when a servo is not prepared, or knows no SYNC READ (an exchange that can be kept is one packet:
@@ -47,9 +48,7 @@ def sync_read_positions(servos: Sequence[Node], *, rate: int = RATE, air: float 
     return sync_exchange(nodes, row.address, row.size, gauges.read, gauges.places, gauges.whole)
 
 
-def position_reads(
-    servos: Sequence[Node], *, rate: int = RATE, air: float = AIR
-) -> list[Exchange[Positions]]:
+def position_reads(servos: Sequence[Node], *, rate: int = RATE, air: float = AIR) -> list[Request[Positions]]:
     """The exchanges that bring the present positions of all of these, which may be kept and run again.
 
     SYNC READs that keep each train of replies within `air` s for those who answer them, a READ for each other.
@@ -69,8 +68,8 @@ async def read_positions(servos: Sequence[Node], *, rate: int = RATE, air: float
     """
     values: dict[int, float] = {}
     at = float("-inf")
-    for exchange in position_reads(servos, rate=rate, air=air):
-        found = await catch(exchange)
+    for request in position_reads(servos, rate=rate, air=air):
+        found = await catch(request)
         if isinstance(found, DOUBTS):
             continue
         if isinstance(found, MotorbusError):
@@ -83,7 +82,7 @@ async def read_positions(servos: Sequence[Node], *, rate: int = RATE, air: float
     )
 
 
-def _alone(node: Node) -> Exchange[Positions]:
+def _alone(node: Node) -> Request[Positions]:
     row = known_row(node, "present_position")
     gauge = _Gauge(node, row)
 
@@ -106,7 +105,7 @@ def refuse_without_sync_read(node: Node) -> None:
 
 
 class _Gauge:
-    """Tells the position of one servo, by the settings that it has when it is asked; as `Node.value`, and quicker.
+    """Reports the position of one servo, by the settings that it has when it is asked; as `Node.value`, and quicker.
 
     What has been made of those `settings` is kept as long as they are the same. A code below `_plain` is its own raw
     value.
@@ -114,7 +113,7 @@ class _Gauge:
 
     __slots__ = ("_factor", "_order", "_plain", "_scale", "end", "node", "row", "settings")
 
-    def __init__(self, node: Node, row: Entry) -> None:
+    def __init__(self, node: Node, row: Register) -> None:
         self.node = node
         self.row = row
         self.end = 5 + row.size
@@ -180,13 +179,13 @@ class _Gauges:
         return Positions(found, answer.missing, at)
 
     def places(self, answer: Response) -> Mapping[int, float]:
-        """The same as `Exchange.tells_position` says it: by the settings that they have now, where those are known."""
+        """The same as `Request.reports_position` says it: by the settings that they have now, where those are known."""
         last = self._last
         if last is not None and (last[0] is answer or last[0] is answer.at) and self._settled():
             return last[1]
         return self._places(answer)
 
-    def whole(self, count: int) -> Whole[Positions] | None:
+    def whole(self, count: int) -> ExactDecoder[Positions] | None:
         """`read` for status packets with so many bytes of data, by the settings that the servos have now."""
         found = [measure(gauge.node, gauge.row) for gauge in self._gauges.values()]
         how = [one for one in found if one is not None]
@@ -202,18 +201,18 @@ class _Gauges:
         blank = dict.fromkeys((one.node.node for one in how), 0.0)
         seen: object = None  # `CHANGES.now` when they were found to have those settings
 
-        def whole(data: bytes, at: float) -> Positions | Unlike:
+        def whole(data: bytes, at: float) -> Positions | None:
             nonlocal seen
             if not are_sound(data):
-                return UNLIKE
+                return None
             if (now := CHANGES.now) is not seen:
                 if list(map(settings_of_now, nodes)) != made_by:
-                    return UNLIKE
+                    return None
                 seen = now
             values = blank.copy()  # of the right size, which one that grows has not
             for (id, scale, factor), raw in zip(scales, unpack(data)):  # noqa: B905 - they are as many
                 if raw >= plain:
-                    return UNLIKE
+                    return None
                 values[id] = raw * scale * factor
             for node in nodes:
                 node.at = at
@@ -238,7 +237,7 @@ class _Gauges:
         return True
 
 
-def sync_write_positions(servos: Sequence[Node], positions: Sequence[float]) -> Exchange[None]:
+def sync_write_positions(servos: Sequence[Node], positions: Sequence[float]) -> Request[None]:
     """Goal positions in rad for all of these, in one packet that nobody acknowledges.
 
     Raises RequestError when a servo is not prepared, is not in position mode, or there are too many for a packet;
@@ -253,14 +252,14 @@ def sync_write_positions(servos: Sequence[Node], positions: Sequence[float]) -> 
     return one_packet(list(sync_writes(nodes, blocks)), len(nodes))
 
 
-def one_packet(exchanges: Sequence[Exchange[None]], servos: int) -> Exchange[None]:
+def one_packet(requests: Sequence[Request[None]], servos: int) -> Request[None]:
     """The only one of these. Raises RequestError where it took several."""
-    if len(exchanges) > 1:
+    if len(requests) > 1:
         raise RequestError(
             f"one packet cannot carry the goals of {servos} servos",
             advice="divide them; nothing was sent",
         )
-    return exchanges[0]
+    return requests[0]
 
 
 def check_ordered(values: object) -> None:
@@ -282,7 +281,7 @@ def _goal(node: Node, to: float) -> Block:
     return Block(row.address, row.encode(raw), row.effect, (order,))
 
 
-def known_row(node: Node, name: str) -> Entry:
+def known_row(node: Node, name: str) -> Register:
     """A row of its map. Raises RequestError when it is not prepared, DeviceError when its map is not known."""
     if node.table is None or node.settings is None:
         raise RequestError(

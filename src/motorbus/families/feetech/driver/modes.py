@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from motorbus.core.entry import Table
-from motorbus.core.operation import Effect
+from motorbus.core.register import RegisterMap
+from motorbus.core.request import Effect
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver import eeprom
 from motorbus.families.feetech.driver.bound import leaving_current_mode
@@ -75,7 +75,9 @@ def _named(mode: Mode | str) -> Mode:
         ) from None
 
 
-def _by_code(node: Node, table: Table, wanted: Mode, limits: tuple[float, float] | None) -> Sequence[Block]:
+def _by_code(
+    node: Node, table: RegisterMap, wanted: Mode, limits: tuple[float, float] | None
+) -> Sequence[Block]:
     if limits is not None:
         raise RequestError(
             f"node {node.node} has an operating mode, which limits do not change",
@@ -88,7 +90,9 @@ def _by_code(node: Node, table: Table, wanted: Mode, limits: tuple[float, float]
     return [Block(row.address, row.encode(code), Effect.PERSISTENT)]
 
 
-def _by_limits(node: Node, table: Table, wanted: Mode, limits: tuple[float, float] | None) -> Sequence[Block]:
+def _by_limits(
+    node: Node, table: RegisterMap, wanted: Mode, limits: tuple[float, float] | None
+) -> Sequence[Block]:
     """Both limits 0 for a motor; limits for a servo, which nobody makes up: a wrong one breaks what it moves."""
     low, high = table["min_position_limit"], table["max_position_limit"]
     if wanted is Mode.PWM:
@@ -110,7 +114,7 @@ def _by_limits(node: Node, table: Table, wanted: Mode, limits: tuple[float, floa
     return [Block(low.address, low.encode(raws[0]) + high.encode(raws[1]), Effect.PERSISTENT)]
 
 
-def _limits_wanted(node: Node, table: Table) -> RequestError:
+def _limits_wanted(node: Node, table: RegisterMap) -> RequestError:
     rows = table["min_position_limit"], table["max_position_limit"]
     shipped = [f"{row.to_value(row.default):.4g}" for row in rows if row.default is not None]
     return RequestError(

@@ -12,9 +12,10 @@ from enum import Enum
 from functools import partial
 from typing import Final, TypeVar
 
-from motorbus.core.entry import Table, is_number, shown
 from motorbus.core.interrupted import Moving, stopped_if_interrupted
-from motorbus.core.operation import Effect, Runnable, Sleep, catch
+from motorbus.core.register import RegisterMap, is_number, shown
+from motorbus.core.request import Effect
+from motorbus.core.steps import Runnable, Sleep, catch
 from motorbus.errors import LimitExceeded, MotorbusError, RequestError, VerificationFailed
 from motorbus.families.feetech.driver.arrival import Move, arrive
 from motorbus.families.feetech.driver.bound import ask_bound
@@ -132,7 +133,7 @@ async def stop(node: Node) -> Promise:
     return _AT_REST[mode]
 
 
-async def _stay(node: Node, table: Table) -> Promise:
+async def _stay(node: Node, table: RegisterMap) -> Promise:
     """Goal := here, unless that could set a limp servo into motion.
 
     A host that sleeps between the reading and the goal would send it back to where it was. So a reading that is too old
@@ -158,7 +159,7 @@ async def _stay(node: Node, table: Table) -> Promise:
     return Promise.OUTSIDE_ACCEPTED if doubtful else Promise.HOLD_ACCEPTED
 
 
-async def calmed(node: Node, table: Table) -> None:
+async def calmed(node: Node, table: RegisterMap) -> None:
     """What a servo that has torque and no force would go for becomes where it is, or no velocity, duty or current.
 
     For whoever is about to give it its force back. Does nothing to a limp one, and in step mode, where nothing waits.
@@ -237,12 +238,12 @@ async def _stopped(node: Node) -> Promise | None:
     return await stop(node)
 
 
-async def _gone(node: Node, table: Table, block: Block, order: Move) -> None:
+async def _gone(node: Node, table: RegisterMap, block: Block, order: Move) -> None:
     await _sent(node, table, block)
     await arrive(node, table, order)
 
 
-async def _sent(node: Node, table: Table, block: Block) -> None:
+async def _sent(node: Node, table: RegisterMap, block: Block) -> None:
     await ordered(node, table, block)
     if not node.control.goal_switches_on:
         await surely_on(node)
@@ -250,7 +251,7 @@ async def _sent(node: Node, table: Table, block: Block) -> None:
 
 def way(
     node: Node,
-    table: Table,
+    table: RegisterMap,
     goal: float,
     velocity: float | None = None,
     acceleration: float | None = None,
@@ -268,7 +269,7 @@ def way(
 
 def move_block(
     node: Node,
-    table: Table,
+    table: RegisterMap,
     to: float,
     velocity: float | None = None,
     acceleration: float | None = None,

@@ -13,9 +13,9 @@ from struct import Struct
 from typing import Final, NamedTuple, TypeAlias
 from zlib import adler32
 
-from motorbus.core.aimed import Aim, Aimed
-from motorbus.core.entry import Entry
-from motorbus.core.operation import Goal
+from motorbus.core.register import Register
+from motorbus.core.request import SetpointGroup, SetpointWrite
+from motorbus.core.setpoint import Setpoint
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import changed_since
 from motorbus.families.feetech.driver.node import CHANGES, Node
@@ -106,7 +106,7 @@ of the mould is made of that: else values of one setting could leave under anoth
 class Mould:
     """The packet for these rows, which adjoin and have the same place for all of these nodes. Made by `mould`."""
 
-    def __init__(self, under: Under, rows: Sequence[Sequence[Entry]], cells: Sequence[Cell]) -> None:
+    def __init__(self, under: Under, rows: Sequence[Sequence[Register]], cells: Sequence[Cell]) -> None:
         nodes, as_made = [node for node, _ in under], [its for _, its in under]
         first, count = rows[0], len(rows[0])
         size = sum(row.size for row in first)
@@ -123,7 +123,7 @@ class Mould:
         self._pack: Final = Struct(("<" if first[0].order == "little" else ">") + item * len(nodes)).pack
         self._head: Final = wire.sync_write(first[0].address, [(id, bytes(size)) for id in self.ids])[:HEAD]
         self._sum: Final = sum(self._head[2:])
-        self._aim: Final = Aim(self.ids, self._goals, changed_since(self._made_by))
+        self._aim: Final = SetpointGroup(self.ids, self._goals, changed_since(self._made_by))
         self._places: Final = _places(as_made, rows, cells)
 
     def holds(self) -> bool:
@@ -137,7 +137,7 @@ class Mould:
         self.seen = now
         return True
 
-    def cast(self, values: Sequence[float]) -> Aimed | None:
+    def cast(self, values: Sequence[float]) -> SetpointWrite | None:
         """The packet with these values, those of one servo behind those of the one before; None where one of them is
         not plain, or they are not as many as it takes."""
         if [*map(type, values)] != self._floats:
@@ -153,7 +153,7 @@ class Mould:
         items = filled.copy()
         items[1 :: count + 1] = raws
         body = self._pack(*items)
-        return Aimed(self._head + body + BYTES[~adler32(body, self._sum) & 255], self._aim, items)
+        return SetpointWrite(self._head + body + BYTES[~adler32(body, self._sum) & 255], self._aim, items)
 
     def _filled(self, values: Sequence[float], count: int) -> list[int] | None:
         """The parts of a packet with all but the values of the first row; in a loop these are mostly what they were."""
@@ -171,12 +171,12 @@ class Mould:
         self._last = rest, items
         return items
 
-    def _goals(self, items: Sequence[int]) -> tuple[Goal, ...]:
+    def _goals(self, items: Sequence[int]) -> tuple[Setpoint, ...]:
         raws = [raw for number, raw in enumerate(items) if number % self._each]
         if self._places:
             return tuple(
                 [
-                    Goal(id, "position", raw * scale * factor, low, high)
+                    Setpoint(id, "position", raw * scale * factor, low, high)
                     for (id, scale, factor, low, high), raw in zip(self._places, raws, strict=True)
                 ]
             )
@@ -184,7 +184,7 @@ class Mould:
         return tuple(goal for (node, row), raw in pairs for goal in goals_of(node, row, raw))
 
 
-def mould(nodes: Sequence[Node], rows: Sequence[Sequence[Entry]]) -> Mould | None:
+def mould(nodes: Sequence[Node], rows: Sequence[Sequence[Register]]) -> Mould | None:
     """The one for these servos, each with its rows in the order of their addresses; None where nothing so simple holds:
     they are not all in position mode, their rows lie elsewhere, or they do not fit into one packet."""
     places = {tuple((row.address, row.size, row.order) for row in its) for its in rows}
@@ -199,7 +199,7 @@ def mould(nodes: Sequence[Node], rows: Sequence[Sequence[Entry]]) -> Mould | Non
 
 
 def _places(
-    nodes: Sequence[Node], rows: Sequence[Sequence[Entry]], cells: Sequence[Cell]
+    nodes: Sequence[Node], rows: Sequence[Sequence[Register]], cells: Sequence[Cell]
 ) -> list[tuple[int, float, float, float, float]]:
     """What the goals of these are made of, where they are told a place and nothing else: as `goals_of` makes them."""
     if [row.name for row in rows[0]] != ["goal_position"]:
@@ -208,12 +208,12 @@ def _places(
     return [(id, cell.scale, cell.factor, *limits) for id, cell, limits in its if limits is not None]
 
 
-def _adjoin(rows: Sequence[Entry]) -> bool:
+def _adjoin(rows: Sequence[Register]) -> bool:
     ends = [row.address + row.size for row in rows[:-1]]
     return ends == [row.address for row in rows[1:]] and all(row.size in (1, 2) for row in rows)
 
 
-def _cell(node: Node, row: Entry) -> Cell | None:
+def _cell(node: Node, row: Register) -> Cell | None:
     settings = node.settings
     if settings is None or node.known_mode is not Mode.POSITION or row.name not in PLAIN:
         return None
@@ -235,7 +235,7 @@ PLAIN: Final = ("goal_position", "goal_time", "goal_velocity")
 """What a servo in position mode is told of where to go, and in what time or how fast: the more, the more of it."""
 
 
-def _within(node: Node, row: Entry, raw: int) -> bool:
+def _within(node: Node, row: Register, raw: int) -> bool:
     for goal in goals_of(node, row, raw):
         if goal.low is None or goal.high is None or not goal.low <= goal.value <= goal.high:
             return False

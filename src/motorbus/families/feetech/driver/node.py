@@ -12,9 +12,10 @@ from math import inf
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from motorbus.core.entry import Entry, Table, Value, is_number, shown
 from motorbus.core.family import Identity
-from motorbus.core.operation import Exchange, Expected, Goal
+from motorbus.core.register import Register, RegisterMap, Value, is_number, shown
+from motorbus.core.request import Expected, Request
+from motorbus.core.setpoint import Setpoint
 from motorbus.errors import RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.table import (
@@ -89,7 +90,7 @@ class Pending(NamedTuple):
     """What a REG WRITE from here ordered and no ACTION has carried out yet: the goals, the settings by which they were
     reckoned, how many stops had left for the servo until then, and whether it was taken back since."""
 
-    goals: tuple[Goal, ...]
+    goals: tuple[Setpoint, ...]
     settings: Settings | None
     stops: int = 0
     withdrawn: bool = False
@@ -139,7 +140,7 @@ class Node:
     def __init__(self, node: int) -> None:
         self.node: Final = checked_id(node)
         self.identity: Identity | None = None
-        self.table: Table | None = None
+        self.table: RegisterMap | None = None
         self.settings = None
         self.alarm: tuple[str, ...] = ()
         self.at = -inf
@@ -149,8 +150,8 @@ class Node:
         self.former_limits: tuple[float, float] | None = None
         self.unsure: set[int] = set()
         self.questions: Final[dict[tuple[int, int], tuple[bytes, tuple[Expected, ...]]]] = {}
-        self.kept: Final[dict[str, tuple[Settings, Exchange[Any]]]] = {}
-        self.preparation: Exchange[Identity] | None = None
+        self.kept: Final[dict[str, tuple[Settings, Request[Any]]]] = {}
+        self.preparation: Request[Identity] | None = None
 
     @property
     def limits(self) -> tuple[float, float] | None:
@@ -182,7 +183,7 @@ class Node:
         self.settings = None
         self.bound = None
 
-    def value(self, row: Entry, raw: int) -> Value:
+    def value(self, row: Register, raw: int) -> Value:
         """Raw value of a register -> value in the row's unit, by the settings of this servo.
 
         The homing offset is taken out of a present position in the modes in which the servo itself leaves it in.
@@ -194,7 +195,7 @@ class Node:
             raw = settings.compensated(raw)
         return row.to_value(raw) * settings.factors[row.name]
 
-    def raw(self, row: Entry, value: Value) -> int:
+    def raw(self, row: Register, value: Value) -> int:
         """Value in the row's unit -> raw value. Raises RequestError when it is not a finite number."""
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise RequestError(
@@ -227,7 +228,7 @@ def as_nodes(ids: Iterable[int | Node]) -> list[Node]:
     return list(nodes.values())
 
 
-def settings_of(table: Table, image: bytes) -> Settings:
+def settings_of(table: RegisterMap, image: bytes) -> Settings:
     """What registers 0 to 39 say, read by the map of the servo."""
 
     def raw(name: str) -> int:

@@ -9,8 +9,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import tau
 from typing import Final, NamedTuple
 
-from motorbus.core.entry import Entry, Storage, Table, Value, is_number, shown
-from motorbus.core.operation import Effect, Goal
+from motorbus.core.register import Register, RegisterMap, Storage, Value, is_number, shown
+from motorbus.core.request import Effect
+from motorbus.core.setpoint import Setpoint
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.families.feetech.driver.exchanges import Block
 from motorbus.families.feetech.driver.identity import refuse_unless_writable
@@ -35,11 +36,11 @@ _INSTEAD: Final = {
 class Order(NamedTuple):
     """One row and the raw value it shall have."""
 
-    row: Entry
+    row: Register
     raw: int
 
 
-def orders_of(node: Node, table: Table, values: Mapping[str, Value]) -> list[Order]:
+def orders_of(node: Node, table: RegisterMap, values: Mapping[str, Value]) -> list[Order]:
     """The raw values to write, each checked against its row and against what a plain write may do."""
     orders = [Order(table[name], node.raw(table[name], value)) for name, value in values.items()]
     for order, value in zip(orders, values.values(), strict=True):
@@ -51,7 +52,7 @@ def orders_of(node: Node, table: Table, values: Mapping[str, Value]) -> list[Ord
     return orders
 
 
-def _refuse_unheeded(node: Node, row: Entry) -> None:
+def _refuse_unheeded(node: Node, row: Register) -> None:
     """A goal says what its mode makes of it: where nobody knows that, the gate could not judge it."""
     if node.settings is None or not is_goal(row):
         return
@@ -106,17 +107,17 @@ def only_block(node: Node, orders: Sequence[Order], what: str) -> Block:
     )
 
 
-def is_goal(row: Entry) -> bool:
+def is_goal(row: Register) -> bool:
     """Whether writing it orders a movement, for the gate to judge."""
     return row.effect is Effect.MOTION and row.storage is Storage.RAM and not limps(row)
 
 
-def limps(row: Entry) -> bool:
+def limps(row: Register) -> bool:
     """Whether this RAM register may be written to a limp servo only: it moves a servo, and is no goal to judge."""
     return row.effect is Effect.MOTION and row.storage is Storage.RAM and not row.name.startswith("goal_")
 
 
-def position_goal(node: Node, row: Entry, to: float) -> tuple[int, Goal]:
+def position_goal(node: Node, row: Register, to: float) -> tuple[int, Setpoint]:
     """A goal position in rad: its raw value, and the goal for the gate, which judges the limits.
 
     Raises DeviceError when its map is not known, RequestError in other than position mode or when both its limits are
@@ -135,7 +136,7 @@ def position_goal(node: Node, row: Entry, to: float) -> tuple[int, Goal]:
             advice="give a number in rad; nothing was sent",
             node=node.node,
         )
-    return raw, Goal(node.node, "position", node.value(row, raw), *(node.limits or (None, None)))
+    return raw, Setpoint(node.node, "position", node.value(row, raw), *(node.limits or (None, None)))
 
 
 def unheeded(node: Node, wanted: Mode, complaint: str) -> RequestError:
@@ -190,7 +191,7 @@ def check_values(values: Mapping[str, Value]) -> None:
             raise faults[0]
 
 
-def _fault(row: Entry, value: Value) -> RequestError | None:
+def _fault(row: Register, value: Value) -> RequestError | None:
     """What is wrong with this value whatever the settings of the servo are, which may scale some rows."""
     if not is_number(value):
         return RequestError(
@@ -210,7 +211,7 @@ def _check(order: Order, value: Value, node: int | None = None) -> None:
     row.encode(raw, row.given(value))  # raises RequestError when out of range
 
 
-def _refusal(row: Entry, raw: int) -> tuple[str, str] | None:
+def _refusal(row: Register, raw: int) -> tuple[str, str] | None:
     """Why this may not be written by name, and what to do instead; None when it may."""
     if row.effect is Effect.IDENTITY:
         return (
@@ -250,32 +251,32 @@ def _block(node: Node, group: Sequence[Order]) -> Block:
     )
 
 
-def goals_of(node: Node, row: Entry, raw: int) -> Iterator[Goal]:
+def goals_of(node: Node, row: Register, raw: int) -> Iterator[Setpoint]:
     """What this value of this row orders, in the operating mode the servo is in."""
     value = node.value(row, raw)
     if row.name == "goal_position" and node.known_mode is Mode.STEP:
         most = MANY_TURNS * row.scale
-        yield Goal(node.node, "relative", value, -most, most)
+        yield Setpoint(node.node, "relative", value, -most, most)
     elif row.name == "goal_position":
-        yield Goal(node.node, "position", value, *(node.limits or (None, None)))
+        yield Setpoint(node.node, "position", value, *(node.limits or (None, None)))
     elif row.name == "goal_velocity":
         yield speed_goal(node, row, raw)
     elif row.name == node.control.current:
         quantity = "current" if node.known_mode is Mode.CURRENT else "cap"
-        yield Goal(node.node, quantity, value, node.value(row, row.low), node.value(row, row.high))
+        yield Setpoint(node.node, quantity, value, node.value(row, row.low), node.value(row, row.high))
     elif row.name == "goal_time":  # a duty in PWM mode; a time otherwise, and judged all the same
-        yield Goal(node.node, "load" if node.known_mode is Mode.PWM else "time", raw * DUTY, -1.0, 1.0)
+        yield Setpoint(node.node, "load" if node.known_mode is Mode.PWM else "time", raw * DUTY, -1.0, 1.0)
 
 
-def speed_goal(node: Node, row: Entry, raw: int) -> Goal:
+def speed_goal(node: Node, row: Register, raw: int) -> Setpoint:
     """What a goal velocity orders: to turn at it in velocity mode, else how fast it goes to its goal at most.
 
     Where 0 means the maximum, that is what it says: as fast as no servo goes much faster.
     """
     low, high = float(node.value(row, row.low)), float(node.value(row, row.high))
     if node.known_mode is Mode.VELOCITY:
-        return Goal(node.node, "velocity", float(node.value(row, raw)), low, high)
+        return Setpoint(node.node, "velocity", float(node.value(row, raw)), low, high)
     most = raw == 0 and (node.settings is None or node.settings.zero_is_maximum)
-    return Goal(
+    return Setpoint(
         node.node, "speed", min(NO_LOAD * COUNT, high) if most else float(node.value(row, raw)), low, high
     )

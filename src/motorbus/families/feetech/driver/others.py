@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from motorbus.core.operation import Emit, Progress, TimeoutClass, catch
+from motorbus.core.request import TimeoutClass
+from motorbus.core.steps import Emit, Progress, catch
 from motorbus.errors import LinkLost, NoReply, RequestError
 from motorbus.families.feetech.driver.exchanges import read_block
 from motorbus.families.feetech.driver.identity import identity_of

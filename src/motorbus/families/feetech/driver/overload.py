@@ -11,9 +11,9 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.entry import Table
 from motorbus.core.family import State
-from motorbus.core.operation import Sleep, catch
+from motorbus.core.register import RegisterMap
+from motorbus.core.steps import Sleep, catch
 from motorbus.errors import DeviceError, MotorbusError, RequestError
 from motorbus.families.feetech.driver.alarm import alarms
 from motorbus.families.feetech.driver.feedback import state_exchange
@@ -84,7 +84,7 @@ async def _let_go(node: Node, error: MotorbusError) -> None:
         )
 
 
-async def _tripped(node: Node, table: Table) -> bool:
+async def _tripped(node: Node, table: RegisterMap) -> bool:
     state: State = await state_exchange(node, table)
     return bool(TRIPS.intersection(state.alarm))
 

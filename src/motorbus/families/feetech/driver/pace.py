@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import ceil
 from typing import Final
 
-from motorbus.core.entry import Entry, Table
+from motorbus.core.register import Register, RegisterMap
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.bound import raw_bound, refuse_current
 from motorbus.families.feetech.driver.node import Node
@@ -20,7 +20,7 @@ ROUNDING: Final = 1e-6
 """Units of a velocity that are noise of binary arithmetic."""
 
 
-def burst(node: Node, table: Table, velocity: float | None, current: float | None) -> bytes:
+def burst(node: Node, table: RegisterMap, velocity: float | None, current: float | None) -> bytes:
     """What follows the goal in the registers of every map: bound of the current or time, and the velocity."""
     control = node.control
     refuse_current(node, current)
@@ -32,7 +32,7 @@ def burst(node: Node, table: Table, velocity: float | None, current: float | Non
     return between + table["goal_velocity"].encode(_speed(node, table, velocity))
 
 
-def ramp_of(node: Node, table: Table, acceleration: float | None) -> bytes:
+def ramp_of(node: Node, table: RegisterMap, acceleration: float | None) -> bytes:
     """The acceleration, whose register comes just before the goal; nothing where the map has none.
 
     Raises RequestError when one is asked for there.
@@ -50,7 +50,7 @@ def ramp_of(node: Node, table: Table, acceleration: float | None) -> bytes:
     )
 
 
-def speed_at_least(node: Node, table: Table, velocity: float | None) -> int:
+def speed_at_least(node: Node, table: RegisterMap, velocity: float | None) -> int:
     """Raw goal velocity for one who follows goals and must not lag: rounded up; None and beyond: the maximum."""
     row = table["goal_velocity"]
     unit = float(node.value(row, 1))
@@ -59,7 +59,7 @@ def speed_at_least(node: Node, table: Table, velocity: float | None) -> int:
     return max(1, ceil(velocity / unit - ROUNDING))
 
 
-def _speed(node: Node, table: Table, velocity: float | None) -> int:
+def _speed(node: Node, table: RegisterMap, velocity: float | None) -> int:
     """Raw goal velocity. Where 0 means standstill, the maximum has to be said as a number."""
     row = table["goal_velocity"]
     if velocity is None and node.settings is not None and not node.settings.zero_is_maximum:
@@ -67,7 +67,7 @@ def _speed(node: Node, table: Table, velocity: float | None) -> int:
     return _positive(node, row, velocity)
 
 
-def _positive(node: Node, row: Entry, value: float | None) -> int:
+def _positive(node: Node, row: Register, value: float | None) -> int:
     """Raw value of a bound that must not become 0, for 0 means 'no bound' (None says that)."""
     if value is None:
         return 0

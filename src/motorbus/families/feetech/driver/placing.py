@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from motorbus.core.operation import Effect, Priority, SetBitrate, Sleep, TimeoutClass
+from motorbus.core.request import Effect, Priority, TimeoutClass
+from motorbus.core.steps import SetBitrate, Sleep
 from motorbus.errors import NoReply, OutcomeUnknown, RequestError, WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import Block, confirmed, read_block, unanswered, verified
@@ -45,7 +46,7 @@ async def rewritten(job: Job, node: Node, goal: Place, course: Course, before: b
     await course.reach(WRITING, goal)
     block = job.block(goal)
     request = wire.write(node.node, block.address, block.data)
-    await unanswered(request, block.effect, rank=Priority.CONFIGURATION)
+    await unanswered(request, block.effect, priority=Priority.CONFIGURATION)
     await Sleep(COMMIT)
     await SetBitrate(goal.rate)
     image = await seen(goal.id)
@@ -66,7 +67,7 @@ async def followed(job: Job, node: Node, goal: Place, course: Course) -> None:
         return
     await course.reach(SECOND, goal)
     block = Block(job.second, bytes((goal.id,)), Effect.PERSISTENT)
-    await confirmed(node, block, rank=Priority.CONFIGURATION, timeout=TimeoutClass.STORE)
+    await confirmed(node, block, priority=Priority.CONFIGURATION, timeout=TimeoutClass.STORE)
     await Sleep(COMMIT)
     await verified(node, block, timeout=TimeoutClass.STORE)
     await _still_open(job, node)
@@ -92,7 +93,7 @@ async def _still_open(job: Job, node: Node) -> None:
 async def locked(job: Job, node: Node) -> None:
     """Close the lock of a servo, whose settings are known, and see that it is closed."""
     block = Block(job.lock, CLOSED, Effect.PERSISTENT)
-    await confirmed(node, block, rank=Priority.CONFIGURATION, timeout=TimeoutClass.STORE)
+    await confirmed(node, block, priority=Priority.CONFIGURATION, timeout=TimeoutClass.STORE)
     await verified(node, block, timeout=TimeoutClass.STORE)
 
 

@@ -9,19 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from motorbus.core.entry import Table
 from motorbus.core.family import Found
-from motorbus.core.operation import (
-    ASKED,
-    Emit,
-    Exclusive,
-    JournalEntry,
-    SetBitrate,
-    Sleep,
-    TimeoutClass,
-    catch,
-    with_cleanup,
-)
+from motorbus.core.register import RegisterMap
+from motorbus.core.request import TimeoutClass
+from motorbus.core.steps import ASKED, Emit, Exclusive, JournalEntry, SetBitrate, Sleep, catch, with_cleanup
 from motorbus.errors import LinkLost, MotorbusError, NoReply, RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.changing import guarded
@@ -76,7 +67,7 @@ def _refuse_unknown(rate: int) -> None:
         )
 
 
-def _refuse_lacking(node: Node, table: Table, rate: int) -> None:
+def _refuse_lacking(node: Node, table: RegisterMap, rate: int) -> None:
     known = [BAUD_CODES[code] for code in BAUD_CODES_OF[table.name]]
     if rate not in known:
         raise RequestError(

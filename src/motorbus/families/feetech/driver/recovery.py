@@ -18,18 +18,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
-from motorbus.core.operation import (
-    Effect,
-    Emit,
-    Exclusive,
-    Priority,
-    Progress,
-    SetBitrate,
-    Sleep,
-    TimeoutClass,
-    catch,
-    with_cleanup,
-)
+from motorbus.core.request import Effect, Priority, TimeoutClass
+from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate, Sleep, catch, with_cleanup
 from motorbus.errors import LinkLost, MotorbusError, NoReply, OutcomeUnknown, RequestError, WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import Block, read_block, unanswered
@@ -251,11 +241,11 @@ async def _called_back(job: Job, course: Course) -> Seen:
     """Give a servo that answers to no id its old one by broadcast; nobody else is there to hear it."""
     await SetBitrate(job.old.rate)
     limp = wire.write(wire.BROADCAST, LIMP.address, LIMP.data)
-    await unanswered(limp, LIMP.effect, rank=Priority.STOP)
+    await unanswered(limp, LIMP.effect, priority=Priority.STOP)
     await course.reach(WRITING, job.old)
     for block in (Block(job.lock, OPEN, Effect.PERSISTENT), job.block(job.old)):
         request = wire.write(wire.BROADCAST, block.address, block.data)
-        await unanswered(request, block.effect, rank=Priority.CONFIGURATION)
+        await unanswered(request, block.effect, priority=Priority.CONFIGURATION)
         await Sleep(COMMIT)
     found = await _among(job, (job.old,))
     if not found:

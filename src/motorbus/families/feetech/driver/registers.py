@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
-from motorbus.core.entry import Entry, Storage, Table, Value
-from motorbus.core.goal import Later
-from motorbus.core.operation import Effect, Exchange, Refusal, Runnable, Stops
+from motorbus.core.register import Register, RegisterMap, Storage, Value
+from motorbus.core.request import Effect, Precondition, Request, Stops
+from motorbus.core.setpoint import Deferred
+from motorbus.core.steps import Runnable
 from motorbus.errors import MotorbusError, OutcomeUnknown, RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver import eeprom
@@ -53,7 +54,7 @@ class Span(NamedTuple):
 
     address: int
     size: int
-    rows: tuple[Entry, ...]
+    rows: tuple[Register, ...]
 
 
 async def read(node: Node, /, *names: str) -> dict[str, Value]:
@@ -79,15 +80,15 @@ async def read_raw(node: Node, /, *names: str) -> dict[str, int]:
     return {row.name: found[row.name] for row in rows}
 
 
-def rows_of(table: Table, names: Sequence[str]) -> list[Entry]:
+def rows_of(table: RegisterMap, names: Sequence[str]) -> list[Register]:
     """The rows of these names in this order; every readable one when none is named."""
     rows = [table[name] for name in names] if names else list(table.values())
     return [row for row in rows if row.readable]
 
 
-def spans(rows: Iterable[Entry]) -> Iterator[Span]:
+def spans(rows: Iterable[Register]) -> Iterator[Span]:
     """Group rows so that few READs bring them all; never across the border of two kinds of memory."""
-    group: list[Entry] = []
+    group: list[Register] = []
     for row in sorted(rows, key=lambda row: row.address):
         if group and (row.storage is not group[-1].storage or row.address - _end(group[-1]) > _GAP):
             yield _span(group)
@@ -104,11 +105,11 @@ def decode(span: Span, data: bytes) -> dict[str, int]:
     }
 
 
-def _span(group: list[Entry]) -> Span:
+def _span(group: list[Register]) -> Span:
     return Span(group[0].address, _end(group[-1]) - group[0].address, tuple(group))
 
 
-def _end(row: Entry) -> int:
+def _end(row: Register) -> int:
     return row.address + row.size
 
 
@@ -200,7 +201,7 @@ def _refuse_goals_among_settings(node: Node, orders: Sequence[Order]) -> None:
         )
 
 
-def _kept(node: Node, table: Table, orders: Iterable[Order], kept: Sequence[Block]) -> Sequence[Block]:
+def _kept(node: Node, table: RegisterMap, orders: Iterable[Order], kept: Sequence[Block]) -> Sequence[Block]:
     """What is stored, and where that changes the mode, what the last goal of the old mode would do to the new one."""
     for order in orders:
         if order.row.name == "operating_mode":
@@ -226,23 +227,25 @@ async def reg_write(node: Node, /, **values: Value) -> None:
     await hand_over(node, table, to_hand_over(node, table, values))
 
 
-def to_hand_over(node: Node, table: Table, values: Mapping[str, Value]) -> Block:
+def to_hand_over(node: Node, table: RegisterMap, values: Mapping[str, Value]) -> Block:
     """What a REG WRITE of these would bring: adjoining registers, not to be sent twice. Raises RequestError."""
     return only_block(node, orders_of(node, table, values), "REG WRITE")._replace(repeatable=False)
 
 
-async def hand_over(node: Node, table: Table, block: Block) -> None:
+async def hand_over(node: Node, table: RegisterMap, block: Block) -> None:
     """REG WRITE one block, and see that it was taken. Raises OutcomeUnknown when nobody knows."""
     request = wire.reg_write(node.node, block.address, block.data)
-    exchange = acknowledged(node, request, block, refusal=_handed_over(node, block), later=Later(node.node))
+    exchange = acknowledged(
+        node, request, block, refusal=_handed_over(node, block), later=Deferred(node.node)
+    )
     await exchange
-    if not exchange.replies:
+    if not exchange.expected:
         await _pending(node, table, exchange)
     if not block.goals:
         node.pending = None
 
 
-def _handed_over(node: Node, block: Block) -> Refusal:
+def _handed_over(node: Node, block: Block) -> Precondition:
     """Keep in mind what is handed over, and how often the servo had been stopped when it left."""
     changed = changed_since([(node, block.under)])
     if block.goals:
@@ -256,19 +259,19 @@ def _handed_over(node: Node, block: Block) -> Refusal:
     return refusal
 
 
-async def _pending(node: Node, table: Table, exchange: Exchange[None]) -> None:
+async def _pending(node: Node, table: RegisterMap, exchange: Request[None]) -> None:
     """A servo that acknowledges nothing still says whether a REG WRITE waits."""
     if await waits(node, table) != WAITING:
         raise OutcomeUnknown(
             f"node {node.node} holds no REG WRITE after one was sent",
-            sent=exchange.request,
+            sent=exchange.wire,
             cause="it was lost on the way, or an ACTION came in between",
             advice="read the goal registers before sending it again",
             node=node.node,
         )
 
 
-def waits(node: Node, table: Table) -> Exchange[bytes]:
+def waits(node: Node, table: RegisterMap) -> Request[bytes]:
     """`WAITING` or `IDLE`. It is held against what it ought to be, which a dry run takes for granted."""
     return read_block(
         node, table["reg_write_pending"].address, 1, lambda told: IDLE if told == IDLE else WAITING
@@ -293,9 +296,9 @@ def action(node: Node) -> Runnable[None]:
         _released([node]),
         refusal=_still_wanted([node]),
         after=lambda: _carried_out([node]),
-        later=Later(node.node, begins=True),
+        later=Deferred(node.node, begins=True),
     )
-    return exchange if exchange.replies else _seen(node, node.table, exchange)
+    return exchange if exchange.expected else _seen(node, node.table, exchange)
 
 
 async def _met(node: Node) -> None:
@@ -303,20 +306,20 @@ async def _met(node: Node) -> None:
     await action(node)
 
 
-async def _seen(node: Node, table: Table, exchange: Exchange[None]) -> None:
+async def _seen(node: Node, table: RegisterMap, exchange: Request[None]) -> None:
     """A servo that acknowledges nothing still says whether a REG WRITE waits."""
     await exchange
     if await waits(node, table) != IDLE:
         raise OutcomeUnknown(
             f"node {node.node} still holds a REG WRITE after ACTION was sent",
-            sent=exchange.request,
+            sent=exchange.wire,
             cause="ACTION was lost on the way, or another REG WRITE came in between",
             advice="read the goal registers before sending it again",
             node=node.node,
         )
 
 
-def action_all(nodes: Sequence[Node] = ()) -> Exchange[None]:
+def action_all(nodes: Sequence[Node] = ()) -> Request[None]:
     """ACTION as a broadcast: every servo carries out what REG WRITE left, at the same moment; nobody answers.
 
     `nodes` are those whose goals were handed over here, for the gate to see once more, and to be refused as `action`
@@ -334,7 +337,7 @@ def action_all(nodes: Sequence[Node] = ()) -> Exchange[None]:
         block.goals,
         refusal=_still_wanted(nodes),
         after=lambda: _carried_out(nodes),
-        later=Later(None, begins=True),
+        later=Deferred(None, begins=True),
     )
 
 
@@ -345,7 +348,7 @@ def _released(nodes: Sequence[Node]) -> Block:
     return Block(0, b"", Effect.MOTION if goals else Effect.TORQUE, goals, repeatable=False)
 
 
-def _still_wanted(nodes: Sequence[Node]) -> Refusal:
+def _still_wanted(nodes: Sequence[Node]) -> Precondition:
     """Refuses what was handed over under other settings, now already, or before a servo was told to let go."""
 
     def refusal(stops: Stops) -> MotorbusError | None:

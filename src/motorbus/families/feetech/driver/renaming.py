@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from motorbus.core.family import Found
-from motorbus.core.operation import ASKED, Emit, Exclusive, JournalEntry, SetBitrate
+from motorbus.core.steps import ASKED, Emit, Exclusive, JournalEntry, SetBitrate
 from motorbus.errors import WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.changing import guarded

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from motorbus.core.entry import Table, is_number, shown
-from motorbus.core.goal import Stays, torque_on
-from motorbus.core.operation import Effect, Goal, Refusal
+from motorbus.core.register import RegisterMap, is_number, shown
+from motorbus.core.request import Effect, Precondition
+from motorbus.core.setpoint import Setpoint, Stays, torque_on
 from motorbus.errors import LimitExceeded, MotionError, RequestError
 from motorbus.families.feetech.driver.bound import ask_bound, raw_bound
 from motorbus.families.feetech.driver.exchanges import PRESENT, Block, confirmed, outdated, read_block
@@ -36,7 +36,7 @@ _HERE, _AWAY = "here", "away"
 # -- what is so now ------------------------------------------------------------------------------------------
 
 
-async def asked_anew(node: Node) -> Table:
+async def asked_anew(node: Node) -> RegisterMap:
     """The map of a servo whose mode, limits and units are read at this moment: another program may have set them.
 
     Costs one READ of registers 0 to 39. Raises DeviceError when the register map is not known.
@@ -66,7 +66,7 @@ async def surely_on(node: Node) -> None:
 # -- torque on -----------------------------------------------------------------------------------------------
 
 
-async def torque_on_unless(node: Node, refusal: Refusal | None, *, jump: float = 0.0) -> None:
+async def torque_on_unless(node: Node, refusal: Precondition | None, *, jump: float = 0.0) -> None:
     """`enable_torque`, with a further reason not to send the packet that switches the torque on."""
     checked_jump(node, jump)
     table = await asked_anew(node)
@@ -83,7 +83,7 @@ async def torque_on_unless(node: Node, refusal: Refusal | None, *, jump: float =
     await surely_on(node)
 
 
-async def beginning(node: Node, table: Table, mode: Mode, jump: float) -> Block:
+async def beginning(node: Node, table: RegisterMap, mode: Mode, jump: float) -> Block:
     """The one packet with which torque comes on at rest, in any mode but step; errors as `held_within` and `at_rest`.
 
     What lies between the switch and the order keeps the value it has.
@@ -113,7 +113,7 @@ async def _commands(node: Node) -> bytes:
     return await read_block(node, TORQUE_ENABLE, _COMMANDS, bytes)
 
 
-async def not_turns_away(node: Node, table: Table, block: Block, jump: float = 0.0) -> None:
+async def not_turns_away(node: Node, table: RegisterMap, block: Block, jump: float = 0.0) -> None:
     """See that a servo which counts its turns still stands on the turn on which this order would have it stay.
 
     It forgets them with its supply: lost between being asked where it stands and the order, "here" is turns away, and
@@ -149,7 +149,7 @@ def checked_jump(node: Node, jump: float) -> None:
         )
 
 
-async def ordered(node: Node, table: Table, block: Block) -> None:
+async def ordered(node: Node, table: RegisterMap, block: Block) -> None:
     """Write an order and be sure of it; what it says of the bound of the current is known from then on."""
     row = table[node.control.current] if node.control.current else None
     told = row is not None and block.address <= row.address < block.address + len(block.data)
@@ -164,14 +164,14 @@ async def ordered(node: Node, table: Table, block: Block) -> None:
 # -- stay ----------------------------------------------------------------------------------------------------
 
 
-async def held(node: Node, table: Table) -> Block:
+async def held(node: Node, table: RegisterMap) -> Block:
     """Goal := the present position, wherever that is, for a servo that is under way or limp."""
     raw = await _stands(node, table)
     _know_the_turn(node, raw)
     return _hold(node, table, raw)
 
 
-async def held_within(node: Node, table: Table, jump: float) -> Block:
+async def held_within(node: Node, table: RegisterMap, jump: float) -> Block:
     """Torque on, and goal := the present position, or the limit it would go for when that is at most `jump` rad away.
 
     With a bound of the current that lets it hold, where the map has one, and with a velocity when it would not go to
@@ -188,13 +188,13 @@ async def held_within(node: Node, table: Table, jump: float) -> Block:
     there = _within(node, table, raw, jump)
     block = _hold(node, table, there)
     if there != raw:  # it goes there, so it is judged as any other that goes
-        block = block._replace(goals=(Goal(node.node, "position", block.goals[0].value, *node.limits),))
+        block = block._replace(goals=(Setpoint(node.node, "position", block.goals[0].value, *node.limits),))
     if _stays_put(node, table, found):
         return switched_on(block._replace(data=block.data + burst(node, table, None, None)), found)
     return switched_on(with_bound(node, table, block), found)
 
 
-def _stays_put(node: Node, table: Table, found: bytes) -> bool:
+def _stays_put(node: Node, table: RegisterMap, found: bytes) -> bool:
     """Whether its goal velocity is 0 and means standstill, so that goals alone would move nothing."""
     if node.settings is None or node.settings.zero_is_maximum:
         return False
@@ -202,14 +202,14 @@ def _stays_put(node: Node, table: Table, found: bytes) -> bool:
     return row.decode(found[row.address - TORQUE_ENABLE :][: row.size]) == 0
 
 
-def outside(node: Node, table: Table, block: Block) -> bool:
+def outside(node: Node, table: RegisterMap, block: Block) -> bool:
     """Whether this order to stay lies outside the limits: a servo with torque goes for the nearer one then."""
     assert node.limits is not None
     here, slack = block.goals[0].value, table["goal_position"].scale / 2
     return not node.limits[0] - slack <= here <= node.limits[1] + slack
 
 
-async def _stands(node: Node, table: Table) -> int:
+async def _stands(node: Node, table: RegisterMap) -> int:
     """Raw present position. Raises RequestError when no goal could be told to be within the limits."""
     if node.limits is None:
         raise no_limits(node)
@@ -225,7 +225,7 @@ def _still(node: Node, settings: Settings | None) -> None:
         raise outdated(node)
 
 
-def at_rest(node: Node, table: Table, mode: Mode) -> Block:
+def at_rest(node: Node, table: RegisterMap, mode: Mode) -> Block:
     """Velocity, duty or current 0, whichever this mode heeds; in velocity mode with what bounds the current."""
     name = {Mode.VELOCITY: "goal_velocity", Mode.PWM: node.control.duty, Mode.CURRENT: node.control.current}[
         mode
@@ -233,11 +233,11 @@ def at_rest(node: Node, table: Table, mode: Mode) -> Block:
     if not name:
         raise unpublished_duty(node)
     row = table[name]
-    goal = Goal(node.node, _QUANTITY[mode], 0.0, 0.0, 0.0, Stays.STILL)
+    goal = Setpoint(node.node, _QUANTITY[mode], 0.0, 0.0, 0.0, Stays.STILL)
     return Block(row.address, row.encode(0), row.effect, (goal,))
 
 
-def with_bound(node: Node, table: Table, block: Block, current: float | None = None) -> Block:
+def with_bound(node: Node, table: RegisterMap, block: Block, current: float | None = None) -> Block:
     """This block with the bound of the current before or behind it, where the map has one; the two adjoin."""
     if not node.control.current:
         return block
@@ -270,11 +270,11 @@ def unknown_mode(node: Node) -> RequestError:
     )
 
 
-def _hold(node: Node, table: Table, raw: int) -> Block:
+def _hold(node: Node, table: RegisterMap, raw: int) -> Block:
     """Goal := this position. Staying where it stands is inside any limits, so the goal brings its own."""
     row = table["goal_position"]
     value = node.value(row, raw)
-    goal = Goal(node.node, "position", value, value, value, Stays.STILL)
+    goal = Setpoint(node.node, "position", value, value, value, Stays.STILL)
     return Block(row.address, row.encode(raw), row.effect, (goal,))
 
 
@@ -295,7 +295,7 @@ def _know_the_turn(node: Node, raw: int, jump: float = 0.0) -> None:
     )
 
 
-def _within(node: Node, table: Table, raw: int, jump: float) -> int:
+def _within(node: Node, table: RegisterMap, raw: int, jump: float) -> int:
     """Where the servo will hold: here, or at the limit it would go for, when that is near enough."""
     row = table["goal_position"]
     here = node.value(row, raw)

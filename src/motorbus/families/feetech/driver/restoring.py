@@ -13,9 +13,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from motorbus.core.entry import Table
 from motorbus.core.family import Found
-from motorbus.core.operation import Effect, Exclusive, Priority, SetBitrate, Sleep, TimeoutClass, with_cleanup
+from motorbus.core.register import RegisterMap
+from motorbus.core.request import Effect, Priority, TimeoutClass
+from motorbus.core.steps import Exclusive, SetBitrate, Sleep, with_cleanup
 from motorbus.errors import NoReply, OutcomeUnknown, WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, acknowledged
@@ -43,7 +44,7 @@ async def factory_restore(node: Node) -> Found:
         node.forget_settings()
 
 
-def factory_rates(table: Table) -> tuple[int, ...]:
+def factory_rates(table: RegisterMap) -> tuple[int, ...]:
     """The rates (bit/s) at which servos of this map ship; two where that depends on the model (SCS)."""
     code = table["baud_rate"].default
     return (BAUD_CODES[0], BAUD_CODES[1]) if code is None else (BAUD_CODES[code],)
@@ -102,7 +103,7 @@ async def _found(
 async def _reset(node: Node) -> None:
     block = Block(0, b"", Effect.PERSISTENT, repeatable=False)
     request = wire.factory_restore(node.node)
-    await acknowledged(node, request, block, rank=Priority.CONFIGURATION, timeout=TimeoutClass.STORE)
+    await acknowledged(node, request, block, priority=Priority.CONFIGURATION, timeout=TimeoutClass.STORE)
 
 
 def _gone(node: Node, taken: set[tuple[int, int]]) -> NoReply:

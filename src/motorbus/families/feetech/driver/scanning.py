@@ -12,15 +12,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from motorbus.core.family import Found, Identity
-from motorbus.core.operation import (
-    Emit,
-    Exclusive,
-    Progress,
-    SetBitrate,
-    Sleep,
-    catch,
-    with_cleanup,
-)
+from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate, Sleep, catch, with_cleanup
 from motorbus.errors import LinkLost, MotorbusError, NoReply, WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.identity import identify, ping_exchange

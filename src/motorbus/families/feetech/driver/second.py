@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from motorbus.core.entry import Entry, Table
-from motorbus.core.family import Readdressed
-from motorbus.core.operation import Effect, Emit, SetBitrate
+from motorbus.core.family import IdChanged
+from motorbus.core.register import Register, RegisterMap
+from motorbus.core.request import Effect
+from motorbus.core.steps import Emit, SetBitrate
 from motorbus.errors import RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver import eeprom
@@ -57,12 +58,12 @@ async def set_second_id(node: Node, new: int, *, force: bool = False, among: Seq
     if new != node.node and not force:
         refuse_taken(Place(new, await SetBitrate(0)), await whoever(new))
     await others_than(node, asked, (node.node,) if force else (new, node.node))
-    await Emit(Readdressed(node.node, new))
+    await Emit(IdChanged(node.node, new))
     await eeprom.store(node, table, [Block(row.address, row.encode(new), Effect.PERSISTENT)])
     return new
 
 
-def _row(node: Node, table: Table) -> Entry:
+def _row(node: Node, table: RegisterMap) -> Register:
     if _ROW in table:
         return table[_ROW]
     raise RequestError(

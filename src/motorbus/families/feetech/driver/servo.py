@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from motorbus.core.verbs import AsyncRunner, Awaiting, Blocking, BlockingRunner, verb
+from motorbus.core.device import AsyncDevice, AsyncRunner, BlockingDevice, BlockingRunner, device_method
 from motorbus.families.feetech.driver import (
     alarm,
     blocked,
@@ -34,66 +34,66 @@ class ServoVerbs(Node):
     Making one costs nothing and sends nothing; the first verb that has to know the servo asks it.
     """
 
-    ping = verb(identity.ping)
-    identify = verb(identity.identify)
-    prepare = verb(identity.prepare)
-    read = verb(registers.read)
-    read_raw = verb(registers.read_raw)
-    write = verb(registers.write)
-    rewrite = verb(registers.rewrite)
-    reg_write = verb(registers.reg_write)
-    action = verb(registers.action)
-    position = verb(feedback.position)
-    velocity = verb(feedback.velocity)
-    load = verb(feedback.load)
-    current = verb(feedback.current)
-    voltage = verb(feedback.voltage)
-    temperature = verb(feedback.temperature)
-    telemetry = verb(feedback.telemetry)
-    enable_torque = verb(motion.enable_torque)
-    disable_torque = verb(torque.disable_torque)
-    move = verb(motion.move)
-    stop = verb(motion.stop)
-    mode = verb(modes.mode)
-    set_mode = verb(modes.set_mode)
-    set_velocity = verb(drive.set_velocity)
-    set_duty = verb(drive.set_duty)
-    set_current = verb(drive.set_current)
-    step = verb(drive.step)
-    duplicates = verb(sharing.duplicates)
-    set_id = verb(renaming.set_id)
-    set_baud = verb(rates.set_baud)
-    second_id = verb(second.second_id)
-    set_second_id = verb(second.set_second_id)
-    recover = verb(recovery.recover)
-    factory_restore = verb(restoring.factory_restore)
-    calibrate = verb(calibration.calibrate)
-    zero = verb(calibration.zero)
-    clear_turns = verb(turns.clear_turns)
-    many_turns = verb(counting.many_turns)
-    set_many_turns = verb(counting.set_many_turns)
-    torque_limit = verb(tuning.torque_limit)
-    set_torque_limit = verb(tuning.set_torque_limit)
-    gains = verb(tuning.gains)
-    set_gains = verb(tuning.set_gains)
-    protection = verb(tuning.protection)
-    set_protection = verb(tuning.set_protection)
-    recover_overload = verb(overload.recover_overload)
-    alarms = verb(alarm.alarms)
-    blockers = verb(blocked.blockers)
+    ping = device_method(identity.ping)
+    identify = device_method(identity.identify)
+    prepare = device_method(identity.prepare)
+    read = device_method(registers.read)
+    read_raw = device_method(registers.read_raw)
+    write = device_method(registers.write)
+    rewrite = device_method(registers.rewrite)
+    reg_write = device_method(registers.reg_write)
+    action = device_method(registers.action)
+    position = device_method(feedback.position)
+    velocity = device_method(feedback.velocity)
+    load = device_method(feedback.load)
+    current = device_method(feedback.current)
+    voltage = device_method(feedback.voltage)
+    temperature = device_method(feedback.temperature)
+    telemetry = device_method(feedback.telemetry)
+    enable_torque = device_method(motion.enable_torque)
+    disable_torque = device_method(torque.disable_torque)
+    move = device_method(motion.move)
+    stop = device_method(motion.stop)
+    mode = device_method(modes.mode)
+    set_mode = device_method(modes.set_mode)
+    set_velocity = device_method(drive.set_velocity)
+    set_duty = device_method(drive.set_duty)
+    set_current = device_method(drive.set_current)
+    step = device_method(drive.step)
+    duplicates = device_method(sharing.duplicates)
+    set_id = device_method(renaming.set_id)
+    set_baud = device_method(rates.set_baud)
+    second_id = device_method(second.second_id)
+    set_second_id = device_method(second.set_second_id)
+    recover = device_method(recovery.recover)
+    factory_restore = device_method(restoring.factory_restore)
+    calibrate = device_method(calibration.calibrate)
+    zero = device_method(calibration.zero)
+    clear_turns = device_method(turns.clear_turns)
+    many_turns = device_method(counting.many_turns)
+    set_many_turns = device_method(counting.set_many_turns)
+    torque_limit = device_method(tuning.torque_limit)
+    set_torque_limit = device_method(tuning.set_torque_limit)
+    gains = device_method(tuning.gains)
+    set_gains = device_method(tuning.set_gains)
+    protection = device_method(tuning.protection)
+    set_protection = device_method(tuning.set_protection)
+    recover_overload = device_method(overload.recover_overload)
+    alarms = device_method(alarm.alarms)
+    blockers = device_method(blocked.blockers)
 
 
-class Servo(ServoVerbs, Blocking):
+class Servo(ServoVerbs, BlockingDevice):
     """One servo on a blocking bus: `Servo(bus, 3).position()`."""
 
     def __init__(self, bus: BlockingRunner, node: int) -> None:
         ServoVerbs.__init__(self, node)
-        Blocking.__init__(self, bus)
+        BlockingDevice.__init__(self, bus)
 
 
-class AsyncServo(ServoVerbs, Awaiting):
+class AsyncServo(ServoVerbs, AsyncDevice):
     """One servo on an async bus: `await AsyncServo(bus, 3).position()`."""
 
     def __init__(self, bus: AsyncRunner, node: int) -> None:
         ServoVerbs.__init__(self, node)
-        Awaiting.__init__(self, bus)
+        AsyncDevice.__init__(self, bus)

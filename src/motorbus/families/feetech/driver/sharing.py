@@ -12,16 +12,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import (
-    Emit,
-    Exchange,
-    Expected,
-    Progress,
-    Response,
-    SetBitrate,
-    TimeoutClass,
-    catch,
-)
+from motorbus.core.request import Expected, Request, Response, TimeoutClass
+from motorbus.core.steps import Emit, Progress, SetBitrate, catch
 from motorbus.errors import MotorbusError, NoReply, RequestError, WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import PRESENT, read_block
@@ -151,7 +143,7 @@ async def refuse_duplicates(node: Node, polls: int = POLLS) -> None:
         )
 
 
-def _alone(node: Node, address: int, count: int) -> Exchange[tuple[bytes, ...]]:
+def _alone(node: Node, address: int, count: int) -> Request[tuple[bytes, ...]]:
     """One read, tried once; surplus bytes and wrong ones make it fail."""
     return read_block(node, address, count, lambda data: (data,), timeout=TimeoutClass.SCAN)
 
@@ -165,8 +157,12 @@ async def read_twice(node: Node, address: int, count: int) -> tuple[bytes, ...]:
             node.heard(reply.data[4], answer.at)
         return tuple(reply.data[5 : 5 + count] for reply in answer.replies)
 
-    answers = await Exchange(
-        wire.read(node.node, address, count), (due, due), read, timeout=TimeoutClass.SCAN, repeatable=True
+    answers = await Request(
+        wire.read(node.node, address, count),
+        (due, due),
+        read,
+        reply_within=TimeoutClass.SCAN,
+        repeatable=True,
     )
     if not answers:
         raise NoReply(f"node {node.node} did not answer", node=node.node)

@@ -11,9 +11,9 @@ from operator import index
 from struct import Struct
 from typing import Final, NamedTuple
 
-from motorbus.core.entry import Coding, shown
 from motorbus.core.family import Quality, State
-from motorbus.core.operation import UNLIKE, Exchange, Response, Unlike, Whole
+from motorbus.core.register import Coding, shown
+from motorbus.core.request import ExactDecoder, Request, Response
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.exchanges import PRESENT
 from motorbus.families.feetech.driver.feedback import FEEDBACK, state_of
@@ -41,7 +41,7 @@ class States(NamedTuple):
     at: float
 
 
-def sync_read_states(servos: Sequence[Node], *, rate: int = RATE, air: float = AIR) -> Exchange[States]:
+def sync_read_states(servos: Sequence[Node], *, rate: int = RATE, air: float = AIR) -> Request[States]:
     """One sample of everything of all of these, as `telemetry` tells it, in one exchange that may be kept.
 
     In API units: rad, rad/s, fraction of the duty, A, V, °C. Raises as `sync_read_positions`.
@@ -65,7 +65,7 @@ def sync_read_states(servos: Sequence[Node], *, rate: int = RATE, air: float = A
 
 def sync_read_raw(
     address: int, count: int, servos: Sequence[Node], *, rate: int = RATE, air: float = AIR
-) -> Exchange[dict[int, bytes]]:
+) -> Request[dict[int, bytes]]:
     """The bytes of `count` registers from `address` on of all of these, by id, in one exchange that may be kept.
 
     Who does not answer is missing. Raises as `sync_read_positions`, and for what is no whole number of either.
@@ -119,7 +119,7 @@ class _Seat(NamedTuple):
     readings: tuple[_Reading | None, ...]
 
 
-def _whole(nodes: Sequence[Node], count: int) -> Whole[States] | None:
+def _whole(nodes: Sequence[Node], count: int) -> ExactDecoder[States] | None:
     packets = Packets([node.node for node in nodes], count)
     seats = [_seat(node, part) for node, part in zip(nodes, packets.parts, strict=True)]
     known = [seat for seat in seats if seat is not None]
@@ -128,13 +128,13 @@ def _whole(nodes: Sequence[Node], count: int) -> Whole[States] | None:
     unpack = Struct(f"<5xHHHBB2xB2xH{count - FEEDBACK + 1}x").unpack
     are_sound, fresh = packets.are_sound, Quality.FRESH
 
-    def whole(data: bytes, at: float) -> States | Unlike:
+    def whole(data: bytes, at: float) -> States | None:
         if not are_sound(data):
-            return UNLIKE
+            return None
         values = {}
         for node, part, settings, readings in known:
             if node.settings is not settings:
-                return UNLIKE
+                return None
             raws = unpack(data[part])
             told: list[float | None] = []
             for reading in readings:
@@ -145,7 +145,7 @@ def _whole(nodes: Sequence[Node], count: int) -> Whole[States] | None:
                 raw = raws[which]
                 if raw >= plain:
                     if not sign:
-                        return UNLIKE
+                        return None
                     size = raw & sign - 1
                     raw = -size if raw & sign else size
                 told.append(raw * scale * factor)

@@ -1,6 +1,6 @@
 """Letting go, whatever happens: torque off ignores alarms, needs to know nothing of the servo, and visits everyone.
 
-Register 40 is the torque switch in every map, so this works on servos that nobody has identified. It has the rank
+Register 40 is the torque switch in every map, so this works on servos that nobody has identified. It has the priority
 of a stop: it passes whoever holds the bus, and an emergency stop that is latched.
 """
 
@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
-from motorbus.core.goal import torque_off
-from motorbus.core.operation import Effect, Exchange, Priority, catch, with_cleanup
+from motorbus.core.request import Effect, Priority, Request
+from motorbus.core.setpoint import torque_off
+from motorbus.core.steps import catch, with_cleanup
 from motorbus.errors import MotorbusError, VerificationFailed
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import DOUBTS, Block, unanswered, verified, write_block
@@ -34,10 +35,10 @@ async def disable_torque(node: Node) -> None:
     """
     doubt: MotorbusError | None = None
     for _ in range(_TRIES):
-        exchange = write_block(node, limp(node.node), rank=Priority.STOP)
+        exchange = write_block(node, limp(node.node), priority=Priority.STOP)
         try:
             await exchange
-            if not exchange.replies:
+            if not exchange.expected:
                 await verified(node, LIMP)
             return
         except (*DOUBTS, VerificationFailed) as error:
@@ -47,9 +48,11 @@ async def disable_torque(node: Node) -> None:
     await verified(node, LIMP, doubt)
 
 
-def disable_torque_everyone() -> Exchange[None]:
+def disable_torque_everyone() -> Request[None]:
     """Torque off for every servo on the line, in one broadcast; no servo acknowledges it."""
-    return unanswered(wire.write(wire.BROADCAST, LIMP.address, LIMP.data), LIMP.effect, rank=Priority.STOP)
+    return unanswered(
+        wire.write(wire.BROADCAST, LIMP.address, LIMP.data), LIMP.effect, priority=Priority.STOP
+    )
 
 
 async def disable_torque_all(ids: Iterable[int | Node]) -> dict[int, MotorbusError]:
@@ -79,10 +82,10 @@ async def _one_by_one(waiting: list[Node], errors: dict[int, MotorbusError]) -> 
         del waiting[0]
 
 
-def all_limp(nodes: Sequence[Node]) -> Iterator[Exchange[None]]:
+def all_limp(nodes: Sequence[Node]) -> Iterator[Request[None]]:
     """SYNC WRITE torque off to these, as many frames as it takes; nobody answers."""
     capacity = wire.sync_write_capacity(len(LIMP.data))
     for start in range(0, len(nodes), capacity):
         ids = [node.node for node in nodes[start : start + capacity]]
         request = wire.sync_write(LIMP.address, [(number, LIMP.data) for number in ids])
-        yield unanswered(request, LIMP.effect, tuple(map(torque_off, ids)), rank=Priority.STOP)
+        yield unanswered(request, LIMP.effect, tuple(map(torque_off, ids)), priority=Priority.STOP)

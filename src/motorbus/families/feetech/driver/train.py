@@ -11,9 +11,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
-from motorbus.core.entry import is_number, shown
 from motorbus.core.family import Positions
-from motorbus.core.operation import Effect, Exchange, catch
+from motorbus.core.register import is_number, shown
+from motorbus.core.request import Effect, Request
+from motorbus.core.steps import catch
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import changed_since, confirmed, unanswered
@@ -85,14 +86,14 @@ def raise_first(errors: Iterable[MotorbusError]) -> None:
 class Train:
     """Servos in a loop; see `core.family.Train`. Made by `train`."""
 
-    def __init__(self, servos: Sequence[Node], positions: Sequence[Exchange[Positions]]) -> None:
+    def __init__(self, servos: Sequence[Node], positions: Sequence[Request[Positions]]) -> None:
         self.nodes: Final = tuple(node.node for node in servos)
         self.positions: Final = tuple(positions)
         self._servos: Final = {node.node: node for node in servos}
         self._packets: tuple[_Packet, ...] = ()
         self._ids: tuple[int, ...] = ()
 
-    def goals(self, to: Mapping[int, float]) -> Sequence[Exchange[None]]:
+    def goals(self, to: Mapping[int, float]) -> Sequence[Request[None]]:
         """Goal positions (rad) for some or all of them, in one packet as long as there are at most 83.
 
         Raises LimitExceeded for what is no finite number or fits no register, RequestError for a servo that is none of
@@ -188,13 +189,13 @@ class _Packet:
         self._seen = now
         return True
 
-    def exchange(self, to: Mapping[int, float]) -> Exchange[None]:
+    def exchange(self, to: Mapping[int, float]) -> Request[None]:
         """The packet with these goals (rad)."""
         goals = [to[node.node] for node in self._nodes]
         cast = None if self._mould is None else self._mould.cast(goals)
         return cast or self._judged(goals)
 
-    def _judged(self, goals: Sequence[float]) -> Exchange[None]:
+    def _judged(self, goals: Sequence[float]) -> Request[None]:
         """The same, as `position_goal` says: a whole number, what is none, or a goal outside the limits."""
         items, orders = [], []
         for node, row, goal in zip(self._nodes, self._rows, goals, strict=True):

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from motorbus.core.entry import Entry, Storage, Table, Value, shown
+from motorbus.core.register import Register, RegisterMap, Storage, Value, shown
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.exchanges import Block, verified
 from motorbus.families.feetech.driver.identity import writable
@@ -143,7 +143,7 @@ async def set_torque_limit(node: Node, limit: float, *, persistent: bool = False
     return TorqueLimit(limit, names, kept)
 
 
-def limiting(table: Table) -> Entry:
+def limiting(table: RegisterMap) -> Register:
     """The row that bounds the torque at this moment."""
     return table[CONTROL[table.name].limit or "max_torque"]
 
@@ -237,11 +237,11 @@ async def set_protection(
     await _put(node, table, orders)
 
 
-def _names(row: Entry, mask: int) -> tuple[str, ...]:
+def _names(row: Register, mask: int) -> tuple[str, ...]:
     return tuple(name for bit, name in row.bits.items() if mask >> bit & 1)
 
 
-def _mask(node: Node, row: Entry, names: object) -> int:
+def _mask(node: Node, row: Register, names: object) -> int:
     wanted = [names] if isinstance(names, str) else list(names) if isinstance(names, Iterable) else [names]
     known = {name: bit for bit, name in row.bits.items() if not name.startswith("undefined")}
     unknown = [str(name) for name in wanted if name not in known]
@@ -294,8 +294,8 @@ def _given(node: Node, values: Mapping[str, object], what: str) -> dict[str, obj
 
 
 def _rows(
-    table: Table, names: Mapping[str, str], wanted: Iterable[str] = (), node: Node | None = None
-) -> dict[str, Entry]:
+    table: RegisterMap, names: Mapping[str, str], wanted: Iterable[str] = (), node: Node | None = None
+) -> dict[str, Register]:
     """The rows of all parts that this map has. Raises RequestError when one that is wanted is not among them."""
     rows = {part: table[name] for part, name in names.items() if name in table}
     for part in wanted:
@@ -305,7 +305,7 @@ def _rows(
     return rows
 
 
-def _lacks(node: Node, table: Table, part: str, has: Iterable[str]) -> RequestError:
+def _lacks(node: Node, table: RegisterMap, part: str, has: Iterable[str]) -> RequestError:
     return RequestError(
         f"node {node.node} has no register for {part!r}: its map {table.name} lacks it",
         expected=f"one of {', '.join(has)}",
@@ -314,7 +314,7 @@ def _lacks(node: Node, table: Table, part: str, has: Iterable[str]) -> RequestEr
     )
 
 
-async def _put(node: Node, table: Table, values: Mapping[str, Value]) -> None:
+async def _put(node: Node, table: RegisterMap, values: Mapping[str, Value]) -> None:
     """Write by name; EEPROM is read back by the guarded sequence, RAM here."""
     await write_limp(node, values)
     for name, value in values.items():

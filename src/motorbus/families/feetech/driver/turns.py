@@ -9,8 +9,9 @@ measured on an STS3215 with firmware 3.10 (ignored).
 
 from __future__ import annotations
 
-from motorbus.core.entry import Entry
-from motorbus.core.operation import Effect, Exclusive, Priority, TimeoutClass
+from motorbus.core.register import Register
+from motorbus.core.request import Effect, Priority, TimeoutClass
+from motorbus.core.steps import Exclusive
 from motorbus.errors import DeviceError, MotorbusError, RequestError, VerificationFailed
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import DOUBTS, PRESENT, Block, acknowledged, read_block
@@ -34,14 +35,18 @@ async def clear_turns(node: Node) -> float:
     return await Exclusive(_cleared(node, table["present_position"], CONTROL[table.name].turn))
 
 
-async def _cleared(node: Node, position: Entry, turn: int) -> float:
+async def _cleared(node: Node, position: Register, turn: int) -> float:
     before = await read_block(node, PRESENT, position.size, position.decode)
     await disable_torque(node)
     order = Block(0, b"", Effect.PERSISTENT)
     doubt: MotorbusError | None = None
     try:
         await acknowledged(
-            node, wire.clear_turns(node.node), order, rank=Priority.CONFIGURATION, timeout=TimeoutClass.STORE
+            node,
+            wire.clear_turns(node.node),
+            order,
+            priority=Priority.CONFIGURATION,
+            timeout=TimeoutClass.STORE,
         )
     except DOUBTS as error:
         doubt = error

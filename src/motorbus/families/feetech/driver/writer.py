@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from itertools import chain
 from typing import Any, Final, TypeAlias
 
-from motorbus.core.entry import Table, shown
-from motorbus.core.operation import Effect, Exchange
+from motorbus.core.register import RegisterMap, shown
+from motorbus.core.request import Effect, Request
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.group import block_of, distinct, sync_writes
 from motorbus.families.feetech.driver.loop import check_ordered, known_row, one_packet
@@ -36,7 +36,7 @@ class SyncWriter:
         )  # the quickest look of all
         self._mould: Mould | None = None
 
-    def __call__(self, values: Sequence[Row]) -> Exchange[None]:
+    def __call__(self, values: Sequence[Row]) -> Request[None]:
         """The packet that writes these: one value for each servo, or where several registers are written one sequence
         of values, in the order of the names. In API units.
 
@@ -47,11 +47,11 @@ class SyncWriter:
         made = self._mould
         if made is None or (made.seen is not CHANGES.now and not made.holds()):
             made = self._fit()
-        exchange = None
+        request = None
         if made is not None and (type(values) is list or type(values) is tuple):
             flat = values if self._single else self._flat(values)
-            exchange = None if flat is None else made.cast(flat)
-        return exchange or self._slowly(values)
+            request = None if flat is None else made.cast(flat)
+        return request or self._slowly(values)
 
     def _flat(self, values: Any) -> list[Any] | None:
         """Rows of values, one behind the other; None where a row is too long or too short, or neither list nor tuple:
@@ -75,7 +75,7 @@ class SyncWriter:
         self._mould = mould(self.servos, rows)
         return self._mould
 
-    def _slowly(self, values: Sequence[Row]) -> Exchange[None]:
+    def _slowly(self, values: Sequence[Row]) -> Request[None]:
         check_ordered(values)
         if len(values) != len(self.servos):
             raise RequestError(
@@ -136,7 +136,7 @@ def sync_writer(servos: Sequence[Node], *names: str) -> SyncWriter:
     return SyncWriter(nodes, names)
 
 
-def _check_rows(node: Node, table: Table, names: Sequence[str]) -> None:
+def _check_rows(node: Node, table: RegisterMap, names: Sequence[str]) -> None:
     """Raise RequestError where whatever is to be written could not be, with the words of the first call."""
     rows = [table[name] for name in names]
     for row in rows:

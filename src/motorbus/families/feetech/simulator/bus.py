@@ -14,8 +14,9 @@ from itertools import count
 from operator import attrgetter
 from typing import Final, NamedTuple, cast
 
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.chance import Chance
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.request import Data
 from motorbus.errors import RequestError
 from motorbus.families.feetech.simulator import effects
 from motorbus.families.feetech.simulator.collision import BITS, Speech, heard, overlapping

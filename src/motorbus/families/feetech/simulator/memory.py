@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, TypeAlias
 
-from motorbus.core.entry import Coding, Entry, Storage, Table
+from motorbus.core.register import Coding, Register, RegisterMap, Storage
 from motorbus.families.feetech.simulator.flash import Commit, Flash
 from motorbus.families.feetech.table import BAUD_CODES
 
@@ -59,15 +59,15 @@ class Word(NamedTuple):
 class Layout:
     """What the rows of a table say about each byte; one for all servos that share the table."""
 
-    def __init__(self, table: Table, defaults: Mapping[str, int]) -> None:
+    def __init__(self, table: RegisterMap, defaults: Mapping[str, int]) -> None:
         self.table = table
-        self._touched: dict[tuple[int, int], tuple[Entry, ...]] = {}
+        self._touched: dict[tuple[int, int], tuple[Register, ...]] = {}
         self._spans: dict[tuple[int, int], Span] = {}
         self.told: dict[
             tuple[int, int], tuple[tuple[str, Tell], ...]
         ] = {}  # `feedback` keeps its answers here
         self.asked: dict[object, Any] = {}  # and `settings` what the same registers come to
-        self.rows: list[Entry | None] = [None] * SIZE
+        self.rows: list[Register | None] = [None] * SIZE
         for entry in table.values():
             for address in range(entry.address, entry.address + entry.size):
                 self.rows[address] = entry
@@ -87,7 +87,7 @@ class Layout:
         row = self.rows[address]
         return row is not None and row.storage is not Storage.RAM
 
-    def touched(self, address: int, count: int) -> tuple[Entry, ...]:
+    def touched(self, address: int, count: int) -> tuple[Register, ...]:
         """The rows of which at least one byte lies in this range, in order."""
         known = self._touched.get((address, count))  # hosts ask for the same ranges again and again
         if known is None:
@@ -256,17 +256,17 @@ class Memory:
         self.settled = False
         self.live[:] = self.layout.begun(stored)
 
-    def _cells(self, entry: Entry) -> list[tuple[int, int]]:
+    def _cells(self, entry: Register) -> list[tuple[int, int]]:
         return [(place, self.live[place]) for place in range(entry.address, entry.address + entry.size)]
 
-    def _put(self, entry: Entry, address: int, data: bytes) -> list[tuple[int, int]]:
+    def _put(self, entry: Register, address: int, data: bytes) -> list[tuple[int, int]]:
         """Write the part of a row that lies in these bytes; gives the cells that it has."""
         places = range(max(entry.address, address), min(entry.address + entry.size, address + len(data)))
         for place in places:
             self.live[place] = data[place - address]
         return [(place, self.live[place]) for place in places]
 
-    def _fits(self, entry: Entry, address: int, data: bytes) -> bool:
+    def _fits(self, entry: Register, address: int, data: bytes) -> bool:
         after = bytearray(self.live)
         after[address : address + len(data)] = data
         return (
@@ -274,12 +274,12 @@ class Memory:
         )
 
 
-def _takes(entry: Entry) -> bool:
+def _takes(entry: Register) -> bool:
     """Whether a host can write this row."""
     return (entry.writable and entry.storage is not Storage.FACTORY) or entry.name in _KEPT_FACTORY_ROWS
 
 
-def _span(rows: tuple[Entry, ...], address: int, count: int) -> Span:
+def _span(rows: tuple[Register, ...], address: int, count: int) -> Span:
     pieces: list[tuple[int, int, int]] = []
     cells: list[int] = []
     names = frozenset(row.name for row in rows if _takes(row))
@@ -295,11 +295,11 @@ def _span(rows: tuple[Entry, ...], address: int, count: int) -> Span:
     return Span(tuple(pieces), tuple(cells), Written(names, False), Written(names, True))
 
 
-def _is_word(entry: Entry) -> bool:
+def _is_word(entry: Register) -> bool:
     return entry.size == 2 and entry.coding is not Coding.TWOS_COMPLEMENT
 
 
-def _word(entry: Entry) -> Word:
+def _word(entry: Register) -> Word:
     low, high = entry.address, entry.address + 1
     if entry.order != "little":
         low, high = high, low
@@ -308,7 +308,7 @@ def _word(entry: Entry) -> Word:
     return Word(low, high, 0xFFFF, 0)
 
 
-def code(entry: Entry, raw: int) -> bytes:
+def code(entry: Register, raw: int) -> bytes:
     """A raw value as the bytes of a row, cut to what its coding can say: a reading has no range but that."""
     bits = entry.sign_bit if entry.coding is Coding.SIGN_MAGNITUDE and entry.sign_bit is not None else None
     if bits is None:
@@ -318,7 +318,7 @@ def code(entry: Entry, raw: int) -> bytes:
     return value.to_bytes(entry.size, "little" if entry.order == "little" else "big")
 
 
-def _image(table: Table, defaults: Mapping[str, int]) -> bytearray:
+def _image(table: RegisterMap, defaults: Mapping[str, int]) -> bytearray:
     image = bytearray(SIZE)
     for entry in table.values():
         raw = defaults.get(entry.name, entry.default or 0)

@@ -12,8 +12,8 @@ from difflib import get_close_matches
 from types import MappingProxyType
 from typing import Final
 
-from motorbus.core.entry import Table
 from motorbus.core.plant import Drive
+from motorbus.core.register import RegisterMap
 from motorbus.errors import RequestError
 from motorbus.families.feetech.simulator.personality import (
     HIGH_LIMITS,
@@ -37,7 +37,7 @@ class Model:
     """
 
     name: str
-    table: Table
+    table: RegisterMap
     turn: int
     drive: Drive
     voltage: float

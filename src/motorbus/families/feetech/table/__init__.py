@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from motorbus.core.entry import Table
+from motorbus.core.register import RegisterMap
 from motorbus.families.feetech.table.codes import (
     ALARM_BITS,
     ALARM_BITS_OF,
@@ -28,7 +28,7 @@ from motorbus.families.feetech.table.scs import SCS, SCS2, SCS_COUNT
 from motorbus.families.feetech.table.sms import SMBL, SMCL
 from motorbus.families.feetech.table.sts import AMPERE, COUNT, STS
 
-TABLES: Final[Mapping[str, Table]] = MappingProxyType(
+TABLES: Final[Mapping[str, RegisterMap]] = MappingProxyType(
     {table.name: table for table in (STS, SMBL, SMCL, SCS, SCS2, HLS)}
 )
 """Every register map by its name."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from motorbus.core.entry import Table, changed
+from motorbus.core.register import RegisterMap, changed
 
 SAME_EVERYWHERE: Final[Mapping[str, int]] = {
     "byte_order": 0,
@@ -52,8 +52,8 @@ _IN_DOUBT_EVERYWHERE: Final = frozenset(("id", "protective_torque", "overload_to
 
 
 def borrowed(
-    table: Table, *, source: str, defaults: Mapping[str, int] | None = None, **differences: object
-) -> Table:
+    table: RegisterMap, *, source: str, defaults: Mapping[str, int] | None = None, **differences: object
+) -> RegisterMap:
     """This table as another map has it that `source` describes: a table to derive that map from.
 
     `defaults` are raw values by name that the other map is known to ship with; `differences` are fields that all of its

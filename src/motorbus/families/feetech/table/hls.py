@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from motorbus.core.entry import Access, Coding, Entry, Storage, changed
-from motorbus.core.operation import Effect
+from motorbus.core.register import Access, Coding, Register, Storage, changed
+from motorbus.core.request import Effect
 from motorbus.families.feetech.table.borrowed import borrowed
 from motorbus.families.feetech.table.codes import ALARM_BITS_OF, rates
 from motorbus.families.feetech.table.phase import PHASE_BITS
@@ -24,23 +24,23 @@ _VELOCITY = 50 * COUNT
 _ROWS = borrowed(STS, source=_BOTH, defaults={"baud_rate": 0, "max_torque": 980, "torque_limit": 980})
 
 
-def _row(name: str, **differences: object) -> Entry:
+def _row(name: str, **differences: object) -> Register:
     return changed(_ROWS[name], **differences)
 
 
-def _setting(name: str, address: int, **facts: object) -> Entry:
+def _setting(name: str, address: int, **facts: object) -> Register:
     return changed(_ROWS["position_p"], name=name, address=address, **facts)
 
 
-def _live(name: str, address: int, loaded: str) -> Entry:
-    return Entry(
+def _live(name: str, address: int, loaded: str) -> Register:
+    return Register(
         name=name, address=address, size=1, access=Access.READ_WRITE, storage=Storage.RAM, high=254,
         source=_BOTH, note=f"loaded from {loaded} at power-up",
     )  # fmt: skip
 
 
-def _factory(name: str, address: int, note: str = "") -> Entry:
-    return Entry(
+def _factory(name: str, address: int, note: str = "") -> Register:
+    return Register(
         name=name, address=address, size=1, access=Access.READ, storage=Storage.FACTORY, high=255,
         protected=True, source=HLS_TABLE, note=note,
     )  # fmt: skip
@@ -53,7 +53,7 @@ _SETTINGS = (
     _row("model_major", default=10),
     _row("id", source=f"{MANUAL}, example 3; {_BOTH}", note=f"the main id; {STS['id'].note}"),
     _row("baud_rate", choices=rates("hls"), source=_ALL, conflict=HEADERS),
-    Entry(
+    Register(
         name="second_id", address=7, size=1, access=Access.READ_WRITE, storage=Storage.EEPROM, high=253,
         effect=Effect.IDENTITY, protected=True, source=_BOTH,
         note="obeyed for writes only; in other maps this is the return delay, and a 0 meant for that gives a servo the "
@@ -103,7 +103,7 @@ _COMMANDS = (
         "goal_position", source=f"{MANUAL}, example 4; {_ALL}",
         note="whether it turns torque on by itself has not been measured",
     ),
-    Entry(
+    Register(
         name="goal_torque", address=44, size=2, access=Access.READ_WRITE, storage=Storage.RAM,
         coding=Coding.SIGN_MAGNITUDE, sign_bit=15, low=-2047, high=2047, unit="A", scale=AMPERE,
         effect=Effect.MOTION, source=_ALL,
@@ -122,7 +122,7 @@ _COMMANDS = (
     _live("live_p", 50, "position_p"),
     _live("live_d", 51, "position_d"),
     _live("live_i", 52, "position_i"),
-    Entry(
+    Register(
         name="control_loop", address=53, size=1, access=Access.READ_WRITE, storage=Storage.RAM, high=1,
         choices={0: "dual loop", 1: "position only"}, effect=Effect.MOTION, source=_BOTH,
         note="Km; gone in later firmware",
@@ -137,7 +137,7 @@ _FEEDBACK = (
     _row("moving", high=3, bits={0: "moving", 1: "goal not reached"}, note="bit 1 is of HLS only"),
     _row("goal_position_echo", source=HLS_TABLE),
     _row("present_current", source=_ALL, note="of the motor's phase; that of the supply is about this times the duty"),
-    Entry(
+    Register(
         name="current_zero_offset", address=73, size=2, access=Access.READ, storage=Storage.RAM,
         coding=Coding.SIGN_MAGNITUDE, sign_bit=15, low=-32767, high=32767, source=_BOTH,
         note="FD calls it Eofs; no unit is published",

@@ -14,8 +14,8 @@ from __future__ import annotations
 from math import radians
 from typing import Final
 
-from motorbus.core.entry import Access, Coding, Entry, Storage, changed
-from motorbus.core.operation import Effect
+from motorbus.core.register import Access, Coding, Register, Storage, changed
+from motorbus.core.request import Effect
 from motorbus.families.feetech.table.borrowed import borrowed
 from motorbus.families.feetech.table.codes import ALARM_BITS_OF, rates
 from motorbus.families.feetech.table.phase import PHASE_BITS
@@ -55,16 +55,16 @@ _ROWS = borrowed(
 )
 
 
-def _row(name: str, **differences: object) -> Entry:
+def _row(name: str, **differences: object) -> Register:
     return changed(_ROWS[name], **differences)
 
 
-def _position(name: str, **differences: object) -> Entry:
+def _position(name: str, **differences: object) -> Register:
     return _row(name, scale=SCS_COUNT, **{"note": _ARC, **differences})
 
 
-def _factory(name: str, address: int, note: str = "") -> Entry:
-    return Entry(
+def _factory(name: str, address: int, note: str = "") -> Register:
+    return Register(
         name=name, address=address, size=1, access=Access.READ, storage=Storage.FACTORY, order="big", high=255,
         protected=True, source=LEROBOT, note=note,
     )  # fmt: skip
@@ -182,7 +182,7 @@ _SECOND = borrowed(
 _UNPUBLISHED = "FD's map of SCS2 has no such register. Chosen: as in the SCS map"
 
 
-def _scs2(name: str, **differences: object) -> Entry:
+def _scs2(name: str, **differences: object) -> Register:
     """The row as SCS has it, with what is said of it there."""
     return changed(_SECOND[name], **{"note": SCS[name].note, "conflict": SCS[name].conflict, **differences})
 

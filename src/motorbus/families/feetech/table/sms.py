@@ -14,8 +14,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from motorbus.core.entry import Entry, changed
-from motorbus.core.operation import Effect
+from motorbus.core.register import Register, changed
+from motorbus.core.request import Effect
 from motorbus.families.feetech.table.borrowed import borrowed
 from motorbus.families.feetech.table.codes import rates
 from motorbus.families.feetech.table.phase import PHASE_BITS
@@ -36,7 +36,7 @@ _ROWS = borrowed(STS, source=FD, defaults={"firmware_major": 2, "model_major": 8
 _LIKE_STS = "laid out as in the STS map; nobody has published this for SMS servos"
 
 
-def _smbl(name: str, **differences: object) -> Entry:
+def _smbl(name: str, **differences: object) -> Register:
     return changed(_ROWS[name], **differences)
 
 
@@ -152,7 +152,7 @@ _OLD = borrowed(
 )
 
 
-def _smcl(name: str, **differences: object) -> Entry:
+def _smcl(name: str, **differences: object) -> Register:
     """The row as SMBL has it, but for its place and for what is known of it."""
     return changed(_OLD[name], **{"address": _MOVED.get(name, _OLD[name].address), **differences})
 

@@ -21,8 +21,8 @@ from functools import partial
 from math import tau
 from typing import Final
 
-from motorbus.core.entry import Access, Coding, Entry, Storage, Table
-from motorbus.core.operation import Effect
+from motorbus.core.register import Access, Coding, Register, RegisterMap, Storage
+from motorbus.core.request import Effect
 from motorbus.families.feetech.table.codes import ALARM_BITS, rates
 from motorbus.families.feetech.table.phase import PHASE_BITS
 from motorbus.families.feetech.table.sources import (
@@ -50,15 +50,15 @@ _ANGLE = "V3.6: bit 4 is the angle limit; newer pages leave it unused. Chosen: V
 _PERCENTAGE = "FD: 0 to 254; but it is a percentage. Chosen: 0 to 100"
 
 _identity = partial(
-    Entry, size=1, access=Access.READ, storage=Storage.EEPROM, high=255, protected=True, source=_COMMON
+    Register, size=1, access=Access.READ, storage=Storage.EEPROM, high=255, protected=True, source=_COMMON
 )
 _setting = partial(
-    Entry, size=1, access=Access.READ_WRITE, storage=Storage.EEPROM, effect=Effect.PERSISTENT, source=_BOTH
+    Register, size=1, access=Access.READ_WRITE, storage=Storage.EEPROM, effect=Effect.PERSISTENT, source=_BOTH
 )
-_command = partial(Entry, access=Access.READ_WRITE, storage=Storage.RAM)
-_feedback = partial(Entry, access=Access.READ, storage=Storage.RAM, source=_COMMON)
+_command = partial(Register, access=Access.READ_WRITE, storage=Storage.RAM)
+_feedback = partial(Register, access=Access.READ, storage=Storage.RAM, source=_COMMON)
 _factory = partial(
-    Entry, size=1, access=Access.READ, storage=Storage.FACTORY, high=255, protected=True, source=LEROBOT
+    Register, size=1, access=Access.READ, storage=Storage.FACTORY, high=255, protected=True, source=LEROBOT
 )
 
 _IDENTITY_ROWS = (
@@ -281,7 +281,7 @@ _FACTORY_ROWS = (
     _factory(name="acceleration_multiplier", address=86, note="used when acceleration is 0"),
 )
 
-STS: Final = Table(
+STS: Final = RegisterMap(
     "sts",
     (*_IDENTITY_ROWS, *_SETTING_ROWS, *_COMMAND_ROWS, *_FEEDBACK_ROWS, *_FACTORY_ROWS),
     title="STS, HTS and STS..BL servos, firmware 3.0 to 3.39, little-endian",

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.capture import Captures, Run
-from motorbus.core.operation import CanFrame, Data, Noise
+from motorbus.core.request import Data, Noise
 from motorbus.families.feetech.wire.bulk import packets, top
 from motorbus.families.feetech.wire.sides import Sides
 from motorbus.families.feetech.wire.stream import Stream

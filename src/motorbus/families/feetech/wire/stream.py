@@ -18,7 +18,8 @@ from collections.abc import Callable
 from typing import Final, Generic, Literal, TypeAlias, TypeVar
 from zlib import adler32
 
-from motorbus.core.operation import CanFrame, Data, Event, Noise, Reply
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Data, Event, Noise, Reply
 from motorbus.families.feetech.wire.packets import (
     BROADCAST,
     HEADER,

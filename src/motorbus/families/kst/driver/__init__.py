@@ -1,7 +1,7 @@
 """What to say to KST CAN servos to get a thing done: one function for each, none of which sends anything itself.
 
 Functions of one servo take a `Node` (a `Servo` is one); what goes to everyone takes the `Dialect` of the bus. Each
-returns an `Exchange`, or an operation that yields steps; a bus carries it out.
+returns a `Request`, or is a procedure that awaits steps; a bus carries it out.
 """
 
 from __future__ import annotations

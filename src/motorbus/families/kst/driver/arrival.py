@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Sleep
+from motorbus.core.steps import Sleep
 from motorbus.errors import MotionError, Stalled
 from motorbus.families.kst.driver.exchanges import decided, upload_row
 from motorbus.families.kst.driver.node import Node
@@ -38,7 +38,7 @@ async def arrive(node: Node, move: Move) -> None:
     """Poll until the move is over. Raises Stalled, or MotionError when the time is up."""
     await decided(node)
     row = node.table["present_position"]
-    look = upload_row(node, row, lambda raw: float(row.to_value(raw)), tells_position=True)
+    look = upload_row(node, row, lambda raw: float(row.to_value(raw)), reports_position=True)
     here = mark = await look
     begun = progressed = node.at
     allowance = move.allowance(abs(here - move.goal))

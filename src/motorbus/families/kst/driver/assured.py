@@ -8,30 +8,32 @@ from __future__ import annotations
 
 from typing import Final
 
-from motorbus.core.assurance import Assurance, Given, Point
+from motorbus.core.guarantees import Guarantee, Guarantees, Level
 from motorbus.families.kst.driver.motion import Promise
 
-ASSURANCE: Final = Assurance(
-    measured=Point(Given.YES, "it tells it when it is asked"),
-    limits=Point(Given.PARTLY, "the range of its make, as the bus is configured: no servo tells its make"),
-    stop=Point(Given.PARTLY, Promise.HOLD_REQUESTED.value),
-    estops={"hold": Point(Given.PARTLY, Promise.HOLD_REQUESTED.value)},
-    alone=Point(
-        Given.PARTLY,
+ASSURANCE: Final = Guarantees(
+    measured=Guarantee(Level.YES, "it tells it when it is asked"),
+    limits=Guarantee(
+        Level.PARTLY, "the range of its make, as the bus is configured: no servo tells its make"
+    ),
+    stop=Guarantee(Level.PARTLY, Promise.HOLD_REQUESTED.value),
+    estops={"hold": Guarantee(Level.PARTLY, Promise.HOLD_REQUESTED.value)},
+    alone=Guarantee(
+        Level.PARTLY,
         "led, it goes on to the last small goal, one cycle ahead of its course, makes up what it lags behind, and "
         "holds; moved by itself, it goes on to its goal",
     ),
-    ends=Point(Given.YES, "it knows nothing but positions to go to"),
-    torque=Point(Given.NO, "none: it holds with all its force as long as it has its supply"),
-    restart=Point(
-        Given.PARTLY,
+    ends=Guarantee(Level.YES, "it knows nothing but positions to go to"),
+    torque=Guarantee(Level.NO, "none: it holds with all its force as long as it has its supply"),
+    restart=Guarantee(
+        Level.PARTLY,
         "where it says so, by the boot notice of CANopen, it is a fault; no sheet promises that it does, and a frame "
         "that is lost is not seen",
     ),
-    strain=Point(
-        Given.PARTLY,
+    strain=Guarantee(
+        Level.PARTLY,
         "current and temperature, where its make tells them; off its goal for too long counts as stalled in any case",
     ),
-    watchdog=Point(Given.NO, "none: it goes on to the last position it was told, and holds"),
+    watchdog=Guarantee(Level.NO, "none: it goes on to the last position it was told, and holds"),
     led=True,
 )

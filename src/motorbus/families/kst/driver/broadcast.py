@@ -10,20 +10,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 
-from motorbus.core.entry import Entry, Value
-from motorbus.core.family import Readdressed
-from motorbus.core.operation import (
-    ANY,
-    EVERY_LANE,
-    Effect,
-    Emit,
-    Exchange,
-    Exclusive,
-    Goal,
-    Priority,
-    Response,
-    TimeoutClass,
-)
+from motorbus.core.family import IdChanged
+from motorbus.core.register import Register, Value
+from motorbus.core.request import ANY, EVERY_LANE, Effect, Priority, Request, Response, TimeoutClass
+from motorbus.core.setpoint import Setpoint
+from motorbus.core.steps import Emit, Exclusive
 from motorbus.errors import RequestError
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.dialect import PLAIN, Dialect
@@ -46,17 +37,17 @@ async def broadcast_read(name: str, dialect: Dialect = PLAIN) -> dict[int, Value
     return await Exclusive(_read(row, dialect))
 
 
-async def _read(row: Entry, dialect: Dialect) -> dict[int, Value]:
+async def _read(row: Register, dialect: Dialect) -> dict[int, Value]:
     """With the bus alone: what a node says to everyone's question looks just like what it says to its own."""
     found: dict[int, Value] = {}
     for extended in sorted(dialect.formats):
         frame = wire.encode_upload(wire.EVERYONE, row.address, row.subindex or 0, extended=extended)
-        answer = await Exchange[Response](frame, ANY, lane=EVERY_LANE)
+        answer = await Request[Response](frame, ANY, lane=EVERY_LANE)
         found |= _values(row, answer, dialect)
     return found
 
 
-def _values(row: Entry, answer: Response, dialect: Dialect) -> dict[int, Value]:
+def _values(row: Register, answer: Response, dialect: Dialect) -> dict[int, Value]:
     told: dict[int, set[bytes]] = {}
     for reply in answer.replies:
         one = wire.decode_reply(reply.data)
@@ -66,7 +57,7 @@ def _values(row: Entry, answer: Response, dialect: Dialect) -> dict[int, Value]:
     return {node: row.to_value(row.decode(data.pop())) for node, data in told.items() if len(data) == 1}
 
 
-def _about(row: Entry, reply: wire.SdoReply) -> bool:
+def _about(row: Register, reply: wire.SdoReply) -> bool:
     return (reply.index, reply.subindex) == (row.address, row.subindex or 0)
 
 
@@ -87,16 +78,16 @@ async def broadcast_position(to: float, nodes: Sequence[int], dialect: Dialect =
     row = dialect.profile.table["goal_position"]
     raw = counts(Node(there[0], dialect), to)
     value, low, high = (float(row.to_value(number)) for number in (raw, row.low, row.high))
-    goals = tuple(Goal(node, "position", value, low, high) for node in there)
+    goals = tuple(Setpoint(node, "position", value, low, high) for node in there)
     return await Exclusive(_moved(dialect, row, raw, goals))
 
 
-async def _moved(dialect: Dialect, row: Entry, raw: int, goals: tuple[Goal, ...]) -> tuple[int, ...]:
+async def _moved(dialect: Dialect, row: Register, raw: int, goals: tuple[Setpoint, ...]) -> tuple[int, ...]:
     if dialect.must_start:
         for extended in sorted(dialect.formats):
             frame = wire.encode_start(dialect.nmt, wire.EVERYONE, True, extended=extended)
-            await Exchange[Response](
-                frame, (), lane=EVERY_LANE, rank=Priority.CONTROL, effect=Effect.MOTION, goals=goals
+            await Request[Response](
+                frame, (), lane=EVERY_LANE, priority=Priority.CONTROL, effect=Effect.MOTION, setpoints=goals
             )
             await Emit(Started(wire.EVERYONE, frame))
     return await _written(dialect, row, raw, goals)
@@ -129,15 +120,15 @@ async def broadcast_node_id(new: int, dialect: Dialect = PLAIN, *, force: bool =
 
 
 async def _readdressed(dialect: Dialect, new: int) -> tuple[int, ...]:
-    await Emit(Readdressed(None, new))
+    await Emit(IdChanged(None, new))
     return await _written(dialect, dialect.profile.table["node_id"], new)
 
 
 async def _written(
     dialect: Dialect,
-    row: Entry,
+    row: Register,
     raw: int,
-    goals: tuple[Goal, ...] = (),
+    goals: tuple[Setpoint, ...] = (),
     *,
     timeout: TimeoutClass = TimeoutClass.REPLY,
 ) -> tuple[int, ...]:
@@ -152,8 +143,13 @@ async def _written(
 
 
 def _write(
-    dialect: Dialect, row: Entry, data: bytes, goals: tuple[Goal, ...], timeout: TimeoutClass, extended: bool
-) -> Exchange[Response]:
+    dialect: Dialect,
+    row: Register,
+    data: bytes,
+    goals: tuple[Setpoint, ...],
+    timeout: TimeoutClass,
+    extended: bool,
+) -> Request[Response]:
     frame = wire.encode_download(
         wire.EVERYONE,
         row.address,
@@ -162,5 +158,13 @@ def _write(
         sized=dialect.sized == "yes",
         extended=extended,
     )
-    rank = Priority.CONTROL if row.effect is Effect.MOTION else Priority.CONFIGURATION
-    return Exchange(frame, ANY, lane=EVERY_LANE, rank=rank, effect=row.effect, goals=goals, timeout=timeout)
+    priority = Priority.CONTROL if row.effect is Effect.MOTION else Priority.CONFIGURATION
+    return Request(
+        frame,
+        ANY,
+        lane=EVERY_LANE,
+        priority=priority,
+        effect=row.effect,
+        setpoints=goals,
+        reply_within=timeout,
+    )

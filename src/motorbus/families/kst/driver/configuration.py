@@ -6,8 +6,9 @@ back, saved and read back again (`keeping.py`). Source of each object: its row i
 
 from __future__ import annotations
 
-from motorbus.core.entry import Entry
-from motorbus.core.operation import Exclusive, Priority
+from motorbus.core.register import Register
+from motorbus.core.request import Priority
+from motorbus.core.steps import Exclusive
 from motorbus.errors import RequestError
 from motorbus.families.kst.driver.exchanges import decided, order, upload_row
 from motorbus.families.kst.driver.feedback import position_exchange
@@ -57,13 +58,13 @@ async def set_mid_point(node: Node) -> float:
     return await Exclusive(_mid_point(node, row))
 
 
-async def _mid_point(node: Node, row: Entry) -> float:
+async def _mid_point(node: Node, row: Register) -> float:
     present = node.table["present_position"]
-    if row.name not in node.unsaved and not await upload_row(node, present, int, tells_position=True):
+    if row.name not in node.unsaved and not await upload_row(node, present, int, reports_position=True):
         return 0.0
     node.limits = None
     node.unsaved.add(row.name)
-    await order(node, row, node.profile.mid_point_value, rank=Priority.CONFIGURATION)
+    await order(node, row, node.profile.mid_point_value, priority=Priority.CONFIGURATION)
     await save(node)
     await settled(node)
     node.unsaved.discard(row.name)
@@ -118,17 +119,17 @@ async def set_reversed(node: Node, on: bool) -> None:
     await Exclusive(_turned(node, row, on))
 
 
-async def _turned(node: Node, row: Entry, on: bool) -> None:
+async def _turned(node: Node, row: Register, on: bool) -> None:
     raw = await upload_row(node, row, int)
     bit = 1 << REVERSED
     await keep(node, [(row, raw | bit if on else raw & ~bit)])
 
 
-def _limits(node: Node) -> tuple[Entry, Entry]:
+def _limits(node: Node) -> tuple[Register, Register]:
     return _row(node, "negative_limit", "travel limits"), _row(node, "positive_limit", "travel limits")
 
 
-def _row(node: Node, name: str, what: str) -> Entry:
+def _row(node: Node, name: str, what: str) -> Register:
     if name not in node.table:
         raise lacking(node, what, name)
     return node.table[name]

@@ -13,7 +13,8 @@ from math import inf
 from typing import Final
 
 from motorbus.core import units
-from motorbus.core.operation import CanFrame, Data, Event, Notification, Reply
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Data, Event, Notification, Reply
 from motorbus.errors import RequestError
 from motorbus.families.kst import wire
 from motorbus.families.kst.table import PROFILES, Profile

@@ -10,20 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Final, TypeVar
 
-from motorbus.core.entry import Entry
-from motorbus.core.operation import (
-    ANY,
-    CanFrame,
-    Effect,
-    Exchange,
-    Exclusive,
-    Goal,
-    Priority,
-    Refusal,
-    Response,
-    Runnable,
-    TimeoutClass,
-)
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.register import Register
+from motorbus.core.request import ANY, Effect, Precondition, Priority, Request, Response, TimeoutClass
+from motorbus.core.setpoint import Setpoint
+from motorbus.core.steps import Exclusive, Runnable
 from motorbus.errors import DeviceError, NoReply, UnexpectedReply
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.node import Node
@@ -60,16 +51,16 @@ def upload(
     subindex: int,
     take: Callable[[SdoReply], T],
     *,
-    rank: Priority = Priority.POLL,
+    priority: Priority = Priority.POLL,
     timeout: TimeoutClass = TimeoutClass.REPLY,
-    tells_position: bool | Callable[[Response], Mapping[int, float]] = False,
-) -> Exchange[T]:
+    reports_position: bool | Callable[[Response], Mapping[int, float]] = False,
+) -> Request[T]:
     """Read an object; the value is what `take` makes of the reply. A refusal raises DeviceError."""
 
     def read(answer: Response) -> T:
         return take(told(node, answer, index, subindex))
 
-    return _upload(node, index, subindex, read, rank, timeout, tells_position)
+    return _upload(node, index, subindex, read, priority, timeout, reports_position)
 
 
 def _upload(
@@ -77,25 +68,25 @@ def _upload(
     index: int,
     subindex: int,
     read: Callable[[Response], T],
-    rank: Priority = Priority.POLL,
+    priority: Priority = Priority.POLL,
     timeout: TimeoutClass = TimeoutClass.REPLY,
-    tells_position: bool | Callable[[Response], Mapping[int, float]] = False,
-) -> Exchange[T]:
-    return Exchange(
+    reports_position: bool | Callable[[Response], Mapping[int, float]] = False,
+) -> Request[T]:
+    return Request(
         wire.encode_upload(node.node, index, subindex, extended=node.dialect.extended(node.node)),
         (wire.upload_due(node.node, index, subindex),),
         read,
         lane=node.node,
-        rank=rank,
-        timeout=timeout,
+        priority=priority,
+        reply_within=timeout,
         repeatable=True,
-        tells_position=tells_position,
+        reports_position=reports_position,
     )
 
 
 def upload_row(
-    node: Node, row: Entry, take: Callable[[int], T], *, tells_position: bool = False
-) -> Exchange[T]:
+    node: Node, row: Register, take: Callable[[int], T], *, reports_position: bool = False
+) -> Request[T]:
     """Read a row of the table; the value is what `take` makes of its raw value.
 
     A reply that states the length of the row is read as it is; every other one is taken apart, which gives the same.
@@ -116,10 +107,10 @@ def upload_row(
             return {}
         return {node.node: float(row.to_value(row.decode(reply.data[: row.size])))}
 
-    return _upload(node, index, subindex, read, tells_position=tells_position and places)
+    return _upload(node, index, subindex, read, reports_position=reports_position and places)
 
 
-def sized(node: Node, row: Entry, reply: SdoReply) -> bytes:
+def sized(node: Node, row: Register, reply: SdoReply) -> bytes:
     """The bytes of this row in a reply. Raises OtherSize when it has fewer, announces segments, or says more.
 
     Bytes beyond the row say nothing where the reply does not state its length, and where they fill up with zeros or
@@ -142,14 +133,14 @@ def sized(node: Node, row: Entry, reply: SdoReply) -> bytes:
 
 def download(
     node: Node,
-    row: Entry,
+    row: Register,
     data: bytes,
     *,
     states_length: bool,
-    goals: tuple[Goal, ...] = (),
-    rank: Priority = Priority.CONTROL,
-    refusal: Refusal | None = None,
-) -> Exchange[None]:
+    goals: tuple[Setpoint, ...] = (),
+    priority: Priority = Priority.CONTROL,
+    refusal: Precondition | None = None,
+) -> Request[None]:
     """Write a row once, in one of the two forms; the acknowledgement proves receipt, not more.
 
     A mid point is not written again in silence: the servo may stand elsewhere by then.
@@ -159,7 +150,7 @@ def download(
     def read(answer: Response) -> None:
         told(node, answer, index, subindex)
 
-    return Exchange(
+    return Request(
         wire.encode_download(
             node.node,
             index,
@@ -171,27 +162,32 @@ def download(
         (wire.download_due(node.node, index, subindex),),
         read,
         lane=node.node,
-        rank=rank,
+        priority=priority,
         effect=Effect.TORQUE if index in UNSETTLING else row.effect,
-        goals=goals,
+        setpoints=goals,
         repeatable=index != MID_POINT,
-        refusal=refusal,
+        precondition=refusal,
     )
 
 
 async def order(
-    node: Node, row: Entry, raw: int, goals: tuple[Goal, ...] = (), *, rank: Priority = Priority.CONTROL
+    node: Node,
+    row: Register,
+    raw: int,
+    goals: tuple[Setpoint, ...] = (),
+    *,
+    priority: Priority = Priority.CONTROL,
 ) -> None:
     """Write a row. Raises DeviceError when the node refuses it, OutcomeUnknown when it never acknowledges."""
     await decided(node)
     data = row.encode(raw)
     states_length = node.dialect.states_length(node.node)
     try:
-        await download(node, row, data, states_length=states_length, goals=goals, rank=rank)
+        await download(node, row, data, states_length=states_length, goals=goals, priority=priority)
     except DeviceError as refusal:
         if states_length or node.dialect.sized != "auto" or meant(refusal.code) not in UNSIZED_REFUSED:
             raise
-        await download(node, row, data, states_length=True, goals=goals, rank=rank)
+        await download(node, row, data, states_length=True, goals=goals, priority=priority)
         node.dialect.learn_sized(node.node)
 
 
@@ -264,7 +260,7 @@ async def decided(node: Node) -> None:
         return
     for extended in (False, True) * 2:
         frame = wire.encode_upload(node.node, NODE_ID, extended=extended)
-        if await listening(node, frame, _somebody, timeout=TimeoutClass.REPLY, rank=Priority.POLL):
+        if await listening(node, frame, _somebody, timeout=TimeoutClass.REPLY, priority=Priority.POLL):
             node.dialect.learn_format(node.node, extended)
             return
     raise NoReply(
@@ -280,13 +276,13 @@ def _somebody(replies: list[SdoReply], at: float) -> bool:
     return any(reply.index in (NODE_ID, 0) for reply in replies)
 
 
-def answers(node: Node) -> Exchange[None]:
+def answers(node: Node) -> Request[None]:
     """Ask for the node id; a refusal is an answer, silence raises NoReply."""
 
     def read(answer: Response) -> None:
         node.at = answer.at
 
-    return Exchange(
+    return Request(
         wire.encode_upload(node.node, NODE_ID, extended=node.dialect.extended(node.node)),
         (wire.upload_due(node.node, NODE_ID),),
         read,
@@ -298,7 +294,7 @@ def answers(node: Node) -> Exchange[None]:
 # --- values longer than four bytes --------------------------------------------------------------------------
 
 
-async def whole(node: Node, row: Entry) -> bytes:
+async def whole(node: Node, row: Register) -> bytes:
     """All bytes of a value: four at most in the one reply that KST servos give, else segment by segment.
 
     A transfer in segments is carried out with the bus to itself, for a second request would end it. Raises
@@ -311,11 +307,11 @@ async def whole(node: Node, row: Entry) -> bytes:
     return await Exclusive(_segments(node, row))
 
 
-def _begin(node: Node, row: Entry) -> Exchange[SdoReply]:
+def _begin(node: Node, row: Register) -> Request[SdoReply]:
     return upload(node, row.address, row.subindex or 0, lambda reply: reply)
 
 
-async def _segments(node: Node, row: Entry) -> bytes:
+async def _segments(node: Node, row: Register) -> bytes:
     first = await _begin(node, row)  # once more, for something else may have come in between
     if first.kind == "upload":
         return first.data
@@ -341,11 +337,11 @@ async def _segments(node: Node, row: Entry) -> bytes:
     return data
 
 
-def _segment(node: Node, toggle: int) -> Exchange[SdoReply]:
+def _segment(node: Node, toggle: int) -> Request[SdoReply]:
     def read(answer: Response) -> SdoReply:
         return told(node, answer, 0, 0)
 
-    return Exchange(
+    return Request(
         wire.encode_segment(node.node, toggle, extended=node.dialect.extended(node.node)),
         (wire.segment_due(node.node, toggle),),
         read,
@@ -353,11 +349,11 @@ def _segment(node: Node, toggle: int) -> Exchange[SdoReply]:
     )
 
 
-def _give_up(node: Node, row: Entry) -> Exchange[None]:
+def _give_up(node: Node, row: Register) -> Request[None]:
     frame = wire.encode_abort(
         node.node, row.address, row.subindex or 0, GIVE_UP, extended=node.dialect.extended(node.node)
     )
-    return Exchange(frame, (), lambda _: None, lane=node.node)
+    return Request(frame, (), lambda _: None, lane=node.node)
 
 
 # --- replies that are counted, or may be missing ------------------------------------------------------------
@@ -370,12 +366,12 @@ def listening(
     *,
     timeout: TimeoutClass,
     effect: Effect = Effect.NONE,
-    rank: Priority = Priority.CONFIGURATION,
-) -> Exchange[T]:
+    priority: Priority = Priority.CONFIGURATION,
+) -> Request[T]:
     """Send a frame and take whatever comes from this node until the time is up; silence is an answer too."""
 
     def read(answer: Response) -> T:
         replies = [wire.decode_reply(reply.data) for reply in answer.replies]
         return take([reply for reply in replies if reply is not None], answer.at)
 
-    return Exchange(frame, ANY, read, lane=node.node, rank=rank, effect=effect, timeout=timeout)
+    return Request(frame, ANY, read, lane=node.node, priority=priority, effect=effect, reply_within=timeout)

@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, NamedTuple, TypeVar
 
-from motorbus.core.entry import Entry
 from motorbus.core.family import State
-from motorbus.core.operation import Exchange, Runnable
+from motorbus.core.register import Register
+from motorbus.core.request import Request
+from motorbus.core.steps import Runnable
 from motorbus.families.kst import table
 from motorbus.families.kst.driver.exchanges import decided, ready, upload, upload_row
 from motorbus.families.kst.driver.node import Node
@@ -46,17 +47,17 @@ def position(node: Node) -> Runnable[float]:
     return ready(node, position_exchange)
 
 
-def position_exchange(node: Node) -> Exchange[float]:
+def position_exchange(node: Node) -> Request[float]:
     """As `position`, of a servo whose id format is known: one exchange that can be kept and run again."""
     return kept(node, "position", _position)
 
 
-def _position(node: Node) -> Exchange[float]:
+def _position(node: Node) -> Request[float]:
     row = node.table["present_position"]
-    return upload_row(node, row, lambda raw: float(row.to_value(raw)), tells_position=True)
+    return upload_row(node, row, lambda raw: float(row.to_value(raw)), reports_position=True)
 
 
-def kept(node: Node, name: str, make: Callable[[Node], Exchange[T]]) -> Exchange[T]:
+def kept(node: Node, name: str, make: Callable[[Node], Request[T]]) -> Request[T]:
     """The exchange that brings this quantity: made once, and anew when the node is asked in another id format."""
     extended = node.dialect.extended(node.node)
     found = node.kept.get(name)
@@ -70,12 +71,12 @@ def status(node: Node) -> Runnable[RawStatus | Status]:
     return ready(node, raw_status if node.profile.status_row is None else _felt)
 
 
-def raw_status(node: Node) -> Exchange[RawStatus]:
+def raw_status(node: Node) -> Request[RawStatus]:
     """The manual's command 7, whatever the profile: the bytes may be a position."""
     return kept(node, "raw_status", _raw_status)
 
 
-def _raw_status(node: Node) -> Exchange[RawStatus]:
+def _raw_status(node: Node) -> Request[RawStatus]:
     row = node.table["present_position"]
 
     def take(reply: SdoReply) -> RawStatus:
@@ -110,26 +111,26 @@ async def telemetry(node: Node) -> State:
     return State(at=at, position=here, current=felt.current, temperature=felt.temperature, alarm=node.alarm)
 
 
-def _felt(node: Node) -> Exchange[Status]:
+def _felt(node: Node) -> Request[Status]:
     return kept(node, "status", _status)
 
 
-def _status(node: Node) -> Exchange[Status]:
+def _status(node: Node) -> Request[Status]:
     def take(raw: int) -> Status:
         return Status(table.current(node.profile, raw), float(table.temperature(node.profile, raw)))
 
     return upload_row(node, _status_row(node), take)
 
 
-def _current(node: Node) -> Exchange[float]:
+def _current(node: Node) -> Request[float]:
     return upload_row(node, _status_row(node), lambda raw: table.current(node.profile, raw))
 
 
-def _temperature(node: Node) -> Exchange[float]:
+def _temperature(node: Node) -> Request[float]:
     return upload_row(node, _status_row(node), lambda raw: float(table.temperature(node.profile, raw)))
 
 
-def _status_row(node: Node) -> Entry:
+def _status_row(node: Node) -> Register:
     if node.profile.status_row is None:
         raise lacking(node, "current and temperature", "status")
     return node.profile.status_row

@@ -9,7 +9,8 @@ follow.
 from __future__ import annotations
 
 from motorbus.core.family import Health, State
-from motorbus.core.operation import Exchange, Runnable
+from motorbus.core.request import Request
+from motorbus.core.steps import Runnable
 from motorbus.families.kst import table
 from motorbus.families.kst.driver.exchanges import ready, upload_row
 from motorbus.families.kst.driver.node import Node
@@ -25,13 +26,13 @@ def health(node: Node) -> Runnable[Health]:
     return _asked(node)
 
 
-def _asked(node: Node) -> Exchange[Health]:
+def _asked(node: Node) -> Request[Health]:
     row = node.profile.status_row
     return upload_row(
         node,
         node.table["present_position"] if row is None else row,
         lambda raw: _health(node, raw),
-        tells_position=row is None,
+        reports_position=row is None,
     )
 
 

@@ -7,9 +7,10 @@ guides through all of it. Source: KST CAN protocol manual, commands 1, 2, 4 and 
 
 from __future__ import annotations
 
-from motorbus.core.entry import Entry
-from motorbus.core.family import Identity, Readdressed
-from motorbus.core.operation import Emit, Exclusive, Priority, catch
+from motorbus.core.family import IdChanged, Identity
+from motorbus.core.register import Register
+from motorbus.core.request import Priority
+from motorbus.core.steps import Emit, Exclusive, catch
 from motorbus.errors import DeviceError, MotorbusError, NoReply, RequestError, VerificationFailed
 from motorbus.families.kst import table
 from motorbus.families.kst.driver.exchanges import (
@@ -108,8 +109,8 @@ async def _free(new: Node, old: Node) -> None:
 async def write_node_id(node: Node, new: int) -> None:
     """As `set_node_id`, for who has looked already whether the servo is alone with its id."""
     row = node.table["node_id"]
-    await Emit(Readdressed(node.node, new))
-    await order(node, row, new, rank=Priority.CONFIGURATION)
+    await Emit(IdChanged(node.node, new))
+    await order(node, row, new, priority=Priority.CONFIGURATION)
     found = await _if_told(node, row)
     if found not in (
         None,
@@ -149,7 +150,7 @@ async def set_bit_rate(node: Node, rate: int) -> None:
 
     Raises RequestError for a rate it cannot have (nothing is sent).
     """
-    await order(node, node.table["bit_rate_code"], code_of(rate), rank=Priority.CONFIGURATION)
+    await order(node, node.table["bit_rate_code"], code_of(rate), priority=Priority.CONFIGURATION)
 
 
 def code_of(rate: int) -> int:
@@ -164,7 +165,7 @@ def code_of(rate: int) -> int:
     )
 
 
-async def _if_told(node: Node, row: Entry) -> int | None:
+async def _if_told(node: Node, row: Register) -> int | None:
     """The raw value, or None when the servo refuses to tell."""
     await decided(node)
     found = await catch(upload_row(node, row, int))

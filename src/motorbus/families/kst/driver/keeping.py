@@ -13,8 +13,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from motorbus.core.entry import Entry
-from motorbus.core.operation import Effect, Exchange, Exclusive, Priority, Sleep, TimeoutClass
+from motorbus.core.register import Register
+from motorbus.core.request import Effect, Priority, Request, TimeoutClass
+from motorbus.core.steps import Exclusive, Sleep
 from motorbus.errors import NoReply, VerificationFailed, WireError, unread
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.exchanges import STORE, decided, listening, order, refused, upload_row
@@ -37,7 +38,7 @@ async def save(node: Node) -> None:
     await save_exchange(node)
 
 
-def save_exchange(node: Node) -> Exchange[None]:
+def save_exchange(node: Node) -> Request[None]:
     """The save alone; it holds the lane of this node for the listening time and the write to flash."""
     row = node.table["store"]
     data = row.encode(SAVE)
@@ -59,7 +60,7 @@ def save_exchange(node: Node) -> Exchange[None]:
     return listening(node, frame, take, timeout=TimeoutClass.STORE, effect=Effect.PERSISTENT)
 
 
-async def keep(node: Node, orders: Sequence[tuple[Entry, int]]) -> None:
+async def keep(node: Node, orders: Sequence[tuple[Register, int]]) -> None:
     """Write these rows, read back, save, read back again; nobody else is on the bus meanwhile.
 
     They are read first. When all of them hold this already, nothing is written and nothing saved, for flash wears;
@@ -75,7 +76,7 @@ async def keep(node: Node, orders: Sequence[tuple[Entry, int]]) -> None:
         node.limits = None
 
 
-async def _kept(node: Node, orders: Sequence[tuple[Entry, int]]) -> None:
+async def _kept(node: Node, orders: Sequence[tuple[Register, int]]) -> None:
     names = {row.name for row, _ in orders}
     if names.isdisjoint(node.unsaved) and await _alike(node, orders):
         return
@@ -89,7 +90,7 @@ async def _kept(node: Node, orders: Sequence[tuple[Entry, int]]) -> None:
     node.unsaved -= names
 
 
-async def _alike(node: Node, orders: Sequence[tuple[Entry, int]]) -> bool:
+async def _alike(node: Node, orders: Sequence[tuple[Register, int]]) -> bool:
     """Whether all of these rows can be read, and hold this."""
     for row, raw in orders:
         if not row.readable or await upload_row(node, row, int) != raw:
@@ -104,10 +105,10 @@ async def settled(node: Node) -> None:
         await Sleep(rest)
 
 
-async def verified(node: Node, row: Entry, raw: int) -> None:
+async def verified(node: Node, row: Register, raw: int) -> None:
     """Write a row and read it back, three times at most; what cannot be read is written once."""
     for attempt in range(TRIES):
-        await order(node, row, raw, rank=Priority.CONFIGURATION)
+        await order(node, row, raw, priority=Priority.CONFIGURATION)
         if not row.readable:
             return
         try:
@@ -119,7 +120,7 @@ async def verified(node: Node, row: Entry, raw: int) -> None:
             return
 
 
-async def checked(node: Node, orders: Sequence[tuple[Entry, int]]) -> None:
+async def checked(node: Node, orders: Sequence[tuple[Register, int]]) -> None:
     """Read these rows back. Raises VerificationFailed when one differs, OutcomeUnknown when it cannot be read."""
     for row, raw in orders:
         if row.readable:
@@ -131,7 +132,7 @@ async def checked(node: Node, orders: Sequence[tuple[Entry, int]]) -> None:
                 raise _differs(node, row, raw, found)
 
 
-def _differs(node: Node, row: Entry, raw: int, found: int) -> VerificationFailed:
+def _differs(node: Node, row: Register, raw: int, found: int) -> VerificationFailed:
     cause = "the servo does not take this value, or a write failed, which is known of these servos"
     if row.name.endswith("_limit"):
         cause = (

@@ -9,17 +9,9 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from motorbus.core.can_bits import least
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import Stop
-from motorbus.core.operation import (
-    ANY,
-    EVERY_LANE,
-    CanFrame,
-    Effect,
-    Exchange,
-    Priority,
-    Response,
-    TimeoutClass,
-)
+from motorbus.core.request import ANY, EVERY_LANE, Effect, Priority, Request, Response, TimeoutClass
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.dialect import Dialect
 from motorbus.families.kst.driver.exchanges import (
@@ -52,27 +44,27 @@ IN_QUEUE: Final = 5
 FIRMWARE: Final = 0x100A
 
 
-def air_time(exchange: Exchange[Any], rate: int) -> float:
+def air_time(exchange: Request[Any], rate: int) -> float:
     """s on the wire for the request and all replies due, with typical stuffing; a broadcast has up to 127 replies."""
-    request = exchange.request
+    request = exchange.wire
     extended = isinstance(request, CanFrame) and request.extended
     bits = least(len(request.data if isinstance(request, CanFrame) else request), extended)
-    if exchange.replies is ANY:
+    if exchange.expected is ANY:
         several = len(wire.NODES) if exchange.lane == EVERY_LANE else 1
         bits += several * least(wire.LENGTH, extended)
     else:
-        for _, _, length in exchange.replies:
+        for _, _, length in exchange.expected:
             bits += least(length, extended)
     return bits * STUFFING / rate
 
 
-def turnaround(exchange: Exchange[Any], flash_wait: float) -> float:
+def turnaround(exchange: Request[Any], flash_wait: float) -> float:
     """s that servos may think; after a save, the listening time and the write to flash."""
-    if exchange.timeout is TimeoutClass.STORE:
+    if exchange.reply_within is TimeoutClass.STORE:
         return LISTEN + flash_wait
     if exchange.lane == EVERY_LANE:
         return EVERYONE
-    return SCAN if exchange.timeout is TimeoutClass.SCAN else REPLY
+    return SCAN if exchange.reply_within is TimeoutClass.SCAN else REPLY
 
 
 def quiet_time(rate: int) -> float:
@@ -80,7 +72,7 @@ def quiet_time(rate: int) -> float:
     return QUIET + IN_QUEUE * least(wire.LENGTH, True) * STUFFING / rate
 
 
-def probe(node: Node, attempt: int) -> Exchange[bool]:
+def probe(node: Node, attempt: int) -> Request[bool]:
     """Read the node id, the version, or a sub-index of the node id that no servo has, in turn.
 
     True when the answer names exactly that object and, for the id, says a possible one (before a restart it may be
@@ -97,7 +89,7 @@ def probe(node: Node, attempt: int) -> Exchange[bool]:
             return reply.data[0] in wire.NODES
         return reply.kind in ("upload", "upload-start", "abort")
 
-    return Exchange(
+    return Request(
         wire.encode_upload(node.node, index, subindex, extended=node.dialect.extended(node.node)),
         (wire.upload_due(node.node, index, subindex),),
         read,
@@ -111,44 +103,44 @@ def stop(nodes: Mapping[int, Response | None], dialect: Dialect) -> Stop:
 
     A node of which nobody knows the id format is addressed in both.
     """
-    exchanges: list[Exchange[Response]] = []
+    requests: list[Request[Response]] = []
     for node in (Node(number, dialect) for number in sorted(nodes)):
         here = _told(nodes[node.node])
         undecided = dialect.undecided(node.node)
         for extended in (False, True) if undecided else (dialect.extended(node.node),):
             wanted = (_ask(node, extended),) if here is None else _holds(node, here, extended)
-            exchanges += wanted
-    return Stop(tuple(exchanges), Promise.HOLD_REQUESTED.value)
+            requests += wanted
+    return Stop(tuple(requests), Promise.HOLD_REQUESTED.value)
 
 
-def _ask(node: Node, extended: bool) -> Exchange[Response]:
-    return Exchange(
+def _ask(node: Node, extended: bool) -> Request[Response]:
+    return Request(
         wire.encode_upload(node.node, POSITION, extended=extended),
         (wire.upload_due(node.node, POSITION),),
         _unrefused(node, POSITION),
         lane=node.node,
-        rank=Priority.STOP,
+        priority=Priority.STOP,
         repeatable=True,
-        tells_position=True,
+        reports_position=True,
     )
 
 
-def _holds(node: Node, here: bytes, extended: bool) -> tuple[Exchange[Response], ...]:
+def _holds(node: Node, here: bytes, extended: bool) -> tuple[Request[Response], ...]:
     """Hold here. Beyond the range, where that may be refused, the end of the range is ordered first."""
     raw = int.from_bytes(here, "little", signed=True)
     end = max(-node.profile.limit, min(raw, node.profile.limit))
     return tuple(_hold(node, place, extended) for place in dict.fromkeys((end, raw)))
 
 
-def _hold(node: Node, raw: int, extended: bool) -> Exchange[Response]:
+def _hold(node: Node, raw: int, extended: bool) -> Request[Response]:
     states_length = node.dialect.states_length(node.node)
     here = raw.to_bytes(2, "little", signed=True)
-    return Exchange(
+    return Request(
         wire.encode_download(node.node, GOAL, 0, here, sized=states_length, extended=extended),
         (wire.download_due(node.node, GOAL),),
         _unrefused(node, GOAL),
         lane=node.node,
-        rank=Priority.STOP,
+        priority=Priority.STOP,
         effect=Effect.MOTION,
         repeatable=True,
     )

@@ -10,7 +10,8 @@ from __future__ import annotations
 from enum import Enum
 from typing import Final
 
-from motorbus.core.operation import Gather, Notification, SetBitrate, WaitFor
+from motorbus.core.request import Notification
+from motorbus.core.steps import SetBitrate, WaitFor, gather
 from motorbus.families.kst.driver.dialect import Dialect
 
 GLANCE: Final = 0.25
@@ -33,7 +34,7 @@ async def heard(dialect: Dialect, rate: int, seconds: float) -> Heard:
     await SetBitrate(rate, listen_only=True)
     memory = dialect.memory
     before = (memory.frames, memory.errors) if memory else (0, 0)
-    whole, broken = await Gather([WaitFor(_is_frame, seconds), WaitFor(_is_error, seconds)])
+    whole, broken = await gather(WaitFor(_is_frame, seconds), WaitFor(_is_error, seconds))
     after = (memory.frames, memory.errors) if memory else (0, 0)
     if whole is not None or after[0] > before[0]:
         return Heard.TRAFFIC

@@ -12,10 +12,12 @@ from enum import Enum
 from functools import partial
 from typing import Final, NamedTuple
 
-from motorbus.core.entry import Entry, changed
-from motorbus.core.goal import Goal, Stays, torque_on
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.interrupted import Moving, stopped_if_interrupted
-from motorbus.core.operation import CanFrame, Effect, Emit, Exchange, Priority
+from motorbus.core.register import Register, changed
+from motorbus.core.request import Effect, Priority, Request
+from motorbus.core.setpoint import Setpoint, Stays, torque_on
+from motorbus.core.steps import Emit
 from motorbus.errors import DeviceError, LimitExceeded, RequestError
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.arrival import Move, arrive
@@ -74,15 +76,15 @@ async def move(
     await stopped_if_interrupted(_gone(node, goal, order), device)
 
 
-async def _gone(node: Node, goal: Goal, order: Move) -> None:
+async def _gone(node: Node, goal: Setpoint, order: Move) -> None:
     await send_goal(node, goal)
     await arrive(node, order)
 
 
-async def goal_of(node: Node, raw: int) -> Goal:
+async def goal_of(node: Node, raw: int) -> Setpoint:
     """What this raw target orders, with the limits for the gate: those of the servo, else those of the profile."""
     known = await limits(node)
-    return Goal(node.node, "position", float(node.table["goal_position"].to_value(raw)), *known)
+    return Setpoint(node.node, "position", float(node.table["goal_position"].to_value(raw)), *known)
 
 
 async def limits(node: Node) -> tuple[float, float]:
@@ -98,7 +100,7 @@ async def travel(node: Node) -> tuple[float, float]:
     return float(row.to_value(row.low)), float(row.to_value(row.high))
 
 
-async def send_goal(node: Node, goal: Goal) -> None:
+async def send_goal(node: Node, goal: Setpoint) -> None:
     """Order a target, with the start first where the profile has that rule; it is sent each time, for a servo that
     lost its supply has forgotten it, and it costs a short frame."""
     row = node.table["goal_position"]
@@ -107,23 +109,23 @@ async def send_goal(node: Node, goal: Goal) -> None:
     await order(node, row, node.raw(row, goal.value), (goal,))
 
 
-async def started(node: Node, goal: Goal | None = None) -> None:
+async def started(node: Node, goal: Setpoint | None = None) -> None:
     """Start this servo and say so; where that is for a goal, the start is refused if the goal would be."""
-    exchange = start_exchange(node, True, goal)
-    assert isinstance(exchange.request, CanFrame)
-    await exchange
-    await Emit(Started(node.node, exchange.request))
+    request = start_exchange(node, True, goal)
+    assert isinstance(request.wire, CanFrame)
+    await request
+    await Emit(Started(node.node, request.wire))
 
 
-def start_exchange(node: Node, on: bool, goal: Goal | None = None) -> Exchange[None]:
+def start_exchange(node: Node, on: bool, goal: Setpoint | None = None) -> Request[None]:
     """Start or stop, in the form of this bus; nobody answers. Where it lets a servo move, it counts as torque; with the
     `goal` that it is started for, as motion."""
     form = node.dialect.nmt
     frame = wire.encode_start(form, node.node, on, extended=node.dialect.extended(node.node))
     effect = Effect.NONE if form != "standard" else Effect.MOTION if goal else Effect.TORQUE
     goals = () if form != "standard" or not on else (goal or torque_on(node.node),)
-    return Exchange(
-        frame, (), lambda _: None, lane=node.node, rank=Priority.CONTROL, effect=effect, goals=goals
+    return Request(
+        frame, (), lambda _: None, lane=node.node, priority=Priority.CONTROL, effect=effect, setpoints=goals
     )
 
 
@@ -133,7 +135,7 @@ async def stop(node: Node) -> Promise:
     The servo comes back to where it was when it was asked. Its torque stays on: these servos have no switch for it.
     """
     await decided(node)
-    here = await upload_row(node, node.table["present_position"], int, tells_position=True)
+    here = await upload_row(node, node.table["present_position"], int, reports_position=True)
     row = node.table["goal_position"]
     try:
         await _hold(node, row, here)
@@ -144,14 +146,14 @@ async def stop(node: Node) -> Promise:
     return Promise.HOLD_REQUESTED
 
 
-async def _hold(node: Node, row: Entry, raw: int) -> None:
+async def _hold(node: Node, row: Register, raw: int) -> None:
     """Target := this place, also when it lies beyond the range, for there it stands; the goal brings its own limits."""
     value = float(row.to_value(raw))
-    goal = Goal(node.node, "position", value, value, value, Stays.STILL)
+    goal = Setpoint(node.node, "position", value, value, value, Stays.STILL)
     await order(node, beyond(row), raw, (goal,))
 
 
-def beyond(row: Entry) -> Entry:
+def beyond(row: Register) -> Register:
     """The same row with all that its bytes can say for its range."""
     reach = 1 << 8 * row.size - 1
     return changed(row, low=-reach, high=reach - 1)
@@ -169,7 +171,7 @@ async def _limits(node: Node) -> tuple[float, float]:
     return float(goal.to_value(low)), float(goal.to_value(high))
 
 
-async def _if_there(node: Node, row: Entry) -> int:
+async def _if_there(node: Node, row: Register) -> int:
     """Its raw value; where the servo lacks it, the row's own outer bound."""
     try:
         return await upload_row(node, row, int)

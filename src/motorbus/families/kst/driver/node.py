@@ -9,8 +9,8 @@ from collections.abc import Iterable
 from math import inf
 from typing import Any, Final
 
-from motorbus.core.entry import Entry, Table, Value
-from motorbus.core.operation import Exchange
+from motorbus.core.register import Register, RegisterMap, Value
+from motorbus.core.request import Request
 from motorbus.errors import RequestError
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.dialect import PLAIN, Dialect
@@ -33,7 +33,7 @@ class Node:
         self.at = -inf
         self.unsaved: set[str] = set()
         self.last_move: object = None
-        self.kept: Final[dict[str, tuple[bool, Exchange[Any]]]] = {}
+        self.kept: Final[dict[str, tuple[bool, Request[Any]]]] = {}
 
     @property
     def profile(self) -> Profile:
@@ -41,7 +41,7 @@ class Node:
         return self.dialect.profile
 
     @property
-    def table(self) -> Table:
+    def table(self) -> RegisterMap:
         """Its objects, by its profile."""
         return self.dialect.profile.table
 
@@ -50,11 +50,11 @@ class Node:
         """Alarms that it sent within the few seconds before its last answer; it never says that one is over."""
         return self.dialect.alarm(self.node, self.at)
 
-    def value(self, row: Entry, raw: int) -> Value:
+    def value(self, row: Register, raw: int) -> Value:
         """Raw value of an object -> value in the row's unit."""
         return row.to_value(raw)
 
-    def raw(self, row: Entry, value: Value) -> int:
+    def raw(self, row: Register, value: Value) -> int:
         """Value in the row's unit -> raw value; half a count of an angle goes away from zero, as in decimal.
 
         Raises RequestError when it is not a finite number, or an angle outside the row's range.

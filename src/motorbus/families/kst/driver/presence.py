@@ -10,15 +10,8 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import (
-    Exchange,
-    Gather,
-    Notification,
-    Priority,
-    SetBitrate,
-    TimeoutClass,
-    WaitFor,
-)
+from motorbus.core.request import Notification, Priority, Request, TimeoutClass
+from motorbus.core.steps import SetBitrate, WaitFor, gather
 from motorbus.errors import LinkError, LinkLost, NoReply, RequestError, WireError
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.dialect import Dialect
@@ -58,7 +51,7 @@ class Presence(NamedTuple):
         return self.most > 1 or self.torn or (self.errors and self.there)
 
 
-def glance(node: Node, index: int = NODE_ID) -> Exchange[Presence]:
+def glance(node: Node, index: int = NODE_ID) -> Request[Presence]:
     """Ask once; silence is an answer too."""
 
     def take(replies: list[SdoReply], at: float) -> Presence:
@@ -67,12 +60,12 @@ def glance(node: Node, index: int = NODE_ID) -> Exchange[Presence]:
         return Presence(at, len(mine), told[0] if told else None)
 
     frame = wire.encode_upload(node.node, index, extended=node.dialect.extended(node.node))
-    return listening(node, frame, take, timeout=TimeoutClass.REPLY, rank=Priority.POLL)
+    return listening(node, frame, take, timeout=TimeoutClass.REPLY, priority=Priority.POLL)
 
 
 async def survey(node: Node) -> Presence:
     """Ask several times and watch for bus errors meanwhile; nobody else must be addressed at the same time."""
-    asked, error = await Gather[Presence | Notification | None]([_asked(node), WaitFor(_is_error, WATCH)])
+    asked, error = await gather(_asked(node), WaitFor(_is_error, WATCH))
     assert isinstance(asked, Presence)
     return asked._replace(errors=error is not None)
 

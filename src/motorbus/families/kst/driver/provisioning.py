@@ -11,15 +11,8 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import (
-    Emit,
-    Exclusive,
-    Priority,
-    Progress,
-    SetBitrate,
-    Sleep,
-    with_cleanup,
-)
+from motorbus.core.request import Priority
+from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate, Sleep, with_cleanup
 from motorbus.errors import NoReply, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.kst.driver.exchanges import order
 from motorbus.families.kst.driver.identity import code_of, identify, write_node_id
@@ -137,7 +130,7 @@ async def _changed(job: Job) -> Place | None:
         await write_node_id(where.node, job.new.node)
     if where.rate != job.new_rate:
         row = where.node.table["bit_rate_code"]
-        await order(where.node, row, code_of(job.new_rate), rank=Priority.CONFIGURATION)
+        await order(where.node, row, code_of(job.new_rate), priority=Priority.CONFIGURATION)
     seen = await glance(where.node)
     await Emit(Progress(2, STEPS, "saving"))
     await save(where.node)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from motorbus.core.family import Found
-from motorbus.core.operation import Emit, Exclusive, Progress, SetBitrate, with_cleanup
+from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate, with_cleanup
 from motorbus.errors import LinkError, LinkLost, RequestError
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.dialect import PLAIN, Dialect

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from motorbus.core.entry import Entry, Storage, Value
-from motorbus.core.operation import Effect
+from motorbus.core.register import Register, Storage, Value
+from motorbus.core.request import Effect
 from motorbus.errors import DeviceError, RequestError
 from motorbus.families.kst.driver.exchanges import ABSENT, OtherSize, meant, order, ready, upload_row
 from motorbus.families.kst.driver.keeping import keep
@@ -52,16 +52,16 @@ async def read_raw(node: Node, /, *names: str) -> dict[str, int]:
     return found
 
 
-async def raw_of(node: Node, row: Entry) -> int:
+async def raw_of(node: Node, row: Register) -> int:
     """The raw value of one object."""
-    return await ready(node, lambda same: upload_row(same, row, int, tells_position=_tells(row)))
+    return await ready(node, lambda same: upload_row(same, row, int, reports_position=_tells(row)))
 
 
-def _tells(row: Entry) -> bool:
+def _tells(row: Register) -> bool:
     return row.name == "present_position"
 
 
-def _readable(row: Entry) -> Entry:
+def _readable(row: Register) -> Register:
     if row.readable:
         return row
     raise RequestError(f"{row.name} can only be written", advice="nothing was sent")
@@ -84,7 +84,7 @@ async def write(node: Node, /, **values: Value) -> None:
             await order(node, row, raw)
 
 
-def _checked(node: Node, row: Entry, value: Value) -> int:
+def _checked(node: Node, row: Register, value: Value) -> int:
     """The raw value to write. Raises RequestError when this may not be written by name."""
     refusal = ""
     if not row.writable:

@@ -13,21 +13,8 @@ from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
 from motorbus.core.family import Found, Identity
-from motorbus.core.operation import (
-    ANY,
-    EVERY_LANE,
-    Emit,
-    Exchange,
-    Exclusive,
-    Gather,
-    Priority,
-    Progress,
-    Response,
-    SetBitrate,
-    TimeoutClass,
-    catch,
-    with_cleanup,
-)
+from motorbus.core.request import ANY, EVERY_LANE, Priority, Request, Response, TimeoutClass
+from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate, catch, gather, with_cleanup
 from motorbus.errors import LinkError, LinkLost, NoReply, WireError
 from motorbus.families.kst import wire
 from motorbus.families.kst.driver.dialect import PLAIN, WINDOW, Dialect
@@ -138,7 +125,7 @@ async def at_one_rate(
         done = (PASSES * part[0] + number) * len(asked)
         for batch in _batches([node for node in asked if node not in there]):
             looks = [_looked(Node(node, dialect), rate) for node in batch]
-            there += [node for node in await Gather(looks) if node is not None]
+            there += [node for node in await gather(*looks) if node is not None]
             done += len(batch)
             await Emit(Progress(done, total, f"ids up to {batch[-1]} at {rate} bit/s"))
     if dialect.memory and dialect.memory.errors > errors:
@@ -160,7 +147,7 @@ async def _strangers(dialect: Dialect, asked: Sequence[int], rate: int, *, broad
     if broadcast:
         await called(extended)
     for batch in _batches([] if heard_of else asked):
-        await Gather([catch(_in_vain(Node(node, dialect), extended)) for node in batch])
+        await gather(*[catch(_in_vain(Node(node, dialect), extended)) for node in batch])
     found = [Found(node, rate, None) for node in asked if node in heard_of]
     for one in found:
         await Emit(one)
@@ -187,7 +174,7 @@ def _batches(nodes: Sequence[int]) -> Iterator[Sequence[int]]:
 async def _counted(dialect: Dialect, nodes: Sequence[int], rate: int) -> None:
     """Ask each once more, and wait whether a second answer comes; a broadcast has shown that already."""
     for batch in _batches(nodes):
-        looks = await Gather([glance(Node(node, dialect)) for node in batch])
+        looks = await gather(*[glance(Node(node, dialect)) for node in batch])
         for node, look in zip(batch, looks, strict=True):
             if look.several:
                 await Emit(Suspicion(node, rate, TWICE))
@@ -196,8 +183,8 @@ async def _counted(dialect: Dialect, nodes: Sequence[int], rate: int) -> None:
 async def _identified(dialect: Dialect, nodes: Sequence[int], rate: int) -> list[Found]:
     found: list[Found] = []
     for batch in _batches(nodes):
-        told = await Gather([catch(identify(Node(node, dialect))) for node in batch])
-        places = await Gather([catch(position(Node(node, dialect))) for node in batch])
+        told = await gather(*[catch(identify(Node(node, dialect))) for node in batch])
+        places = await gather(*[catch(position(Node(node, dialect))) for node in batch])
         for node, one, place in zip(batch, told, places, strict=True):
             found.append(Found(node, rate, one if isinstance(one, Identity) else None))
             if isinstance(one, Identity) and isinstance(place, NoReply):
@@ -225,14 +212,14 @@ async def _called(dialect: Dialect, asked: Sequence[int], rate: int) -> list[int
     return there
 
 
-def called(extended: bool, rank: Priority = Priority.CONFIGURATION) -> Exchange[Response]:
+def called(extended: bool, priority: Priority = Priority.CONFIGURATION) -> Request[Response]:
     """Read the node id of everyone at once; the replies come one after the other, by arbitration."""
-    return Exchange(
+    return Request(
         wire.encode_upload(wire.EVERYONE, NODE_ID, extended=extended),
         ANY,
         _about_ids,
         lane=EVERY_LANE,
-        rank=rank,
+        priority=priority,
     )
 
 
@@ -277,16 +264,16 @@ async def _looked(node: Node, rate: int) -> int | None:
     return None
 
 
-def _present(node: Node, extended: bool) -> Exchange[SdoReply | None]:
+def _present(node: Node, extended: bool) -> Request[SdoReply | None]:
     def read(answer: Response) -> SdoReply | None:
         return wire.decode_reply(answer.replies[0].data)
 
-    return Exchange(
+    return Request(
         wire.encode_upload(node.node, NODE_ID, extended=extended),
         (wire.upload_due(node.node, NODE_ID),),
         read,
         lane=node.node,
-        rank=Priority.CONFIGURATION,
-        timeout=TimeoutClass.SCAN,
+        priority=Priority.CONFIGURATION,
+        reply_within=TimeoutClass.SCAN,
         repeatable=True,
     )

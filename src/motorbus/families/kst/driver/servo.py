@@ -5,7 +5,7 @@ There is no verb for torque: these servos have no torque switch, they hold whene
 
 from __future__ import annotations
 
-from motorbus.core.verbs import AsyncRunner, Awaiting, Blocking, BlockingRunner, verb
+from motorbus.core.device import AsyncDevice, AsyncRunner, BlockingDevice, BlockingRunner, device_method
 from motorbus.families.kst.driver import (
     configuration,
     feedback,
@@ -26,50 +26,50 @@ class ServoVerbs(Node):
     servos of several makers.
     """
 
-    ping = verb(identity.ping)
-    identify = verb(identity.identify)
-    read = verb(registers.read)
-    read_raw = verb(registers.read_raw)
-    write = verb(registers.write)
-    position = verb(feedback.position)
-    telemetry = verb(feedback.telemetry)
-    status = verb(feedback.status)
-    current = verb(feedback.current)
-    temperature = verb(feedback.temperature)
-    move = verb(motion.move)
-    stop = verb(motion.stop)
-    version = verb(identity.version)
-    node_id = verb(identity.node_id)
-    set_node_id = verb(identity.set_node_id)
-    bit_rate = verb(identity.bit_rate)
-    set_bit_rate = verb(identity.set_bit_rate)
-    save = verb(keeping.save)
-    provision = verb(provisioning.provision)
-    set_id = verb(provisioning.set_id)
-    set_baud = verb(provisioning.set_baud)
-    start_reports = verb(configuration.start_reports)
-    stop_reports = verb(configuration.stop_reports)
-    set_mid_point = verb(configuration.set_mid_point)
-    travel_limits = verb(configuration.travel_limits)
-    set_travel_limits = verb(configuration.set_travel_limits)
-    reversed = verb(configuration.reversed_)
-    set_reversed = verb(configuration.set_reversed)
+    ping = device_method(identity.ping)
+    identify = device_method(identity.identify)
+    read = device_method(registers.read)
+    read_raw = device_method(registers.read_raw)
+    write = device_method(registers.write)
+    position = device_method(feedback.position)
+    telemetry = device_method(feedback.telemetry)
+    status = device_method(feedback.status)
+    current = device_method(feedback.current)
+    temperature = device_method(feedback.temperature)
+    move = device_method(motion.move)
+    stop = device_method(motion.stop)
+    version = device_method(identity.version)
+    node_id = device_method(identity.node_id)
+    set_node_id = device_method(identity.set_node_id)
+    bit_rate = device_method(identity.bit_rate)
+    set_bit_rate = device_method(identity.set_bit_rate)
+    save = device_method(keeping.save)
+    provision = device_method(provisioning.provision)
+    set_id = device_method(provisioning.set_id)
+    set_baud = device_method(provisioning.set_baud)
+    start_reports = device_method(configuration.start_reports)
+    stop_reports = device_method(configuration.stop_reports)
+    set_mid_point = device_method(configuration.set_mid_point)
+    travel_limits = device_method(configuration.travel_limits)
+    set_travel_limits = device_method(configuration.set_travel_limits)
+    reversed = device_method(configuration.reversed_)
+    set_reversed = device_method(configuration.set_reversed)
 
 
-class Servo(ServoVerbs, Blocking):
+class Servo(ServoVerbs, BlockingDevice):
     """One servo on a blocking bus: `Servo(bus, 0x25).position()`."""
 
     def __init__(self, bus: BlockingRunner, node: int, *, profile: str = "") -> None:
         ServoVerbs.__init__(self, node, _dialect(bus, profile))
-        Blocking.__init__(self, bus)
+        BlockingDevice.__init__(self, bus)
 
 
-class AsyncServo(ServoVerbs, Awaiting):
+class AsyncServo(ServoVerbs, AsyncDevice):
     """One servo on an async bus: `await AsyncServo(bus, 0x25).position()`."""
 
     def __init__(self, bus: AsyncRunner, node: int, *, profile: str = "") -> None:
         ServoVerbs.__init__(self, node, _dialect(bus, profile))
-        Awaiting.__init__(self, bus)
+        AsyncDevice.__init__(self, bus)
 
 
 def _dialect(bus: object, profile: str) -> Dialect:

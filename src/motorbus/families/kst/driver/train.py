@@ -12,9 +12,11 @@ from collections.abc import Mapping, Sequence
 from math import inf
 from typing import Any, Final
 
-from motorbus.core.entry import is_number, shown
 from motorbus.core.family import Positions
-from motorbus.core.operation import Exchange, Gather, Goal, Refusal, Stops
+from motorbus.core.register import is_number, shown
+from motorbus.core.request import Precondition, Request, Stops
+from motorbus.core.setpoint import Setpoint
+from motorbus.core.steps import gather
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.kst.driver.exchanges import answers, decided, download
 from motorbus.families.kst.driver.feedback import position_exchange
@@ -33,7 +35,7 @@ async def train(servos: Sequence[Node], *, rate: int) -> Train:
             "an id is named twice" if servos else "no servo is named",
             advice="name each servo once; nothing was sent",
         )
-    found = await Gather([_known(node) for node in servos])
+    found = await gather(*[_known(node) for node in servos])
     return Train(dict(zip(servos, found, strict=True)))
 
 
@@ -54,7 +56,7 @@ class Train:
         self.positions: Final = tuple(_position(node) for node in servos)
         self._leads: Final = {node.node: _Lead(node, known) for node, known in servos.items()}
 
-    def goals(self, to: Mapping[int, float]) -> Sequence[Exchange[None]]:
+    def goals(self, to: Mapping[int, float]) -> Sequence[Request[None]]:
         """A frame with a target (rad) for each of these.
 
         Raises LimitExceeded for what is no finite number or outside the profile, RequestError for a servo that is none
@@ -70,7 +72,7 @@ class Train:
         """
         for id, speed in speeds.items():
             _check_speed(self._lead(id).node, speed)
-        await Gather([_begin(lead.node) for lead in self._leads.values()])
+        await gather(*[_begin(lead.node) for lead in self._leads.values()])
 
     def _lead(self, id: int) -> _Lead:
         try:
@@ -90,9 +92,9 @@ class _Lead:
         self.node: Final = node
         self._limits: Final = known
         self._row: Final = node.table["goal_position"]
-        self._refusal: Final[Refusal] = self._changed
+        self._refusal: Final[Precondition] = self._changed
 
-    def goal(self, to: float) -> Exchange[None]:
+    def goal(self, to: float) -> Request[None]:
         """The frame with this target."""
         node, row = self.node, self._row
         if error := self._changed():
@@ -103,7 +105,7 @@ class _Lead:
             row,
             row.encode(raw),
             states_length=node.dialect.states_length(node.node),
-            goals=(Goal(node.node, "position", float(row.to_value(raw)), *self._limits),),
+            goals=(Setpoint(node.node, "position", float(row.to_value(raw)), *self._limits),),
             refusal=self._refusal,
         )
 
@@ -118,12 +120,12 @@ class _Lead:
         )
 
 
-def _position(node: Node) -> Exchange[Positions]:
+def _position(node: Node) -> Request[Positions]:
     """The position of one, as those of several are told."""
     one = position_exchange(node)
-    read = one.read
+    read = one.decode
     assert read is not None
-    return one.reading(lambda answer: Positions({node.node: read(answer)}, (), answer.at))
+    return one.with_decoder(lambda answer: Positions({node.node: read(answer)}, (), answer.at))
 
 
 async def _begin(node: Node) -> Any:

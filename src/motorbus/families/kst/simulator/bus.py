@@ -14,8 +14,8 @@ from itertools import count
 from typing import Final, NamedTuple
 
 from motorbus.core.can_bits import precedence
-from motorbus.core.frame import Audience
-from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Data
+from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, Audience, CanFrame
+from motorbus.core.request import Data
 from motorbus.errors import RequestError
 from motorbus.families.kst import wire
 from motorbus.families.kst.simulator import sight as seen

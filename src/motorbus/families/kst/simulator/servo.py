@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from math import inf, pi
 from typing import Final
 
-from motorbus.core.operation import CanFrame
+from motorbus.core.can_frame import CanFrame
 from motorbus.errors import RequestError
 from motorbus.families.kst import wire
 from motorbus.families.kst.simulator import objects
@@ -230,7 +230,7 @@ class Servo:
         """Whether it heeds identifiers of this form."""
         return self.switches.id_format in ("asked", "ext" if extended else "std")
 
-    def obey(self, request: wire.Request, at: float) -> None:
+    def obey(self, request: wire.SdoRequest, at: float) -> None:
         """Carry a request out and answer it, one after the other: a servo has one SDO server."""
         if self.busy_until - at > MAILBOX * self.switches.turnaround:
             return  # no controller holds more; a host that floods it loses frames, and the others are served again soon

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterable, Iterator
 from typing import cast
 
-from motorbus.core.entry import Table
+from motorbus.core.register import RegisterMap
 from motorbus.families.kst.simulator import objects
 from motorbus.families.kst.simulator.servo import Servo
 
@@ -19,5 +19,5 @@ def sight(servos: Iterable[Servo], at: float) -> Iterator[tuple[int, tuple[Hasha
 
 def shown(picture: tuple[Hashable, ...], name: str) -> int:
     """The raw value of a row in a picture. Raises RequestError for a row that is not there."""
-    table = cast("Table", picture[0])
+    table = cast("RegisterMap", picture[0])
     return cast("int", picture[1 + list(table).index(table[name].name)])

@@ -15,8 +15,8 @@ from math import pi
 from types import MappingProxyType
 from typing import Final
 
-from motorbus.core.entry import Access, Coding, Entry, Storage, Table, changed
-from motorbus.core.operation import Effect
+from motorbus.core.register import Access, Coding, Register, RegisterMap, Storage, changed
+from motorbus.core.request import Effect
 
 BIT_RATES: Final = MappingProxyType(
     dict(enumerate((20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000)))
@@ -42,11 +42,11 @@ KINGMAX_DRIVER: Final = "public ESP32 driver for the Kingmax BLS4510S"
 XQPOWER_DRIVER: Final = "public PX4 module and tools for XQPOWER servos, after the vendor's can-sd-v022"
 
 _kept = partial(
-    Entry, size=1, access=Access.READ_WRITE, storage=Storage.EEPROM, effect=Effect.PERSISTENT, subindex=0
+    Register, size=1, access=Access.READ_WRITE, storage=Storage.EEPROM, effect=Effect.PERSISTENT, subindex=0
 )
-_angle = partial(Entry, size=2, subindex=0, coding=Coding.TWOS_COMPLEMENT, unit="rad", scale=pi / 1800)
+_angle = partial(Register, size=2, subindex=0, coding=Coding.TWOS_COMPLEMENT, unit="rad", scale=pi / 1800)
 _version = partial(
-    Entry, size=4, subindex=0, access=Access.READ, storage=Storage.FACTORY, high=0xFFFFFFFF, protected=True
+    Register, size=4, subindex=0, access=Access.READ, storage=Storage.FACTORY, high=0xFFFFFFFF, protected=True
 )
 
 _MANUAL_ROWS = (
@@ -91,7 +91,7 @@ _LATER_ROWS = (
         name="software_version", address=0x100B, source=DEMO,
         conflict="the manual: the version is in 0x100A; the demo driver: here. Chosen: both are asked",
     ),
-    Entry(
+    Register(
         name="report_interval", address=0x2200, subindex=0, size=1, access=Access.WRITE, storage=Storage.RAM,
         low=1, high=255, unit="s", scale=0.001, source=DEMO,
         note="what 0 does is not known",
@@ -117,7 +117,7 @@ _LATER_ROWS = (
         source=f"{FLIGHT}; {DEMO}",
         note="the other bits are unknown, so only read-modify-write; a write may fail, or be undone by a restart",
     ),
-    Entry(
+    Register(
         name="status", address=0x6005, subindex=0, size=4, access=Access.READ, storage=Storage.RAM,
         high=0xFFFFFFFF, source=f"{FLIGHT}; {DEMO}",
         conflict="the manual reads a status at 0x6002; four public drivers here. Chosen: here",
@@ -126,7 +126,7 @@ _LATER_ROWS = (
 )  # fmt: skip
 
 
-def _reaching(table: Table, limit: int, scale: float, source: str) -> tuple[Entry, ...]:
+def _reaching(table: RegisterMap, limit: int, scale: float, source: str) -> tuple[Register, ...]:
     """The two position rows with another range and scale, and who says so."""
     rows = (table["present_position"], table["goal_position"])
     return tuple(
@@ -135,7 +135,7 @@ def _reaching(table: Table, limit: int, scale: float, source: str) -> tuple[Entr
     )
 
 
-KST: Final = Table("kst", _MANUAL_ROWS, title="KST CAN servo, as its protocol manual says")
+KST: Final = RegisterMap("kst", _MANUAL_ROWS, title="KST CAN servo, as its protocol manual says")
 KST_EXT: Final = KST.derive(
     "kst-ext",
     *_LATER_ROWS,

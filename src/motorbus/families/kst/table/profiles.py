@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final
 
-from motorbus.core.entry import Entry, Table
+from motorbus.core.register import Register, RegisterMap
 from motorbus.families.kst.table.objects import (
     DEMO,
     FLIGHT,
@@ -41,13 +41,13 @@ class Profile:
     name: str
     title: str
     vendor: str
-    table: Table
+    table: RegisterMap
     counts_per_degree: int
     limit: int
-    status_row: Entry | None
+    status_row: Register | None
     current_scale: float
     nmt: str
-    version_rows: tuple[Entry, ...]
+    version_rows: tuple[Register, ...]
     flash_wait: float
     mid_point_value: int
     mid_point_wait: float
@@ -124,7 +124,7 @@ PROFILES: Final[Mapping[str, Profile]] = MappingProxyType(
     {profile.name: profile for profile in (_KST, _KST_EXT, _KINGMAX, _XQPOWER)}
 )
 """Every profile by its name; the first is the default."""
-TABLES: Final[Mapping[str, Table]] = MappingProxyType(
+TABLES: Final[Mapping[str, RegisterMap]] = MappingProxyType(
     {profile.name: profile.table for profile in PROFILES.values()}
 )
 """Every object dictionary by the name of its profile."""

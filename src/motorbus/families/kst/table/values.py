@@ -9,7 +9,7 @@ from __future__ import annotations
 from decimal import ROUND_HALF_UP, Decimal
 from math import degrees, isfinite
 
-from motorbus.core.entry import Entry
+from motorbus.core.register import Register
 from motorbus.errors import RequestError
 from motorbus.families.kst.table.profiles import Profile
 
@@ -32,7 +32,7 @@ def to_raw(profile: Profile, radians: float, row: str = "goal_position") -> int:
     return raw
 
 
-def _outside(profile: Profile, entry: Entry, counts: float) -> RequestError:
+def _outside(profile: Profile, entry: Register, counts: float) -> RequestError:
     low, high = (f"{bound / profile.counts_per_degree:.6g}°" for bound in (entry.low, entry.high))
     return RequestError(
         f"{entry.name}: {counts / profile.counts_per_degree:.6g}° is out of range {low} to {high}",
@@ -41,7 +41,7 @@ def _outside(profile: Profile, entry: Entry, counts: float) -> RequestError:
     )
 
 
-def text(row: Entry, raw: int) -> str:
+def text(row: Register, raw: int) -> str:
     """What a version row says, from its raw value: see `version`."""
     return version(raw.to_bytes(row.size, "little"))
 

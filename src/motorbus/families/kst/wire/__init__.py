@@ -48,8 +48,8 @@ from motorbus.families.kst.wire.notices import (
 )
 from motorbus.families.kst.wire.receiver import FrameReceiver
 from motorbus.families.kst.wire.sdo import (
-    Request,
     SdoReply,
+    SdoRequest,
     decode_reply,
     decode_request,
     encode_abort_reply,
@@ -77,8 +77,8 @@ __all__ = [
     "FrameReceiver",
     "Key",
     "Multiplexer",
-    "Request",
     "SdoReply",
+    "SdoRequest",
     "Start",
     "abort_text",
     "addressed",

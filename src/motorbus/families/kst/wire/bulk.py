@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Final
 
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.capture import FAULTS, NOISE, Columns
-from motorbus.core.operation import CanFrame
 from motorbus.families.kst.wire.frames import LENGTH
 from motorbus.families.kst.wire.said import said
 

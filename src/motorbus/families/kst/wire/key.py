@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from motorbus.core.operation import Expected
+from motorbus.core.request import Expected
 from motorbus.families.kst.wire.frames import LENGTH, Multiplexer
 
 

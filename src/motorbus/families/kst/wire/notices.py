@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import ERROR_FLAG, REMOTE_FLAG, CanFrame, Notification
+from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
+from motorbus.core.request import Notification
 from motorbus.errors import RequestError
 from motorbus.families.kst.wire.frames import EVERYONE, LENGTH, NODES, REPLY, REQUEST, one
 

@@ -13,7 +13,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from motorbus.core.operation import CanFrame, Data, Event, Noise, Reply
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Data, Event, Noise, Reply
 from motorbus.families.kst.wire.abort import ABORTS
 from motorbus.families.kst.wire.frames import LENGTH, NODES, REPLY, TOGGLE
 from motorbus.families.kst.wire.key import Key

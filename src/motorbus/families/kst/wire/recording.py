@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.capture import NOISE, Captures, PacketFacts, Run
-from motorbus.core.operation import CanFrame, Data, Noise
+from motorbus.core.request import Data, Noise
 from motorbus.families.kst.wire.bulk import frames_in
 from motorbus.families.kst.wire.said import code_of, said
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
+from motorbus.core.can_frame import ERROR_FLAG, CanFrame
 from motorbus.core.capture import ABSENT, NOISE, NOTICE, REPLY, REQUEST
-from motorbus.core.operation import ERROR_FLAG, CanFrame
 from motorbus.families.kst.wire.frames import REPLY as REPLIES
 from motorbus.families.kst.wire.notices import decode_notice, decode_start
 from motorbus.families.kst.wire.sdo import decode_reply, decode_request

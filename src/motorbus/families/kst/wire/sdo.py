@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import CanFrame
+from motorbus.core.can_frame import CanFrame
 from motorbus.errors import RequestError
 from motorbus.families.kst.wire.frames import (
     ABORT,
@@ -35,7 +35,7 @@ _S: Final = 1
 _SEGMENT_BYTES: Final = 7
 
 
-class Request(NamedTuple):
+class SdoRequest(NamedTuple):
     """What a client asked.
 
     `node` is 0 for everyone; `kind` is "upload", "download", "segment", "abort" or "unknown"; `data` are the bytes
@@ -72,7 +72,7 @@ class SdoReply(NamedTuple):
     last: bool = False
 
 
-def decode_request(frame: CanFrame) -> Request | None:
+def decode_request(frame: CanFrame) -> SdoRequest | None:
     """For a server: a request in either id format, or None for every other frame.
 
     None too for a request that has not exactly 8 bytes (CiA 301) and for remote and error frames.
@@ -83,13 +83,13 @@ def decode_request(frame: CanFrame) -> Request | None:
     index, subindex, rest = data[1] | data[2] << 8, data[3], data[4:]
     specifier, kind = data[0], _request_kind(data[0])
     if kind == "segment":
-        return Request(node, kind, 0, 0, b"", False, int(bool(specifier & TOGGLE)), frame.extended)
+        return SdoRequest(node, kind, 0, 0, b"", False, int(bool(specifier & TOGGLE)), frame.extended)
     sized = kind == "download" and bool(specifier & _S)
     if kind == "upload":
         rest = b""
     elif sized:
         rest = rest[: _stated(specifier)]
-    return Request(node, kind, index, subindex, rest, sized, 0, frame.extended)
+    return SdoRequest(node, kind, index, subindex, rest, sized, 0, frame.extended)
 
 
 def _request_kind(specifier: int) -> str:

@@ -1,7 +1,7 @@
 """What to say to a stepper controller to get a thing done: one function for each, none of which sends anything itself.
 
 Here is what looks, what writes, what moves and what stops. Each takes a `Node` (a `Controller` is one) and
-returns an `Exchange`, or an operation that yields steps; a bus carries it out.
+returns a `Request`, or is a procedure that awaits steps; a bus carries it out.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from dataclasses import replace
 from math import inf
 from typing import Any, Final, NamedTuple, TypeVar
 
-from motorbus.core.operation import (
+from motorbus.core.steps import (
     ASKED,
     INTENT,
     OUTCOME,

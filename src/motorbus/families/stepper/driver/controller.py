@@ -7,7 +7,7 @@ to a position, is absent rather than refused.
 
 from __future__ import annotations
 
-from motorbus.core.verbs import AsyncRunner, Awaiting, Blocking, BlockingRunner, verb
+from motorbus.core.device import AsyncDevice, AsyncRunner, BlockingDevice, BlockingRunner, device_method
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver import (
     characterising,
@@ -36,55 +36,55 @@ class ControllerVerbs(Node):
     Making one costs nothing and sends nothing.
     """
 
-    ping = verb(presence.ping)
-    identify = verb(presence.identify)
-    read = verb(reading.read)
-    read_raw = verb(reading.read_raw)
-    read_project = verb(reading.read_project)
-    read_input = verb(reading.read_input)
-    dump = verb(reading.dump)
-    difference = verb(writing.difference)
-    write_project = verb(writing.write_project)
-    write = verb(writing.write)
-    select = verb(selecting.select)
-    save = verb(selecting.save)
-    clear = verb(selecting.clear)
-    backup = verb(copying.backup)
-    restore = verb(copying.restore)
-    start_project = verb(running.start_project)
-    run = verb(running.run)
-    set_output = verb(outputs.set_output)
-    watch_inputs = verb(inputs.watch_inputs)
-    inputs = verb(inputs.inputs)  # last of those, for it takes the module's name
-    stop = verb(stopping.stop)
-    jog = verb(jogging.jog)
-    move_by = verb(jogging.move_by)
-    run_once = verb(jogging.run_once)
-    jog_forward = verb(jogging.jog_forward)
-    jog_reverse = verb(jogging.jog_reverse)
-    home = verb(homing.home)
-    characterise = verb(characterising.characterise)
-    recover = verb(recovery.recover)
+    ping = device_method(presence.ping)
+    identify = device_method(presence.identify)
+    read = device_method(reading.read)
+    read_raw = device_method(reading.read_raw)
+    read_project = device_method(reading.read_project)
+    read_input = device_method(reading.read_input)
+    dump = device_method(reading.dump)
+    difference = device_method(writing.difference)
+    write_project = device_method(writing.write_project)
+    write = device_method(writing.write)
+    select = device_method(selecting.select)
+    save = device_method(selecting.save)
+    clear = device_method(selecting.clear)
+    backup = device_method(copying.backup)
+    restore = device_method(copying.restore)
+    start_project = device_method(running.start_project)
+    run = device_method(running.run)
+    set_output = device_method(outputs.set_output)
+    watch_inputs = device_method(inputs.watch_inputs)
+    inputs = device_method(inputs.inputs)  # last of those, for it takes the module's name
+    stop = device_method(stopping.stop)
+    jog = device_method(jogging.jog)
+    move_by = device_method(jogging.move_by)
+    run_once = device_method(jogging.run_once)
+    jog_forward = device_method(jogging.jog_forward)
+    jog_reverse = device_method(jogging.jog_reverse)
+    home = device_method(homing.home)
+    characterise = device_method(characterising.characterise)
+    recover = device_method(recovery.recover)
 
     # -- commands of the manual, one frame each: what they set goes to the selected project and is not read back
 
-    select_project = verb(commands.select_project)
-    set_microstep_and_angle = verb(commands.set_microstep_and_angle)
-    set_turn_distance = verb(commands.set_turn_distance)
-    set_step_distance = verb(commands.set_step_distance)
-    set_step_direction_start = verb(commands.set_step_direction_start)
-    set_step_accel_speed = verb(commands.set_step_accel_speed)
-    set_step_output = verb(commands.set_step_output)
-    set_step_delay = verb(commands.set_step_delay)
-    set_step_start_input = verb(commands.set_step_start_input)
-    set_step_stop_input = verb(commands.set_step_stop_input)
-    set_segment_loop = verb(commands.set_segment_loop)
-    set_project_loop = verb(commands.set_project_loop)
-    stop_project = verb(commands.stop_project)
-    stop_motor = verb(commands.stop_motor)
-    set_stop_mode = verb(commands.set_stop_mode)
-    set_mode4 = verb(commands.set_mode4)
-    set_power_on_home = verb(commands.set_power_on_home)
+    select_project = device_method(commands.select_project)
+    set_microstep_and_angle = device_method(commands.set_microstep_and_angle)
+    set_turn_distance = device_method(commands.set_turn_distance)
+    set_step_distance = device_method(commands.set_step_distance)
+    set_step_direction_start = device_method(commands.set_step_direction_start)
+    set_step_accel_speed = device_method(commands.set_step_accel_speed)
+    set_step_output = device_method(commands.set_step_output)
+    set_step_delay = device_method(commands.set_step_delay)
+    set_step_start_input = device_method(commands.set_step_start_input)
+    set_step_stop_input = device_method(commands.set_step_stop_input)
+    set_segment_loop = device_method(commands.set_segment_loop)
+    set_project_loop = device_method(commands.set_project_loop)
+    stop_project = device_method(commands.stop_project)
+    stop_motor = device_method(commands.stop_motor)
+    set_stop_mode = device_method(commands.set_stop_mode)
+    set_mode4 = device_method(commands.set_mode4)
+    set_power_on_home = device_method(commands.set_power_on_home)
 
     @property
     def last_commanded(self) -> dict[int, bool | None]:
@@ -92,20 +92,20 @@ class ControllerVerbs(Node):
         return outputs.last_commanded(self)
 
 
-class Controller(ControllerVerbs, Blocking):
+class Controller(ControllerVerbs, BlockingDevice):
     """The controller of a blocking bus: `Controller(bus).read_project(1)`."""
 
     def __init__(self, bus: BlockingRunner, node: int = wire.ONLY) -> None:
         ControllerVerbs.__init__(self, node, *_spoken(bus))
-        Blocking.__init__(self, bus)
+        BlockingDevice.__init__(self, bus)
 
 
-class AsyncController(ControllerVerbs, Awaiting):
+class AsyncController(ControllerVerbs, AsyncDevice):
     """The controller of an async bus: `await AsyncController(bus).read_project(1)`."""
 
     def __init__(self, bus: AsyncRunner, node: int = wire.ONLY) -> None:
         ControllerVerbs.__init__(self, node, *_spoken(bus))
-        Awaiting.__init__(self, bus)
+        AsyncDevice.__init__(self, bus)
 
 
 def _spoken(bus: object) -> tuple[int, Order, Memory | None]:

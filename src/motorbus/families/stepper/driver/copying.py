@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Final
 
-from motorbus.core.operation import Emit, Exclusive, Progress, Sleep
+from motorbus.core.steps import Emit, Exclusive, Progress, Sleep
 from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.costs import Taken, taken

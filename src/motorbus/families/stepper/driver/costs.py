@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import SetBitrate
+from motorbus.core.steps import SetBitrate
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.line import BITS
 from motorbus.families.stepper.driver.node import Node

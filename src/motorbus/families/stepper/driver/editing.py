@@ -15,17 +15,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
-from motorbus.core.entry import Entry, Value
-from motorbus.core.operation import (
-    ASKED,
-    READABLE,
-    Emit,
-    Exchange,
-    JournalEntry,
-    Priority,
-    Progress,
-    Runnable,
-)
+from motorbus.core.register import Register, Value
+from motorbus.core.request import Priority, Request
+from motorbus.core.steps import ASKED, READABLE, Emit, JournalEntry, Progress, Runnable
 from motorbus.errors import RequestError, VerificationFailed
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.commands import nothing
@@ -58,7 +50,7 @@ _MOST: Final = 6
 class Change(NamedTuple):
     """One parameter that differs: its row, and both raw values. str() of it is "step_3_delay: 0.5 s -> 1 s"."""
 
-    row: Entry
+    row: Register
     step: int
     raw_before: int
     raw_after: int
@@ -222,7 +214,7 @@ def differs(node: Node, image: bytes, meant: Project, what: str, advice: str) ->
     )
 
 
-def _orders(node: Node, wanted: Sequence[Edit], *, strict: bool = True) -> list[Exchange[None]]:
+def _orders(node: Node, wanted: Sequence[Edit], *, strict: bool = True) -> list[Request[None]]:
     """The commands; unless `strict`, without those that no controller takes, which then hold what they held before."""
     found = []
     for edit in wanted:
@@ -240,12 +232,12 @@ def _filled(project: Project) -> int:
     return max(min(project.total_steps, STEPS), *rows, 0)
 
 
-def _order(node: Node, edit: Edit) -> Exchange[None]:
+def _order(node: Node, edit: Edit) -> Request[None]:
     values: dict[str, Any] = dict(edit.values)
-    return command(node, edit.command, nothing, rank=Priority.CONFIGURATION, expert=True, **values)
+    return command(node, edit.command, nothing, priority=Priority.CONFIGURATION, expert=True, **values)
 
 
-async def _told(node: Node, project: int, orders: Sequence[Exchange[None]]) -> None:
+async def _told(node: Node, project: int, orders: Sequence[Request[None]]) -> None:
     if node.memory.unsaved is not None and node.memory.unsaved.number != project:
         node.memory.unsaved = None  # those edits are lost with the selection of this one
     number = 0
@@ -281,7 +273,7 @@ def _is_alike(shown: Project, before: Project) -> bool:
     return replace(shown, number=before.number, **flags) == before
 
 
-def _words(row: Entry, raw: int) -> str:
+def _words(row: Register, raw: int) -> str:
     if raw in row.choices:
         return row.choices[raw]
     return f"{row.to_value(raw):.6g} {row.unit}" if row.unit else str(raw)

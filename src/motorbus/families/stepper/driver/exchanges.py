@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-from motorbus.core.operation import Exchange, Expected, Goal, Priority, Refusal, Response, TimeoutClass
+from motorbus.core.request import Expected, Precondition, Priority, Request, Response, TimeoutClass
+from motorbus.core.setpoint import Setpoint
 from motorbus.errors import UnexpectedReply
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.node import Node
@@ -18,15 +19,15 @@ from motorbus.families.stepper.table import ORDERS, check
 T = TypeVar("T")
 
 
-def timed(said: Exchange[object]) -> Exchange[float]:
+def timed(said: Request[object]) -> Request[float]:
     """The same exchange, which gives the moment of its reply (s), once that is the right one."""
 
     def at(answer: Response) -> float:
-        if said.read is not None:
-            said.read(answer)
+        if said.decode is not None:
+            said.decode(answer)
         return answer.at
 
-    return said.reading(at)
+    return said.with_decoder(at)
 
 
 def command(
@@ -34,13 +35,13 @@ def command(
     name: str,
     read: Callable[[bytes], T],
     *,
-    rank: Priority = Priority.POLL,
+    priority: Priority = Priority.POLL,
     timeout: TimeoutClass | None = None,
-    goals: tuple[Goal, ...] = (),
-    refusal: Refusal | None = None,
+    goals: tuple[Setpoint, ...] = (),
+    refusal: Precondition | None = None,
     expert: bool = False,
     **values: int,
-) -> Exchange[T]:
+) -> Request[T]:
     """A command by its name and its numbers; `read` makes a value of the whole reply, once that is the right one.
 
     `goals` is what it orders, for what moves the motor, `refusal` tells why it must not leave after all. `expert` lets
@@ -67,14 +68,14 @@ def command(
             )
         return read(reply)
 
-    return Exchange(
+    return Request(
         request,
         (Expected(node.node, wire.key_of(next(iter(right))), wire.reply_length(order.command)),),
         judged,
-        rank=rank,
+        priority=priority,
         effect=order.effect,
-        goals=goals,
-        timeout=order.timeout if timeout is None else timeout,
+        setpoints=goals,
+        reply_within=order.timeout if timeout is None else timeout,
         repeatable=order.repeatable,
-        refusal=refusal,
+        precondition=refusal,
     )

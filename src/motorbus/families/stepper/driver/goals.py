@@ -11,7 +11,7 @@ from dataclasses import replace
 from math import inf, nan, tau
 from typing import Final
 
-from motorbus.core.operation import Goal
+from motorbus.core.setpoint import Setpoint
 from motorbus.families.stepper import execution
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.execution import USUAL, Behaviour
@@ -23,7 +23,7 @@ _COUNTS: Final = ("total", "extra")
 """What a count of a loop may mean, in all or besides the first: nobody has settled it, so the farthest is judged."""
 
 
-def of_project(node: Node, project: Project, how: Behaviour = USUAL) -> tuple[Goal, ...]:
+def of_project(node: Node, project: Project, how: Behaviour = USUAL) -> tuple[Setpoint, ...]:
     """Starting it: the farthest that it gets in each direction from where it begins, in rad, its greatest speed in
     rad/s, and that as a velocity where it never ends.
 
@@ -38,23 +38,23 @@ def of_project(node: Node, project: Project, how: Behaviour = USUAL) -> tuple[Go
     return (*ways, _speed(node, fastest))
 
 
-def of_move(node: Node, project: Project) -> tuple[Goal, ...]:
+def of_move(node: Node, project: Project) -> tuple[Setpoint, ...]:
     """A single move, which takes distance, direction and speed from step 1."""
     step = project.step(1)
     return (_goal(node, "relative", _angle(project, step.sign * step.distance)), _speed(node, step.speed))
 
 
-def of_jog(node: Node, project: Project, sign: int) -> tuple[Goal, ...]:
+def of_jog(node: Node, project: Project, sign: int) -> tuple[Setpoint, ...]:
     """Jog and homing, which take their speed from step 1 and end when they are stopped."""
     return (_goal(node, "velocity", sign * project.step(1).speed * tau / 60),)
 
 
-def _speed(node: Node, rpm: int) -> Goal:
+def _speed(node: Node, rpm: int) -> Setpoint:
     return _goal(node, "speed", rpm * tau / 60)
 
 
-def _goal(node: Node, quantity: str, value: float) -> Goal:
-    return Goal(node.node, quantity, value, -inf, inf)
+def _goal(node: Node, quantity: str, value: float) -> Setpoint:
+    return Setpoint(node.node, quantity, value, -inf, inf)
 
 
 def _angle(project: Project, units: int) -> float:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from math import floor, inf, tau
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Emit, Progress, Sleep
+from motorbus.core.steps import Emit, Progress, Sleep
 from motorbus.errors import NotHomed
 from motorbus.families.stepper.driver import commands, goals
 from motorbus.families.stepper.driver.borrowing import borrowed

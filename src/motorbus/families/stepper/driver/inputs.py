@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from math import inf
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Emit, Sleep
+from motorbus.core.steps import Emit, Sleep
 from motorbus.errors import FramingError, RequestError
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.reading import READINGS, read_input

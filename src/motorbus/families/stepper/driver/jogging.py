@@ -18,7 +18,7 @@ from fractions import Fraction
 from math import copysign, tau
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Sleep
+from motorbus.core.steps import Sleep
 from motorbus.errors import RequestError
 from motorbus.families.stepper import execution, wire
 from motorbus.families.stepper.driver import commands, goals

@@ -14,7 +14,7 @@ from fractions import Fraction
 from math import tau
 from typing import Final, NamedTuple, TypeVar
 
-from motorbus.core.operation import Procedure, SetBitrate, Sleep, catch
+from motorbus.core.steps import Procedure, SetBitrate, Sleep, catch
 from motorbus.core.timing import Timing, Turned
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.stepper import wire

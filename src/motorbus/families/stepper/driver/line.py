@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from motorbus.core.operation import ANY, Exchange, TimeoutClass
+from motorbus.core.request import ANY, Request, TimeoutClass
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.table import DUMP_ENDS, RATE, REPLY, STORE
 
@@ -14,17 +14,17 @@ BITS: Final = 10
 """For one byte: a start bit, eight of data, a stop bit."""
 
 
-def air_time(exchange: Exchange[Any], rate: int) -> float:
+def air_time(request: Request[Any], rate: int) -> float:
     """s on the wire for the request and the replies due: 17.7 ms for a command, 246.9 ms for a dump at 9600 baud."""
-    due = (wire.DUMP_LENGTH,) if exchange.replies is ANY else [one.length for one in exchange.replies]
-    return (len(exchange.request) + sum(due)) * BITS / rate
+    due = (wire.DUMP_LENGTH,) if request.expected is ANY else [one.length for one in request.expected]
+    return (len(request.wire) + sum(due)) * BITS / rate
 
 
-def turnaround(exchange: Exchange[Any]) -> float:
+def turnaround(request: Request[Any]) -> float:
     """s that the controller may think."""
-    if exchange.timeout is TimeoutClass.STORE:
+    if request.reply_within is TimeoutClass.STORE:
         return STORE
-    due = () if exchange.replies is ANY else exchange.replies
+    due = () if request.expected is ANY else request.expected
     if any(one.length == wire.DUMP_LENGTH for one in due):
         return DUMP_ENDS - wire.DUMP_LENGTH * BITS / RATE
     return REPLY

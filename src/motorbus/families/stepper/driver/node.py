@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import Final
 
 from motorbus.core import units
-from motorbus.core.entry import Entry, Table, Value
-from motorbus.core.operation import Exchange
+from motorbus.core.register import Register, RegisterMap, Value
+from motorbus.core.request import Request
 from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.memory import Memory
@@ -35,7 +35,7 @@ class Node:
         self.motor: Final = checked_motor(motor)
         self.order: Final[Order] = checked_order(order)
         self.memory: Final = memory if memory is not None else Memory()
-        self.kept: Final[dict[int, Exchange[bool]]] = {}
+        self.kept: Final[dict[int, Request[bool]]] = {}
 
     @property
     def alarm(self) -> tuple[str, ...]:
@@ -43,15 +43,15 @@ class Node:
         return ()
 
     @property
-    def table(self) -> Table:
+    def table(self) -> RegisterMap:
         """The parameters of one project."""
         return TABLE
 
-    def value(self, row: Entry, raw: int) -> Value:
+    def value(self, row: Register, raw: int) -> Value:
         """Raw value of a parameter -> value in the row's unit."""
         return row.to_value(raw)
 
-    def raw(self, row: Entry, value: Value) -> int:
+    def raw(self, row: Register, value: Value) -> int:
         """Value in the row's unit -> raw value. Raises RequestError when it is not a finite number."""
         return row.to_raw(value)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import INTENT, OUTCOME, READABLE, Emit, JournalEntry, catch
+from motorbus.core.steps import INTENT, OUTCOME, READABLE, Emit, JournalEntry, catch
 from motorbus.errors import LinkError
 from motorbus.families.stepper.driver.node import Node
 

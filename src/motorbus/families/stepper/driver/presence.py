@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from motorbus.core.family import Identity
-from motorbus.core.operation import Exchange
+from motorbus.core.request import Request
 from motorbus.errors import NoReply
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.node import Node
@@ -41,13 +41,13 @@ def _details(node: Node) -> Mapping[str, object]:
     return {"motor": node.motor, "projects": PROJECTS, "known_by": f"a dump of {wire.DUMP_LENGTH} bytes"}
 
 
-def probe(node: Node, attempt: int) -> Exchange[bool]:
+def probe(node: Node, attempt: int) -> Request[bool]:
     """Read one of the four projects, in turn: all that can be asked without a frame that means something elsewhere."""
     project = attempt % PROJECTS + 1
     asked = dump_once(node, project)
-    return Exchange(
-        asked.request,
-        asked.replies,
+    return Request(
+        asked.wire,
+        asked.expected,
         lambda answer: not wire.dump_fault(answer.replies[0].data, project),
         repeatable=True,
     )

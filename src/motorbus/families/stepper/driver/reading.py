@@ -12,8 +12,9 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Final
 
-from motorbus.core.entry import Entry, Value
-from motorbus.core.operation import Exchange, Sleep, TimeoutClass
+from motorbus.core.register import Register, Value
+from motorbus.core.request import Request, TimeoutClass
+from motorbus.core.steps import Sleep
 from motorbus.errors import FramingError, RequestError, UnexpectedReply
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.exchanges import command
@@ -27,7 +28,7 @@ _ALIKE: Final = 3
 """Of so many readings each byte is the same, once two have differed: more than half of them all."""
 
 
-def dump_once(node: Node, project: int, timeout: TimeoutClass | None = None) -> Exchange[bytes]:
+def dump_once(node: Node, project: int, timeout: TimeoutClass | None = None) -> Request[bytes]:
     """The 226 bytes of a project, 1 to 4, as they come once."""
     return command(node, "read_project", bytes, project=project, timeout=timeout)
 
@@ -121,12 +122,12 @@ async def read(node: Node, /, *names: str, project: int = 1) -> dict[str, Value]
 
 async def read_raw(node: Node, /, *names: str, project: int = 1) -> dict[str, int]:
     """The same as raw values."""
-    rows: list[Entry] = [node.table[name] for name in names or node.table]
+    rows: list[Register] = [node.table[name] for name in names or node.table]
     held = await image(node, project)
     return {row.name: row_value(held, row, node.order) for row in rows}
 
 
-def read_input(node: Node, port: int) -> Exchange[bool]:
+def read_input(node: Node, port: int) -> Request[bool]:
     """Whether an input, 1 to 5, is active. Raises RequestError for another.
 
     One reading, and nothing vouches for its one bit; `inputs` reads until two agree.

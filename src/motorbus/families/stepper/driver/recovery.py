@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final
 
-from motorbus.core.operation import REACHED, Emit, Exclusive, JournalEntry
+from motorbus.core.steps import REACHED, Emit, Exclusive, JournalEntry
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.stepper.driver import characterising, reading
 from motorbus.families.stepper.driver.borrowing import GIVEN_BACK, NOTE, PROJECT, Loan, given_back, loan_of

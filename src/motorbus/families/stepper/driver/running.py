@@ -11,18 +11,17 @@ from collections.abc import Iterable, Sequence
 from math import inf
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import (
+from motorbus.core.request import Notification, Stops
+from motorbus.core.steps import (
     ASKED,
     Emit,
     Exclusive,
-    Gather,
     JournalEntry,
-    Notification,
     Procedure,
     Sleep,
-    Stops,
     WaitFor,
     catch,
+    gather,
     with_cleanup,
 )
 from motorbus.errors import (
@@ -139,7 +138,7 @@ async def _waited(
             await settled(node, course.wait.ran.outcome.value)
 
     try:
-        await with_cleanup(Gather([_failing(course, branch) for branch in branches]), settle)
+        await with_cleanup(gather(*[_failing(course, branch) for branch in branches]), settle)
     except MotorbusError:
         raise
     except BaseException as interruption:

@@ -9,15 +9,8 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from motorbus.core.family import Found
-from motorbus.core.operation import (
-    Data,
-    Emit,
-    Exclusive,
-    Progress,
-    SetBitrate,
-    TimeoutClass,
-    with_cleanup,
-)
+from motorbus.core.request import Data, TimeoutClass
+from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate, with_cleanup
 from motorbus.errors import NoReply, WireError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.node import Node, checked_id
@@ -60,7 +53,7 @@ async def _at(rate: int, motor: int) -> list[Found]:
     node = Node(motor=motor)
     for number in range(PASSES):
         asked = dump_once(node, 1, timeout=TimeoutClass.SCAN)
-        await Emit(Sends(asked.request, rate))
+        await Emit(Sends(asked.wire, rate))
         await Emit(Progress(number, PASSES, f"reading project 1 at {rate} bit/s"))
         try:
             await asked

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Emit, Exclusive, Sleep, catch
+from motorbus.core.steps import Emit, Exclusive, Sleep, catch
 from motorbus.errors import OutcomeUnknown, RequestError, WireError
 from motorbus.families.stepper.driver import commands
 from motorbus.families.stepper.driver.costs import taken

@@ -13,7 +13,8 @@ from math import inf
 from typing import Final
 
 from motorbus.core.family import Stop
-from motorbus.core.operation import Exchange, Priority, Response, catch
+from motorbus.core.request import Priority, Request, Response
+from motorbus.core.steps import catch
 from motorbus.errors import Interrupted, LinkError, MotorbusError, OutcomeUnknown
 from motorbus.families.stepper.driver.commands import nothing
 from motorbus.families.stepper.driver.exchanges import command
@@ -75,7 +76,7 @@ async def _said(node: Node, names: tuple[str, ...]) -> dict[str, MotorbusError]:
     """Say each of them once; what was told of those that were not accepted."""
     failures = {}
     for name in names:
-        told = await catch(command(node, name, nothing, rank=Priority.STOP))
+        told = await catch(command(node, name, nothing, priority=Priority.STOP))
         if told is not None:
             failures[name] = told
     return failures
@@ -104,13 +105,13 @@ def _not_accepted(node: Node, failures: Mapping[str, MotorbusError], times: int)
 def stop_all(nodes: Mapping[int, Response | None], motor: int) -> Stop:
     """Both commands; where nobody has answered yet, without waiting for an answer."""
     frames = tuple(
-        Exchange[Response](
-            said.request,
-            said.replies if nodes else (),
-            rank=Priority.STOP,
+        Request[Response](
+            said.wire,
+            said.expected if nodes else (),
+            priority=Priority.STOP,
             effect=said.effect,
             repeatable=True,
         )
-        for said in (command(Node(motor=motor), name, nothing, rank=Priority.STOP) for name in STOPS)
+        for said in (command(Node(motor=motor), name, nothing, priority=Priority.STOP) for name in STOPS)
     )
     return Stop(frames, Promise.STOP_ACCEPTED.value)

@@ -17,7 +17,8 @@ from math import ceil, inf, isfinite
 from sys import float_info
 from typing import Final, NamedTuple, TypeVar
 
-from motorbus.core.operation import Emit, Progress, Runnable, Sleep, Stops
+from motorbus.core.request import Stops
+from motorbus.core.steps import Emit, Progress, Runnable, Sleep
 from motorbus.errors import Interrupted, MotorbusError, OutcomeUnknown, Refused, RequestError
 from motorbus.families.stepper import execution
 from motorbus.families.stepper.driver.node import Node

@@ -12,7 +12,7 @@ from enum import Enum
 from math import inf, isinf
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Notification
+from motorbus.core.request import Notification
 from motorbus.errors import MotorbusError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.memory import Memory

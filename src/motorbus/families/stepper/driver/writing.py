@@ -16,8 +16,8 @@ from dataclasses import replace
 from enum import Enum
 from typing import NamedTuple
 
-from motorbus.core.entry import Entry, Value
-from motorbus.core.operation import Emit, Exclusive, Sleep, catch
+from motorbus.core.register import Register, Value
+from motorbus.core.steps import Emit, Exclusive, Sleep, catch
 from motorbus.errors import MotorbusError, OutcomeUnknown, RequestError, WireError
 from motorbus.families.stepper.driver.commands import save_project
 from motorbus.families.stepper.driver.costs import Cost, Taken, taken
@@ -364,7 +364,7 @@ def _meant(node: Node, found: Taken, wanted: Project) -> Project:
     return replace(wanted, steps=wanted.steps[: wanted.total_steps] + there.steps[wanted.total_steps :])
 
 
-def _raw(node: Node, row: Entry, value: Value) -> int:
+def _raw(node: Node, row: Register, value: Value) -> int:
     """The raw value to write. Raises RequestError when this may not be written by name."""
     refusal = "" if row.writable else "it is set by selecting the project"
     if row.protected:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any, Final
 
-from motorbus.core.entry import shown
+from motorbus.core.register import shown
 from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.program import Program

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
-from motorbus.core.entry import shown
+from motorbus.core.register import shown
 from motorbus.families.stepper.program.quantities import refuse
 from motorbus.families.stepper.table import INPUTS, OUTPUTS, PARAMETERS, STEP_INPUTS, step_output_of
 

@@ -15,7 +15,7 @@ from math import isfinite
 from types import MappingProxyType
 from typing import Any, Final, TypeAlias
 
-from motorbus.core.entry import shown
+from motorbus.core.register import shown
 from motorbus.families.stepper.execution import USUAL, Behaviour
 from motorbus.families.stepper.program.quantities import refuse
 from motorbus.families.stepper.program.source import FORMAT, check_format, read, toml

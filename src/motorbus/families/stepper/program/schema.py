@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, Final
 
-from motorbus.core.entry import Entry
+from motorbus.core.register import Register
 from motorbus.families.stepper.program import names, text
 from motorbus.families.stepper.program.quantities import DISTANCES, LENGTH, SPEEDS
 from motorbus.families.stepper.program.source import FORMAT
@@ -119,7 +119,7 @@ def _object(properties: dict[str, Any], required: Iterable[str] = ()) -> dict[st
     return made | ({"required": list(required)} if required else {})
 
 
-def _integer(row: Entry) -> dict[str, Any]:
+def _integer(row: Register) -> dict[str, Any]:
     described = "; ".join(part for part in (UNITS.get(row.name, ""), row.note) if part)
     made: dict[str, Any] = {"type": "integer", "minimum": row.low, "maximum": row.high}
     return made | ({"description": described} if described else {})

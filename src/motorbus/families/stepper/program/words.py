@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from motorbus.core.entry import shown
+from motorbus.core.register import shown
 from motorbus.families.stepper.program.quantities import clock, refuse
 from motorbus.families.stepper.table import ENDLESS, PARAMETERS, allowed, is_allowed
 

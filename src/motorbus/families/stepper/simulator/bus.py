@@ -14,7 +14,8 @@ from itertools import count
 from math import inf
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import CanFrame, Data
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Data
 from motorbus.errors import RequestError
 from motorbus.families.stepper.simulator import sight as seen
 from motorbus.families.stepper.simulator.controller import Controller, Said

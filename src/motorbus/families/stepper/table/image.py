@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from typing import Any, Final, Literal, TypeAlias
 
-from motorbus.core.entry import Entry, shown
+from motorbus.core.register import Register, shown
 from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.table.project import STEPS, Project, Step
@@ -57,7 +57,7 @@ def encode_image(project: Project, order: Order = "little", *, over: bytes = BLA
     return bytes(image)
 
 
-def row_value(image: bytes, row: Entry, order: Order = "little", start: int = 0) -> int:
+def row_value(image: bytes, row: Register, order: Order = "little", start: int = 0) -> int:
     """The raw value of one row of an image; `start` is where the row of its step begins, if it counts from there."""
     at = start + row.address
     return int.from_bytes(image[at : at + row.size], order)
@@ -83,7 +83,7 @@ def differences(one: Project, other: Project) -> Iterator[tuple[str, int, int, i
                 yield field.name, x, mine, theirs
 
 
-def _put(image: bytearray, at: int, row: Entry, value: int, order: Order, step: int) -> None:
+def _put(image: bytearray, at: int, row: Register, value: int, order: Order, step: int) -> None:
     if not 0 <= value < 1 << 8 * row.size:
         where = f"step {step}, " if step else ""
         raise RequestError(

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from motorbus.core.entry import Entry
+from motorbus.core.register import Register
 from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.table.codes import INPUTS
@@ -41,7 +41,7 @@ def allowed(name: str, *, expert: bool = False) -> str:
     return f"{row.low} to {row.high}{unit}{extra}"
 
 
-def _is_told(row: Entry, raw: int) -> bool:
+def _is_told(row: Register, raw: int) -> bool:
     return row.name in ("project_loop", "direction", "stop_mode", "loop_first", "loop_last", "loop_count")
 
 

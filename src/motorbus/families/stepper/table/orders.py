@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Effect, TimeoutClass
+from motorbus.core.request import Effect, TimeoutClass
 from motorbus.families.stepper import wire
 
 REPLY: Final = 0.2

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Final
 
-from motorbus.core.entry import shown
+from motorbus.core.register import shown
 from motorbus.errors import RequestError
 from motorbus.families.stepper.table.codes import ENDLESS, Direction
 

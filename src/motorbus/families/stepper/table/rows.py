@@ -18,8 +18,8 @@ from math import pi
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from motorbus.core.entry import Access, Entry, Storage, Table, changed
-from motorbus.core.operation import Effect
+from motorbus.core.register import Access, Register, RegisterMap, Storage, changed
+from motorbus.core.request import Effect
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.table.codes import ENDLESS, STEP_INPUTS
 from motorbus.families.stepper.table.project import PROJECTS, STEPS, Step
@@ -27,7 +27,7 @@ from motorbus.families.stepper.table.project import PROJECTS, STEPS, Step
 MANUAL: Final = "stepper controller serial protocol manual"
 ASSUMED: Final = "an assumption, no source"
 
-_row = partial(Entry, size=1, access=Access.READ_WRITE, storage=Storage.EEPROM, effect=Effect.PERSISTENT)
+_row = partial(Register, size=1, access=Access.READ_WRITE, storage=Storage.EEPROM, effect=Effect.PERSISTENT)
 _INPUTS: Final = {0: "none", **{number: f"input {number}" for number in STEP_INPUTS}}
 
 BASE: Final = (
@@ -159,23 +159,23 @@ RESERVED: Final = tuple(
 """Runs of bytes of the image that the manual does not name: 45 in all. Kept as they are, never interpreted."""
 
 
-def step_row(number: int, name: str) -> Entry:
+def step_row(number: int, name: str) -> Register:
     """The row of one step of the project table: `step_row(3, "delay")` is `step_3_delay`."""
     return TABLE[f"step_{number}_{name}"]
 
 
-def _of_step(number: int) -> list[Entry]:
+def _of_step(number: int) -> list[Register]:
     start = wire.ROW_LENGTH * number
     return [changed(row, name=f"step_{number}_{row.name}", address=start + row.address) for row in STEP]
 
 
-TABLE: Final = Table(
+TABLE: Final = RegisterMap(
     "project",
     (*BASE, *(row for number in range(1, STEPS + 1) for row in _of_step(number))),
     title="one project of the stepper controller",
 )
-TABLES: Final[Mapping[str, Table]] = MappingProxyType({TABLE.name: TABLE})
-PARAMETERS: Final[Mapping[str, Entry]] = MappingProxyType(
+TABLES: Final[Mapping[str, RegisterMap]] = MappingProxyType({TABLE.name: TABLE})
+PARAMETERS: Final[Mapping[str, Register]] = MappingProxyType(
     {row.name: row for row in (*BASE, *STEP, *REQUEST_ONLY)}
 )
 """Every number that a request carries or a dump holds, by its name there."""
@@ -201,6 +201,6 @@ SET_BY: Final[Mapping[str, Setter]] = MappingProxyType(
 """By the name of a parameter; all but `number`, which is set by selecting the project."""
 
 
-def dump_offset(row: Entry) -> int:
+def dump_offset(row: Register) -> int:
     """Where a row of the project table stands in the 226 bytes of a dump."""
     return wire.REPLY_LENGTH + row.address

@@ -44,7 +44,7 @@ Key: TypeAlias = tuple[int, ...]
 """What matches a reply to its request: all that can be known beforehand of bytes 2 to 5, see `key_of`."""
 
 
-class Request(NamedTuple):
+class RequestParts(NamedTuple):
     """A request taken apart: which command, its numbers by name, and the motor it names (0: none)."""
 
     command: Command
@@ -105,7 +105,7 @@ def is_sound(data: bytes) -> bool:
     return len(data) == REQUEST_LENGTH and data[:2] == HEADER and data[-1] == checksum(data)
 
 
-def decode_request(data: bytes) -> Request | None:
+def decode_request(data: bytes) -> RequestParts | None:
     """A request taken apart; None when it is not whole, its checksum is wrong or no command is meant by it.
 
     Reserved bytes are not looked at and no range is checked.
@@ -117,7 +117,7 @@ def decode_request(data: bytes) -> Request | None:
         place.name: int.from_bytes(data[place.offset : place.offset + place.size], "little")
         for place in command.places
     }
-    return Request(command, values, data[2] if command.kind == MOTOR_CLASS else 0)
+    return RequestParts(command, values, data[2] if command.kind == MOTOR_CLASS else 0)
 
 
 def key_of(reply: bytes) -> Key:
@@ -160,14 +160,14 @@ def encode_reply(request: bytes, *, project: int = 0, level: int = 0, image: byt
     return head + image
 
 
-def _asked(request: bytes) -> Request:
+def _asked(request: bytes) -> RequestParts:
     asked = decode_request(request)
     if asked is None:
         raise RequestError("there is no reply to what is no request", sent=request)
     return asked
 
 
-def _head(asked: Request, request: bytes, project: int, level: int) -> bytes:
+def _head(asked: RequestParts, request: bytes, project: int, level: int) -> bytes:
     command, values = asked.command, asked.values
     reply = bytearray(HEADER + request[2:4] + b"\0\0")
     if command.kind == SYSTEM:
@@ -180,7 +180,7 @@ def _head(asked: Request, request: bytes, project: int, level: int) -> bytes:
     return bytes(reply)
 
 
-def _unnamed(asked: Request) -> bool:
+def _unnamed(asked: RequestParts) -> bool:
     """Its reply repeats a project that the request does not name."""
     return asked.command.echo == "project" and "project" not in asked.values
 

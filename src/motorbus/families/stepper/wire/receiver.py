@@ -16,7 +16,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from motorbus.core.operation import CanFrame, Data, Event, Noise, Notification, Reply
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Data, Event, Noise, Notification, Reply
 from motorbus.families.stepper.wire.frames import (
     DUMP,
     DUMP_LENGTH,

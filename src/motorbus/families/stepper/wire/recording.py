@@ -10,8 +10,9 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.capture import NOISE, NOTICE, REPLY, REQUEST, Captures, PacketFacts, Run
-from motorbus.core.operation import CanFrame, Data, Noise
+from motorbus.core.request import Data, Noise
 from motorbus.families.stepper.wire import bulk, frames
 from motorbus.families.stepper.wire.frames import (
     DUMP,

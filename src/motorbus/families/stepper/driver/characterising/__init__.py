@@ -16,16 +16,7 @@ from dataclasses import replace
 from math import isfinite
 from typing import Any, Final
 
-from motorbus.core.operation import (
-    ASKED,
-    INTENT,
-    OUTCOME,
-    Emit,
-    Exclusive,
-    JournalEntry,
-    catch,
-    with_cleanup,
-)
+from motorbus.core.steps import ASKED, INTENT, OUTCOME, Emit, Exclusive, JournalEntry, catch, with_cleanup
 from motorbus.errors import LinkError, RequestError, VerificationFailed
 from motorbus.families.stepper.driver import reading
 from motorbus.families.stepper.driver.characterising.experiments import Motor

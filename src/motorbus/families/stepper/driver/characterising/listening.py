@@ -9,16 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, Final, NamedTuple
 
-from motorbus.core.operation import (
-    Exchange,
-    Gather,
-    Goal,
-    Notification,
-    Priority,
-    Sleep,
-    WaitFor,
-    catch,
-)
+from motorbus.core.request import Notification, Priority, Request
+from motorbus.core.setpoint import Setpoint
+from motorbus.core.steps import Sleep, WaitFor, catch, gather
 from motorbus.errors import Interrupted, MotorbusError
 from motorbus.families.stepper.driver import goals
 from motorbus.families.stepper.driver.characterising.experiments import Act
@@ -58,10 +51,10 @@ async def write(node: Node, project: Project, *, leave: str = "") -> None:
             await told(node, edit)
 
 
-def told(node: Node, edit: Edit) -> Exchange[None]:
+def told(node: Node, edit: Edit) -> Request[None]:
     """One command that sets parameters."""
     values: dict[str, Any] = dict(edit.values)
-    return command(node, edit.command, nothing, rank=Priority.CONFIGURATION, **values)
+    return command(node, edit.command, nothing, priority=Priority.CONFIGURATION, **values)
 
 
 async def listened(
@@ -81,7 +74,7 @@ async def listened(
     await catch(read_input(node, 1))
     await Sleep(QUIET)
     node.memory.owed = True
-    said, _ = await Gather[Any]([_said(node, watch, project, acts), _listening(heard, seconds)])
+    said, _ = await gather(_said(node, watch, project, acts), _listening(heard, seconds))
     if watch.overtaken:
         raise Interrupted(
             "somebody stopped the controller during an experiment",
@@ -116,15 +109,15 @@ async def _said(
     return tuple(sent), tuple(answered)
 
 
-def order(node: Node, watch: Watch, project: Project, name: str) -> Exchange[None]:
+def order(node: Node, watch: Watch, project: Project, name: str) -> Request[None]:
     """The exchange for one command of an experiment, with the goals of what it moves."""
     if name == "start_project":
         far = goals.of_project(node, project) if project.total_steps else (_nowhere(node),)
         return motion(node, name, far, watch.refusal, project=project.number)
     if name == "run_once":
         return motion(node, name, goals.of_move(node, project), watch.refusal)
-    return command(node, name, nothing, rank=Priority.STOP)
+    return command(node, name, nothing, priority=Priority.STOP)
 
 
-def _nowhere(node: Node) -> Goal:
-    return Goal(node.node, "relative", 0.0, -float("inf"), float("inf"))
+def _nowhere(node: Node) -> Setpoint:
+    return Setpoint(node.node, "relative", 0.0, -float("inf"), float("inf"))

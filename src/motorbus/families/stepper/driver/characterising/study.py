@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple, TypeVar
 
-from motorbus.core.operation import Emit, Procedure
+from motorbus.core.steps import Emit, Procedure
 from motorbus.errors import NoReply, WireError
 from motorbus.families.stepper.driver.characterising import views
 from motorbus.families.stepper.driver.characterising.experiments import Seen, Trial, Verdict, judged

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.operation import Sleep
+from motorbus.core.steps import Sleep
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver.characterising.experiments import Seen, Trial
 from motorbus.families.stepper.driver.characterising.findings import Case

@@ -15,7 +15,7 @@ class Stays(Enum):
     """Hold the present position, or do nothing, with torque switched on."""
 
 
-class Goal(NamedTuple):
+class Setpoint(NamedTuple):
     """What a motion request asks of one node, in API units, with the limits in force when the request was made.
 
     `quantity` is position or relative (rad); velocity (rad/s), load (fraction) or current (A), which the node follows
@@ -31,17 +31,17 @@ class Goal(NamedTuple):
     stays: Stays | None = None
 
 
-def torque_on(node: int) -> Goal:
+def torque_on(node: int) -> Setpoint:
     """The goal of a request that only enables torque, or lets the node accept goals."""
-    return Goal(node, "torque", 1.0, 1.0, 1.0, Stays.ON)
+    return Setpoint(node, "torque", 1.0, 1.0, 1.0, Stays.ON)
 
 
-def torque_off(node: int) -> Goal:
+def torque_off(node: int) -> Setpoint:
     """The goal of a request that disables torque: the node rests, whatever its earlier goals."""
-    return Goal(node, "torque", 0.0, 0.0, 0.0, Stays.STILL)
+    return Setpoint(node, "torque", 0.0, 0.0, 0.0, Stays.STILL)
 
 
-class Later:
+class Deferred:
     """Marks a request whose goals do not take effect on arrival, or that makes such goals take effect.
 
     Without `begins` its goals wait in `node` and replace those that waited there. With `begins` the goals that wait in

@@ -7,38 +7,36 @@ from typing import Any, assert_type
 
 import pytest
 
-from motorbus.core.operation import (
+from motorbus.core.request import Expected, Notification, Request, Step
+from motorbus.core.steps import (
     Emit,
-    Exchange,
     Exclusive,
-    Expected,
     Gather,
     Guard,
-    Notification,
     Procedure,
     Runnable,
     SetBitrate,
     Shielded,
     Sleep,
-    Step,
     WaitFor,
     catch,
     discard,
+    gather,
     with_cleanup,
 )
 from motorbus.errors import MotorbusError, NoReply
 from tests.families.player import played
 
 
-def number(value: int) -> Exchange[int]:
-    return Exchange(bytes([value]), (Expected(1, 1, 1),), lambda answer: answer.replies[0].data[0])
+def number(value: int) -> Request[int]:
+    return Request(bytes([value]), (Expected(1, 1, 1),), lambda answer: answer.replies[0].data[0])
 
 
 async def everything() -> str:
     one = await number(1)
     assert_type(one, int)
-    several = await Gather([number(2), number(3)])
-    assert_type(several, list[int])
+    several = await gather(number(2), number(3))
+    assert_type(several, tuple[int, int])
     alone = await Exclusive(number(4))
     assert_type(alone, int)
     await Sleep(0.1)
@@ -60,14 +58,14 @@ def test_every_step_yields_itself_and_returns_what_is_sent_in() -> None:
     kinds.append(type(step))
     with pytest.raises(StopIteration) as end:
         operation.send(answers[-1])
-    assert kinds == [Exchange, Gather, Exclusive, Sleep, WaitFor, SetBitrate, Emit]
+    assert kinds == [Request, Gather, Exclusive, Sleep, WaitFor, SetBitrate, Emit]
     assert end.value.value == "1 [2, 3] 4 None"
 
 
 def test_an_outcome_turns_our_errors_into_values_and_no_others() -> None:
     operation: Procedure[int | MotorbusError] = catch(number(1))
     begun = operation.send(None)
-    assert isinstance(begun, Exchange)
+    assert isinstance(begun, Request)
     with pytest.raises(StopIteration) as end:
         _ = operation.throw(NoReply("silent"))
     assert isinstance(end.value.value, NoReply)
@@ -95,11 +93,11 @@ def carried_out(operation: Runnable[Any], log: list[int], *, fails_at: int, erro
 
     def carry_out(step: Any) -> Any:
         if isinstance(step, Shielded):
-            return played(step.operation, carry_out)
-        log.append(step.request[0])
-        if step.request[0] == fails_at:
+            return played(step.runnable, carry_out)
+        log.append(step.wire[0])
+        if step.wire[0] == fails_at:
             raise error
-        return step.request[0]
+        return step.wire[0]
 
     return played(operation, carry_out)
 
@@ -136,5 +134,5 @@ def test_a_procedure_that_is_dropped_leaves_no_guard() -> None:
 
 def test_what_is_never_started_is_closed_with_all_that_it_was_given() -> None:
     inner = changed([])
-    discard(Gather([Exclusive(catch(inner))]))
+    discard(gather(Exclusive(catch(inner))))
     assert getcoroutinestate(inner) == CORO_CLOSED

@@ -9,8 +9,9 @@ import pydoc
 import sys
 from typing import Any, TypeVar, assert_type
 
-from motorbus.core.operation import Exchange, Runnable
-from motorbus.core.verbs import Awaiting, Blocking, verb
+from motorbus.core.device import AsyncDevice, BlockingDevice, device_method
+from motorbus.core.request import Request
+from motorbus.core.steps import Runnable
 
 T = TypeVar("T")
 
@@ -19,19 +20,19 @@ class Node:
     id = 7
 
 
-def scaled(node: Node, by: int, *, plus: int = 0) -> Exchange[int]:
+def scaled(node: Node, by: int, *, plus: int = 0) -> Request[int]:
     """Documented once."""
-    return Exchange(bytes([node.id]), (), lambda answer: node.id * by + plus)
+    return Request(bytes([node.id]), (), lambda answer: node.id * by + plus)
 
 
 class Verbs(Node):
-    scaled = verb(scaled)
+    scaled = device_method(scaled)
 
 
 class BlockingBus:
     def run(self, operation: Runnable[T], /) -> T:
-        assert isinstance(operation, Exchange)
-        value: T = operation.read(None)  # type: ignore[misc, arg-type]  # this reader ignores its answer
+        assert isinstance(operation, Request)
+        value: T = operation.decode(None)  # type: ignore[misc, arg-type]  # this reader ignores its answer
         return value
 
 
@@ -40,21 +41,21 @@ class AsyncBus:
         return BlockingBus().run(operation)
 
 
-class Device(Verbs, Blocking): ...
+class Servo(Verbs, BlockingDevice): ...
 
 
-class AsyncDevice(Verbs, Awaiting): ...
+class AsyncServo(Verbs, AsyncDevice): ...
 
 
 def test_a_blocking_device_returns_the_plain_value() -> None:
-    value = Device(BlockingBus()).scaled(3, plus=1)
+    value = Servo(BlockingBus()).scaled(3, plus=1)
     assert_type(value, int)
     assert value == 22
 
 
 def test_an_async_device_returns_an_awaitable() -> None:
     async def main() -> int:
-        value = await AsyncDevice(AsyncBus()).scaled(3, plus=1)
+        value = await AsyncServo(AsyncBus()).scaled(3, plus=1)
         assert_type(value, int)
         return value
 
@@ -62,7 +63,7 @@ def test_an_async_device_returns_an_awaitable() -> None:
 
 
 def test_a_method_is_found_once_and_shows_what_it_takes() -> None:
-    device = Device(BlockingBus())
+    device = Servo(BlockingBus())
     assert device.scaled is device.scaled
     assert str(inspect.signature(device.scaled)) == "(by: 'int', *, plus: 'int' = 0) -> 'int'"
     assert device.scaled.__name__ == "scaled"
@@ -70,21 +71,21 @@ def test_a_method_is_found_once_and_shows_what_it_takes() -> None:
 
 
 def test_a_class_shows_the_methods_of_its_face() -> None:
-    for kind in (Device, AsyncDevice):
+    for kind in (Servo, AsyncServo):
         method: Any = kind.scaled
         assert str(inspect.signature(method)) == "(self, by: 'int', *, plus: 'int' = 0) -> 'int'"
         assert method.__qualname__ == f"{kind.__name__}.scaled"
         assert method.function is scaled
         assert "Documented once." in pydoc.plain(pydoc.render_doc(kind))
-    unbound: Any = Device.scaled
-    assert unbound(Device(BlockingBus()), 3) == 21
+    unbound: Any = Servo.scaled
+    assert unbound(Servo(BlockingBus()), 3) == 21
     if sys.version_info >= (3, 12):
-        assert inspect.iscoroutinefunction(AsyncDevice.scaled)
-        assert not inspect.iscoroutinefunction(Device.scaled)
+        assert inspect.iscoroutinefunction(AsyncServo.scaled)
+        assert not inspect.iscoroutinefunction(Servo.scaled)
 
 
 def test_a_copy_has_methods_of_its_own() -> None:
-    first = Device(BlockingBus())
+    first = Servo(BlockingBus())
     assert first.scaled(3) == 21
     second = copy.copy(first)
     second.id = 8

@@ -13,7 +13,7 @@ from difflib import get_close_matches
 from enum import Enum
 from typing import TypeAlias, TypeGuard
 
-from motorbus.core.operation import Effect
+from motorbus.core.request import Effect
 from motorbus.errors import RequestError
 
 Value: TypeAlias = int | float
@@ -55,7 +55,7 @@ class Storage(Enum):
 
 
 class Coding(Enum):
-    """Coding of negative numbers; the sign bit of sign-magnitude is `Entry.sign_bit`."""
+    """Coding of negative numbers; the sign bit of sign-magnitude is `Register.sign_bit`."""
 
     UNSIGNED = "unsigned"
     SIGN_MAGNITUDE = "sign-magnitude"
@@ -63,7 +63,7 @@ class Coding(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Entry:
+class Register:
     """One addressable value of a device.
 
     `address` is the register number, or the CANopen index with `subindex`; `size` is in bytes. `low` and `high` bound
@@ -169,10 +169,10 @@ class Entry:
         return f"{self.to_value(raw):.6g} {self.unit} (raw {raw})" if self.unit else str(raw)
 
 
-class Table(Mapping[str, Entry]):
+class RegisterMap(Mapping[str, Register]):
     """All rows of one register map, by name and by address. Immutable."""
 
-    def __init__(self, name: str, entries: Iterable[Entry], *, title: str = "") -> None:
+    def __init__(self, name: str, entries: Iterable[Register], *, title: str = "") -> None:
         self.name = name
         self.title = title or name
         self._by_name = {entry.name: entry for entry in entries}
@@ -180,7 +180,7 @@ class Table(Mapping[str, Entry]):
         if len(self._by_address) != len(self._by_name):
             raise ValueError(f"table {name}: two rows share an address")
 
-    def __getitem__(self, name: str) -> Entry:
+    def __getitem__(self, name: str) -> Register:
         try:
             return self._by_name[name]
         except KeyError:
@@ -200,19 +200,21 @@ class Table(Mapping[str, Entry]):
     def __len__(self) -> int:
         return len(self._by_name)
 
-    def at(self, address: int, subindex: int | None = None) -> Entry | None:
+    def at(self, address: int, subindex: int | None = None) -> Register | None:
         """The row that starts at this address, or None."""
         return self._by_address.get((address, subindex))
 
-    def derive(self, name: str, *changed: Entry, without: Iterable[str] = (), title: str = "") -> Table:
+    def derive(
+        self, name: str, *changed: Register, without: Iterable[str] = (), title: str = ""
+    ) -> RegisterMap:
         """The table of another model: these rows, some replaced or added by name, some removed."""
         rows = {key: row for key, row in self._by_name.items() if key not in set(without)}
         rows.update({row.name: row for row in changed})
-        return Table(
+        return RegisterMap(
             name, sorted(rows.values(), key=lambda row: (row.address, row.subindex or 0)), title=title
         )
 
 
-def changed(entry: Entry, **differences: object) -> Entry:
+def changed(entry: Register, **differences: object) -> Register:
     """A copy of the row with some fields replaced."""
     return replace(entry, **differences)  # type: ignore[arg-type]

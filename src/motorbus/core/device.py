@@ -14,7 +14,7 @@ from functools import cached_property
 from inspect import Parameter, Signature, getattr_static, signature
 from typing import Any, ClassVar, Concatenate, Generic, ParamSpec, Protocol, Self, TypeVar, overload
 
-from motorbus.core.operation import Runnable
+from motorbus.core.steps import Runnable
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -39,21 +39,23 @@ class _Owner:
 
     def __getstate__(self) -> dict[str, Any]:
         kind = type(self)
-        cached = {name for name in self.__dict__ if isinstance(getattr_static(kind, name, None), Said)}
+        cached = {
+            name for name in self.__dict__ if isinstance(getattr_static(kind, name, None), DeviceMethod)
+        }
         return {name: value for name, value in self.__dict__.items() if name not in cached}
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {getattr(self, 'node', '')} on {getattr(self, 'bus', None)!r}>"
 
 
-class Blocking(_Owner):
+class BlockingDevice(_Owner):
     """A device whose verbs run on a blocking bus."""
 
     def __init__(self, bus: BlockingRunner) -> None:
         self.bus = bus
 
 
-class Awaiting(_Owner):
+class AsyncDevice(_Owner):
     """A device whose verbs run on an async bus."""
 
     _is_async = True
@@ -62,14 +64,14 @@ class Awaiting(_Owner):
         self.bus = bus
 
 
-class Said(Generic[P, T]):
+class DeviceMethod(Generic[P, T]):
     """Base of descriptors that make a method of a driver function; a subclass says how the method runs it.
 
     On a class it gives a function with the signature of the method; `function` of that is the driver function.
     `returns` names the types in which a driver function returns its value.
     """
 
-    returns: ClassVar[str] = "Exchange|Procedure|Runnable"
+    returns: ClassVar[str] = "Request|Procedure|Runnable"
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self.function = function
@@ -127,8 +129,8 @@ class Said(Generic[P, T]):
         method.__signature__ = shown
 
 
-class verb(Said[P, T]):  # noqa: N801 - used like a function
-    """Makes a method of a driver function: blocking on a `Blocking` device, a coroutine on an `Awaiting` one."""
+class device_method(DeviceMethod[P, T]):  # noqa: N801 - used like a function
+    """Make a method of a driver function: blocking on a `BlockingDevice`, a coroutine on an `AsyncDevice`."""
 
     function: Callable[Concatenate[Any, P], Runnable[T]]
 
@@ -138,9 +140,9 @@ class verb(Said[P, T]):  # noqa: N801 - used like a function
     @overload
     def __get__(self, device: None, owner: type) -> Self: ...
     @overload
-    def __get__(self, device: Blocking, owner: type) -> Callable[P, T]: ...
+    def __get__(self, device: BlockingDevice, owner: type) -> Callable[P, T]: ...
     @overload
-    def __get__(self, device: Awaiting, owner: type) -> Callable[P, Coroutine[Any, Any, T]]: ...
+    def __get__(self, device: AsyncDevice, owner: type) -> Callable[P, Coroutine[Any, Any, T]]: ...
     def __get__(self, device: Any, owner: type) -> Any:
         if device is None:
             return self.of_class(owner)

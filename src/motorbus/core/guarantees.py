@@ -1,7 +1,7 @@
 """What a user can rely on in the devices of a family: texts for people, written once per family.
 
 A device cannot be asked what it does when its host fails, so the family declares it. `motorbus safety` and reviewers of
-a machine use it. A text states a fact; `Given` states how far a user can rely on it.
+a machine use it. A text states a fact; `Level` states how far a user can rely on it.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from enum import Enum
 from typing import Final, NamedTuple
 
 
-class Given(Enum):
+class Level(Enum):
     """How far a user can rely on a property."""
 
     YES = "yes"
@@ -19,14 +19,14 @@ class Given(Enum):
     NO = "no"
 
 
-class Point(NamedTuple):
+class Guarantee(NamedTuple):
     """One property: how far a user can rely on it, and the facts."""
 
-    given: Given
+    given: Level
     text: str
 
 
-class Assurance(NamedTuple):
+class Guarantees(NamedTuple):
     """The safety properties of each device of a family.
 
     `measured`  the device measures and reports its position
@@ -43,19 +43,19 @@ class Assurance(NamedTuple):
     `led`       the device follows small goals of a loop; otherwise it moves by a profile of its own
     """
 
-    measured: Point
-    limits: Point
-    stop: Point
-    estops: Mapping[str, Point]
-    alone: Point
-    ends: Point
-    torque: Point
-    restart: Point
-    strain: Point
-    watchdog: Point
+    measured: Guarantee
+    limits: Guarantee
+    stop: Guarantee
+    estops: Mapping[str, Guarantee]
+    alone: Guarantee
+    ends: Guarantee
+    torque: Guarantee
+    restart: Guarantee
+    strain: Guarantee
+    watchdog: Guarantee
     led: bool = False
 
-    def points(self) -> Iterator[tuple[str, Point]]:
+    def points(self) -> Iterator[tuple[str, Guarantee]]:
         """Yield the title and the point of each property, in display order."""
         for name, title in _TITLES.items():
             if name == "estops":

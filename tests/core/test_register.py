@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.entry import Access, Coding, Entry, Storage, Table, changed
-from motorbus.core.operation import Effect
+from motorbus.core.register import Access, Coding, Register, RegisterMap, Storage, changed
+from motorbus.core.request import Effect
 from motorbus.errors import RequestError
 
 HUGE = pytest.param(10**400, id="huge"), pytest.param(-(10**5000), id="beyond printing")
-PLAIN = Entry(
+PLAIN = Register(
     name="plain",
     address=5,
     size=1,
@@ -22,7 +22,7 @@ PLAIN = Entry(
     high=253,
     source="manual 1",
 )
-SIGNED = Entry(
+SIGNED = Register(
     name="goal_position",
     address=42,
     size=2,
@@ -84,7 +84,7 @@ def test_a_row_without_unit_takes_whole_numbers() -> None:
 
 
 def test_a_table_finds_by_name_and_address_and_suggests() -> None:
-    table = Table("t", [PLAIN, SIGNED])
+    table = RegisterMap("t", [PLAIN, SIGNED])
     assert table["plain"] is PLAIN
     assert table.at(42) is SIGNED
     assert table.at(43) is None
@@ -97,7 +97,7 @@ def test_a_table_finds_by_name_and_address_and_suggests() -> None:
 
 
 def test_a_later_model_is_an_earlier_table_plus_differences() -> None:
-    later = Table("t", [PLAIN, SIGNED]).derive("u", changed(PLAIN, high=252), without=["goal_position"])
+    later = RegisterMap("t", [PLAIN, SIGNED]).derive("u", changed(PLAIN, high=252), without=["goal_position"])
     assert later.name == "u"
     assert list(later) == ["plain"]
     assert later["plain"].high == 252
@@ -106,12 +106,12 @@ def test_a_later_model_is_an_earlier_table_plus_differences() -> None:
 
 def test_two_rows_at_one_address_are_refused() -> None:
     with pytest.raises(ValueError, match="share an address"):
-        Table("t", [PLAIN, changed(SIGNED, address=5)])
+        RegisterMap("t", [PLAIN, changed(SIGNED, address=5)])
 
 
 @pytest.mark.parametrize("value", [1e308, -1e308, *HUGE, None, "1", 1j, [1.0], object()])
 @pytest.mark.parametrize("row", [PLAIN, SIGNED])
-def test_a_value_that_is_no_finite_number_is_a_bad_request(row: Entry, value: Any) -> None:
+def test_a_value_that_is_no_finite_number_is_a_bad_request(row: Register, value: Any) -> None:
     with pytest.raises(RequestError, match=r"not a finite number|out of range") as caught:
         row.encode(row.to_raw(value))
     assert len(caught.value.summary) < 400

@@ -1,0 +1,260 @@
+"""Requests, the replies that they expect, and what a bus makes of received data.
+
+A `Request` is a step: a procedure awaits it, see `core.steps`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, field
+from enum import Enum, IntEnum
+from typing import Any, ClassVar, Final, Generic, NamedTuple, TypeAlias, TypeVar
+
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.setpoint import Deferred, Setpoint
+from motorbus.errors import MotorbusError
+
+T = TypeVar("T")
+T_co = TypeVar("T_co", covariant=True)
+
+Data: TypeAlias = bytes | CanFrame
+Key: TypeAlias = Hashable
+
+
+class Priority(IntEnum):
+    """Priority among waiting exchanges: the lowest number leaves first."""
+
+    STOP = 0
+    CONTROL = 1
+    POLL = 2
+    CONFIGURATION = 3
+
+
+class Effect(IntEnum):
+    """Effect of a write; of several effects the highest number counts."""
+
+    NONE = 0
+    PERSISTENT = 1
+    IDENTITY = 2
+    TORQUE = 3
+    MOTION = 4
+
+
+class TimeoutClass(IntEnum):
+    """Class of the time that a device takes before it replies; the family defines the seconds."""
+
+    REPLY = 0
+    SCAN = 1
+    STORE = 2
+
+
+class Expected(NamedTuple):
+    """An expected reply: its node, the key that identifies it, and its exact length in bytes.
+
+    A refusal is a reply, too; where it is shorter, the family pads it to this length, as CANopen does.
+    """
+
+    node: int
+    key: Key
+    length: int
+
+
+class Any_(Enum):  # noqa: N801 - typing.Any is taken
+    """The type of `ANY`: every reply before the deadline is part of the answer."""
+
+    ANY = "any"
+
+
+ANY: Final = Any_.ANY
+EVERY_LANE: Final = -1
+"""Lane of a request to all nodes of a bus where each node has its own lane. Its replies are `ANY`: it takes the replies
+of any lane that no other exchange expects."""
+
+
+class Reply(NamedTuple):
+    """A frame that answers a request. `key` identifies it, `data` is the whole frame or the CAN data field."""
+
+    lane: int
+    key: Key
+    data: bytes
+
+
+class Notification(NamedTuple):
+    """A frame that a device sent unsolicited: a report, an alarm, the end of a program.
+
+    `at` is its arrival time (s, link clock), set by the bus.
+    """
+
+    node: int
+    kind: str
+    data: bytes
+    at: float = 0.0
+
+
+class Noise(NamedTuple):
+    """Bytes that are no reply and no notice.
+
+    `fault` is "framing" or "checksum": the bytes may be a damaged reply of a node that was asked recently. Or it is
+    "foreign": a whole frame of other traffic. `lane` is the lane of the bytes, None if any node may have sent them.
+    """
+
+    data: bytes
+    fault: str
+    lane: int | None = None
+
+
+Event: TypeAlias = Reply | Notification | Noise
+
+
+class Response(NamedTuple):
+    """The replies in the expected order, the nodes without a reply, and the arrival time (s, link clock)."""
+
+    replies: tuple[Reply, ...]
+    missing: tuple[int, ...]
+    at: float
+
+
+ExactDecoder: TypeAlias = "Callable[[Any, float], T | None]"
+"""(received bytes, arrival time in s) -> value; None unless they are exactly the expected replies without an alarm."""
+
+Stops: TypeAlias = Callable[[int], int]
+"""Node -> number of stops sent to it so far, stops to all nodes included."""
+Precondition: TypeAlias = Callable[[Stops], MotorbusError | None]
+"""The error if a request must not leave, None if it may."""
+
+
+class Step(Generic[T_co]):
+    """What a procedure awaits; the value of the `await` has the type of the step."""
+
+    __slots__ = ()
+
+    def __await__(self) -> Generator[Step[Any], Any, T_co]:
+        value: T_co = yield self
+        return value
+
+
+@dataclass(slots=True, eq=False, repr=False)
+class Request(Step[T_co]):
+    """One request and its expected replies. It is immutable, except for `prepared`, and may be sent again.
+
+    `wire`         the bytes or the CAN frame to send
+    `expected`     one `Expected` per reply; () for none; `ANY` for all replies before the deadline
+    `decode`       response -> value; None: the value is the `Response`. Matching of replies does not use it
+    `lane`         requests on the same lane never overlap
+    `effect`       highest effect of the registers that it writes
+    `setpoints`    what it asks of each node, for the gate
+    `repeatable`   sending it twice has the same effect as sending it once
+    `deferred`     its setpoints wait in the node, or it makes waiting setpoints take effect
+    `precondition` checked before each attempt that moves or switches torque, as for stops or changed settings
+    `alternate`    makes an equivalent request with replies of another length. The bus alternates where replies carry no
+                   number, so that a second copy of the last reply is not taken for the next one
+    `decode_exact` fast path of `decode` for a request that is kept: decodes the bytes of all expected replies at once
+    `prepared`     state that a bus keeps for it
+    `reports_position`  True: the replies begin with the present position, so a stop can hold it. A function, for the
+                   gate: response -> position (rad) by node, without the nodes whose reply does not give it
+    """
+
+    wire: Final[Data]
+    expected: Final[tuple[Expected, ...] | Any_] = ()
+    decode: Callable[[Response], T_co] | None = None
+    _: KW_ONLY
+    lane: Final[int] = 0
+    priority: Final[Priority] = Priority.POLL
+    effect: Final[Effect] = Effect.NONE
+    setpoints: Final[tuple[Setpoint, ...]] = ()
+    reply_within: Final[TimeoutClass] = TimeoutClass.REPLY
+    repeatable: Final[bool] = False
+    reports_position: Final[bool | Callable[[Response], Mapping[int, float]]] = False
+    precondition: Final[Precondition | None] = None
+    deferred: Final[Deferred | None] = None
+    alternate: Callable[[], Request[T_co]] | None = None
+    decode_exact: ExactDecoder[T_co] | None = None
+    prepared: Any = field(default=None, init=False)
+
+    group: ClassVar[Any] = None
+    prechecked: ClassVar[bool] = False
+    """Every setpoint is within the limits that it carries, and none is an endless motion; see `SetpointWrite`."""
+
+    @property
+    def setpoint_nodes(self) -> Sequence[int]:
+        """The nodes of the setpoints."""
+        return [setpoint.node for setpoint in self.setpoints]
+
+    def with_decoder(self, decode: Callable[[Response], T]) -> Request[T]:
+        """The same request with another `decode`, without `alternate` and `decode_exact`."""
+        own = ("wire", "expected", "decode", "alternate", "decode_exact", "prepared")
+        rest = [name for name in Request.__slots__ if name not in own]
+        return Request(self.wire, self.expected, decode, **{name: getattr(self, name) for name in rest})
+
+    def __repr__(self) -> str:
+        text = self.wire.hex(" ") if isinstance(self.wire, bytes) else repr(self.wire)
+        return f"<Request {text}>"
+
+
+class SetpointGroup:
+    """The common part of `SetpointWrite`s: their nodes, the conversion of raw values to setpoints, the precondition."""
+
+    __slots__ = ("nodes", "precondition", "to_setpoints")
+
+    def __init__(
+        self,
+        nodes: Sequence[int],
+        to_setpoints: Callable[[Sequence[int]], tuple[Setpoint, ...]],
+        precondition: Precondition,
+    ) -> None:
+        self.nodes: Final = nodes
+        self.to_setpoints: Final = to_setpoints
+        self.precondition: Final = precondition
+
+
+class SetpointWrite(Request[None]):
+    """A request of a control loop that moves several nodes and has no reply; see `Request`.
+
+    A loop makes one in each cycle, so it costs little more than its bytes: `setpoints` are computed when a caller first
+    reads them. It is `prechecked`: each setpoint is finite and within the limits that it carries, none is endless.
+    """
+
+    __slots__ = ("_raws", "_setpoints", "group")
+
+    group: SetpointGroup  # type: ignore[misc]
+    precondition: Precondition  # type: ignore[misc]
+    prechecked = True
+    # Equal for all of these requests, so they are class attributes.
+    expected = ()  # type: ignore[misc]
+    lane = 0  # type: ignore[misc]
+    priority = Priority.CONTROL  # type: ignore[misc]
+    effect = Effect.MOTION  # type: ignore[misc]
+    reply_within = TimeoutClass.REPLY  # type: ignore[misc]
+    repeatable = False  # type: ignore[misc]
+    reports_position = False  # type: ignore[misc]
+    deferred = None  # type: ignore[misc]
+    alternate = None
+    decode_exact = None
+    prepared = None
+
+    def __init__(self, wire: bytes, group: SetpointGroup, raws: Sequence[int]) -> None:
+        self.wire = wire  # type: ignore[misc]
+        self.group = group
+        self.precondition = group.precondition  # type: ignore[misc]
+        self._raws = raws
+        self._setpoints: tuple[Setpoint, ...] | None = None
+
+    def with_group(self, group: SetpointGroup) -> SetpointWrite:
+        """The same request with another group."""
+        return SetpointWrite(self.wire, group, self._raws)  # type: ignore[arg-type]  # always bytes here
+
+    @staticmethod
+    def decode(_: Response) -> None:
+        """There is no reply to decode."""
+
+    @property  # type: ignore[misc]
+    def setpoints(self) -> tuple[Setpoint, ...]:
+        """What the request asks of each node, for the gate."""
+        if self._setpoints is None:
+            self._setpoints = self.group.to_setpoints(self._raws)
+        return self._setpoints
+
+    @property
+    def setpoint_nodes(self) -> Sequence[int]:
+        """The nodes of the setpoints."""
+        return self.group.nodes
