@@ -1,6 +1,6 @@
 """A control loop over six servos: one sync read in, one sync write out, each cycle.
 
-The group operations are made once and kept. Goals pass the gate like every other motion.
+The group requests are made once and kept. Goals pass the gate like every other motion.
 """
 
 from __future__ import annotations

@@ -231,7 +231,7 @@ def test_after_a_motion_order_a_stop_asks_where_the_node_is(can: Engine) -> None
     assert goals == {0x601: (333).to_bytes(2, "little"), 0x602: (200).to_bytes(2, "little")}
 
 
-def test_a_procedure_that_awaits_no_step_is_told_what_it_may_await(engine: Engine) -> None:
+def test_a_procedure_that_awaits_no_step_raises_an_error_that_names_the_steps(engine: Engine) -> None:
     async def foreign() -> None:
         await asyncio.sleep(0)
 
@@ -239,3 +239,12 @@ def test_a_procedure_that_awaits_no_step_is_told_what_it_may_await(engine: Engin
         engine.run(foreign())
     assert "asyncio.sleep" in caught.value.cause
     assert engine.run(read(1)) == 100
+
+
+def test_a_step_awaited_outside_of_a_procedure_names_run() -> None:
+    async def awaits_a_step() -> None:
+        await Sleep(0.1)
+
+    with pytest.raises(RequestError, match="Sleep was awaited outside of a procedure") as caught:
+        asyncio.run(awaits_a_step())
+    assert "await bus.run(...)" in caught.value.advice

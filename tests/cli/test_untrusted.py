@@ -28,7 +28,7 @@ def test_what_moves_it_or_gives_it_torque_is_refused_and_says_what_ends_that(
     told = run(*command.split())
     assert told.code == Exit.UNSAFE
     assert "a1 is at fault: untrusted: " in told.err
-    assert "of arm#1 did not come to its end" in told.err
+    assert "of arm#1 is unfinished" in told.err
     assert "motorbus recover" in told.err
     assert "nothing was sent" in told.err
     noted(bench, OUTCOME, outcome="taken back")

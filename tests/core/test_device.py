@@ -81,6 +81,7 @@ def test_a_class_shows_the_methods_of_its_face() -> None:
     assert unbound(Servo(BlockingBus()), 3) == 21
     if sys.version_info >= (3, 12):
         assert inspect.iscoroutinefunction(AsyncServo.scaled)
+        assert inspect.iscoroutinefunction(AsyncServo(AsyncBus()).scaled)
         assert not inspect.iscoroutinefunction(Servo.scaled)
 
 

@@ -9,10 +9,10 @@ import pytest
 
 from motorbus import AsyncRobot, LinkLost, MotorbusError, NotHomed, Robot
 from motorbus.core.steps import Sleep, catch, gather
-from motorbus.motion.abreast import Abreast
 from motorbus.motion.leaving import Leaving, given_up, goes_on
 from motorbus.motion.machine import Machine
 from motorbus.motion.moving import verbs as moving
+from motorbus.motion.parallel import Parallel
 from tests.support.machines import Cut, listened, machine, said
 
 PARKED = {"exit": "park", "park": "10 deg"}
@@ -248,7 +248,7 @@ def test_a_movement_that_was_cut_was_stopped_and_is_left_so() -> None:
         with Robot.of(made) as robot:
             here = robot.positions()
             assert abs(here["a1"] or 0.0) < 1.4, "it was under way"
-            robot.conductor.run(Abreast({"arm": _wait(1.0), "can": _wait(1.0)}, dict))
+            robot.conductor.run(Parallel({"arm": _wait(1.0), "can": _wait(1.0)}, dict))
             assert robot.positions() == {name: pytest.approx(place, abs=0.01) for name, place in here.items()}
 
 
@@ -302,7 +302,7 @@ def test_a_stop_of_others_in_a_movement_needs_no_more_when_it_is_left() -> None:
             told = await gather(catch(moving.move_axis(robot["a1"], 1.0)), catch(_stopped_after(robot, 0.3)))
             return list(told)
 
-        told: list[object] = robot.conductor.run(Abreast({"arm": both()}, lambda found: found["arm"]))
+        told: list[object] = robot.conductor.run(Parallel({"arm": both()}, lambda found: found["arm"]))
         assert isinstance(told[0], MotorbusError)
         listened(sims)
         robot.close()

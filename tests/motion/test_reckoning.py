@@ -12,7 +12,7 @@ from motorbus import AsyncRobot, Interrupted, LimitExceeded, MotorbusError, NotH
 from motorbus.core.steps import Sleep, catch, gather
 from motorbus.motion import capabilities as verbs
 from motorbus.motion import reckoning
-from motorbus.motion.abreast import Abreast
+from motorbus.motion.parallel import Parallel
 from motorbus.motion.reckoning import Movement, Reckoning, is_reckoned
 from tests.families.stepper.runs import TURN
 from tests.families.stepper.runs import made as built
@@ -172,7 +172,9 @@ def test_a_stop_in_the_middle_makes_it_unknown(rank: str) -> None:
             found = await gather(catch(reckoning.move_by(lift, 0.1)), catch(stopped()))
             return list(found)
 
-        told: list[object] = robot.conductor.run(Abreast({"stage": both()}, lambda results: results["stage"]))
+        told: list[object] = robot.conductor.run(
+            Parallel({"stage": both()}, lambda results: results["stage"])
+        )
         assert isinstance(told[0], Interrupted), told
         assert lift.estimated is None
         assert "did not come to its end" in lift.reckoning.why  # type: ignore[union-attr]

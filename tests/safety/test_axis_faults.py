@@ -13,7 +13,7 @@ from motorbus.bus.base import BaseBus
 from motorbus.core.steps import INTENT, OUTCOME, READABLE, JournalEntry
 from motorbus.errors import Refused
 from motorbus.motion.machine import Machine
-from motorbus.motion.safety import canary
+from motorbus.motion.safety import restarts
 from motorbus.session.robot import AsyncRobot, Robot
 from motorbus.simulation.named import Simulation
 from tests.support.machines import listened, machine, said
@@ -40,7 +40,7 @@ def test_a_device_whose_change_was_cut_off_is_untrusted_by_either_id_until_recov
     with cut_off() as (made, sims):
         with Robot.of(made) as robot:
             assert set(robot.faults) == {"a2", "a3"}
-            assert robot.faults["a2"].startswith("untrusted: set_id() of arm#2 did not come to its end")
+            assert robot.faults["a2"].startswith("untrusted: set_id() of arm#2 is unfinished")
             assert "motorbus recover feetech:sim" in robot.faults["a2"]
             listened(sims)
             for name in ("a2", "a3"):
@@ -94,7 +94,7 @@ def test_an_async_robot_has_the_same_doubt() -> None:
 
 def test_one_that_cannot_be_cleared_keeps_all_from_being_cleared() -> None:
     with cut_off() as (made, _), Robot.of(made) as robot:
-        canary.fault(robot["a1"], "it was seen to smoke")
+        restarts.fault(robot["a1"], "it was seen to smoke")
         with pytest.raises(Refused, match="nothing was cleared"):
             robot.clear_fault()
         assert set(robot.faults) == {"a1", "a2", "a3"}

@@ -146,7 +146,7 @@ class Template:
         return scan(ids, rates)
 
     def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:
-        """SI operations by capability; what a model cannot do is absent."""
+        """Driver functions in SI units, by capability; what a model cannot do is absent."""
         return _AXIS if model == "metronome" else {}
 
     def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:

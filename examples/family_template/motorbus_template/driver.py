@@ -25,7 +25,7 @@ from motorbus.core.request import (
     TimeoutClass,
 )
 from motorbus.core.setpoint import Setpoint
-from motorbus.core.steps import Exclusive, WaitFor, catch, with_cleanup
+from motorbus.core.steps import Exclusive, Guard, WaitFor, catch
 from motorbus.errors import (
     DeviceError,
     LimitExceeded,
@@ -225,7 +225,7 @@ async def write(node: Node, /, **values: Value) -> None:
     orders = [(TABLE[name], _checked(TABLE[name], value)) for name, value in values.items()]
     kept = [(row, raw) for row, raw in orders if row.storage is Storage.EEPROM]
     if kept:
-        await Exclusive(_guarded(node, kept))
+        await Exclusive(_write_eeprom(node, kept))
     for row, raw in orders:
         if row.effect is Effect.MOTION:
             await write_row(node, row, raw, await _goal(node, raw))
@@ -236,7 +236,7 @@ async def write(node: Node, /, **values: Value) -> None:
 async def set_node_id(node: Node, new: int) -> None:
     """Give it another id, 1 to 63, which it takes at its next power-up."""
     TABLE["node_id"].encode(new)
-    await Exclusive(_guarded(node, [(TABLE["node_id"], new)]))
+    await Exclusive(_write_eeprom(node, [(TABLE["node_id"], new)]))
 
 
 def _checked(row: Register, value: Value) -> int:
@@ -255,29 +255,30 @@ def _checked(row: Register, value: Value) -> int:
     return raw
 
 
-async def _guarded(node: Node, orders: list[tuple[Register, int]]) -> None:
-    """Unlock, write, read back, and lock again whatever happens, Ctrl-C and a second Ctrl-C included.
+class Unlocked(Guard):
+    """EEPROM can be written inside the block; locked again after an error, an interrupt and a cancellation."""
 
-    The unlock belongs to what is cleaned up after, for it may have been heard although its answer was not.
-    """
+    def __init__(self, node: Node) -> None:
+        self._node = node
+
+    async def enter(self) -> None:
+        await write_row(self._node, TABLE["lock"], 0)
+
+    async def leave(self, error: BaseException | None) -> None:
+        lock = write_row(self._node, TABLE["lock"], 1)
+        if await catch(lock) is not None:  # not acknowledged, after the retries of the bus
+            await lock
+
+
+async def _write_eeprom(node: Node, orders: list[tuple[Register, int]]) -> None:
+    """Unlock, write, read back, lock."""
     node.limits = None
-    await with_cleanup(_unlocked(node, orders), lambda: _locked(node))
-
-
-async def _unlocked(node: Node, orders: list[tuple[Register, int]]) -> None:
-    await write_row(node, TABLE["lock"], 0)
-    for row, raw in orders:
-        await write_row(node, row, raw)
-        found = await read_row(node, row)
-        if found != raw:
-            raise VerificationFailed(f"{row.name} reads back {found}, not {raw}", node=node.node)
-
-
-async def _locked(node: Node) -> None:
-    """Said again when it was not acknowledged, beside what the bus repeats by itself."""
-    lock = write_row(node, TABLE["lock"], 1)
-    if await catch(lock) is not None:
-        await lock
+    async with Unlocked(node):
+        for row, raw in orders:
+            await write_row(node, row, raw)
+            found = await read_row(node, row)
+            if found != raw:
+                raise VerificationFailed(f"{row.name} reads back {found}, not {raw}", node=node.node)
 
 
 # --- moving -------------------------------------------------------------------------------------------------

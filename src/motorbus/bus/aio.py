@@ -57,7 +57,7 @@ class AsyncBus(BaseBus):
         call = _Call(request)
         with self.turn:
             try:
-                prepared = self.prepare(request)
+                prepared = self.find_prepared(request)
                 if prepared is not None:
                     self.write(prepared)
                     self._direct = prepared, call
@@ -95,7 +95,7 @@ class AsyncBus(BaseBus):
         seconds = self.engine.next_deadline() - self.now()
         if self.engine.gone is not None or self.engine.stopping:
             seconds = min(seconds, IDLE)
-        elif descriptor is None and not (self.engine.idle and not self.engine.listeners):
+        elif descriptor is None and not (self.engine.idle and not self.engine.notification_handlers):
             seconds = min(seconds, LOOK)
         if seconds == inf:
             return
@@ -117,7 +117,7 @@ class AsyncBus(BaseBus):
             else:
                 self.receive(-inf)
                 self.send()
-            if not self.engine.idle or self.engine.listeners:
+            if not self.engine.idle or self.engine.notification_handlers:
                 self.watch()
 
     def _look_for_reply(self, prepared: Prepared, call: _Call) -> None:
@@ -249,7 +249,7 @@ class _Part(Generic[T]):
         self._loop = asyncio.get_running_loop()
         self._thread = get_ident()
         self.tree: TaskTree[T] = TaskTree(
-            bus.engine, procedure, now=bus.now, report=bus.listener(report), settled=self._settled
+            bus.engine, procedure, now=bus.now, report=bus.event_sink(report), settled=self._settled
         )
 
     def _settled(self) -> None:

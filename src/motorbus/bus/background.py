@@ -25,7 +25,7 @@ class BackgroundTask(Generic[T]):
         """Step it whenever the bus is used; for virtual time, which passes only then."""
         bus = self._bus
         with bus.turn:
-            self._tree = TaskTree(bus.engine, self._procedure(), now=bus.now, report=bus.listener(None))
+            self._tree = TaskTree(bus.engine, self._procedure(), now=bus.now, report=bus.event_sink(None))
             bus.background.append(self._tree)
 
     def hurry(self) -> None:

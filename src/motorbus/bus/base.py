@@ -37,7 +37,7 @@ class BaseBus:
 
     `interlock` judges requests that move a motor or switch torque; without it they are refused. `report` gets the
     events of procedures. `journal` gets the journal entries first. `stop_socket` is where another process can request
-    an emergency stop. `warnings` are for the user. `readdressed` is called before a device gets another id.
+    an emergency stop. `warnings` are for the user. `on_id_change` is called before a device gets another id.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class BaseBus:
         self.family = family
         self.report = report
         self.journal = journal
-        self.readdressed: Callable[[IdChanged], None] | None = None
+        self.on_id_change: Callable[[IdChanged], None] | None = None
         self.warnings: tuple[str, ...] = tuple(link.warnings)
         self.engine = Engine(
             family,
@@ -203,7 +203,7 @@ class BaseBus:
 
     # -- prepared requests -------------------------------------------------------------------------------------
 
-    def prepare(self, request: Request[Any]) -> Prepared | None:
+    def find_prepared(self, request: Request[Any]) -> Prepared | None:
         """The prepared form of this request if it may be sent at once, else None. The caller holds the turn.
 
         `Engine.submit` makes the prepared form when the request is sent for the first time.
@@ -298,15 +298,15 @@ class BaseBus:
 
     # -- observers ---------------------------------------------------------------------------------------------
 
-    def listener(self, report: Notify | None) -> Notify | None:
-        """What gets the events of a procedure: the journal first, then `report` or that of the bus."""
-        observer, journal, readdressed = report or self.report, self.journal, self.readdressed
-        if journal is None and readdressed is None:
+    def event_sink(self, report: Notify | None) -> Notify | None:
+        """The function that takes the events of a procedure: it passes them to the journal, then to `report`."""
+        observer, journal, on_id_change = report or self.report, self.journal, self.on_id_change
+        if journal is None and on_id_change is None:
             return observer
 
         def deliver(event: object) -> None:
-            if readdressed is not None and isinstance(event, IdChanged):
-                readdressed(event)
+            if on_id_change is not None and isinstance(event, IdChanged):
+                on_id_change(event)
             if journal is not None and isinstance(event, JournalEntry):
                 journal(event)
             if observer is not None:

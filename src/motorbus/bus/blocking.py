@@ -47,7 +47,7 @@ class Bus(BaseBus):
         try:
             turn.acquire(request.priority)
             try:
-                prepared = self.prepare(request)
+                prepared = self.find_prepared(request)
                 if prepared is not None:
                     return self._receive(prepared, self.write(prepared))
                 job = RequestJob(request, since=since)
@@ -135,7 +135,7 @@ class Bus(BaseBus):
         order = requests[0] if len(requests) == 2 else None
         if len(requests) > 2 or not requests or (order is not None and not self._may_join(order)):
             return None
-        prepared = self.prepare(requests[-1])
+        prepared = self.find_prepared(requests[-1])
         if prepared is not None:
             try:
                 self.write(prepared, order, since)

@@ -89,7 +89,7 @@ class Engine:
         self.positions = LastPositions(family, rate)
         self.in_flight: dict[int, Attempt] = {}
         self.queue: list[Job] = []
-        self.listeners: list[Callable[[Notification], None]] = []
+        self.notification_handlers: list[Callable[[Notification], None]] = []
         self.end_sleeps: list[Callable[[BaseException], None]] = []
         """Called with the error when an emergency stop is latched or the port is lost: procedures that sleep end."""
         self.exclusive: object = None
@@ -450,8 +450,8 @@ class Engine:
             self.statistics.other["notices"] += 1
             notice = event._replace(at=now)
             self.notices.put(notice)
-            for listener in tuple(self.listeners):
-                listener(notice)
+            for handle in tuple(self.notification_handlers):
+                handle(notice)
         else:
             self._take_noise(event, now)
 

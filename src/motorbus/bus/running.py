@@ -71,7 +71,7 @@ class _Part(Generic[T]):
             bus.engine,
             procedure,
             now=bus.link.now,
-            report=bus.listener(report),
+            report=bus.event_sink(report),
             settled=self._settled,
             since=since,
         )
@@ -114,7 +114,11 @@ class _Part(Generic[T]):
         A tree that waits for a notice keeps it until another thread wants it.
         """
         engine = self.bus.engine
-        free = engine.idle and engine.exclusive is None and (not engine.listeners or self.bus.turn.wanted)
+        free = (
+            engine.idle
+            and engine.exclusive is None
+            and (not engine.notification_handlers or self.bus.turn.wanted)
+        )
         if self.holds_turn and (self.tree.root.finished or free or self.bus.waits_for_stop):
             self.holds_turn = False
             self.bus.turn.release()
@@ -123,7 +127,7 @@ class _Part(Generic[T]):
         """Wait for data, a deadline, or the next moment of the tree; without the turn sleep for at most `IDLE`."""
         bus, moment = self.bus, self.tree.next_moment()
         if self.holds_turn:
-            listens = bus.engine.idle and bus.engine.listeners and not bus.link.virtual
+            listens = bus.engine.idle and bus.engine.notification_handlers and not bus.link.virtual
             bus.receive(min(moment, bus.link.now() + LISTEN_TIME) if listens else moment)
         elif not bus.waits_for_stop:
             self._sleep(min(moment - bus.link.now(), IDLE))

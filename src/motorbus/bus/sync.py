@@ -1,4 +1,4 @@
-"""Which nodes are in sync. Decision record 0006.
+"""Which nodes are in sync. Decision record 0039.
 
 A node is out of sync from the first byte of a request to it until its reply is accepted. Before it is asked again the
 bus is silent for a quiet time, then sends a probe: a request whose reply differs in key or length from every reply

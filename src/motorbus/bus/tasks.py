@@ -166,7 +166,7 @@ class TaskTree(Generic[T]):
     def _end(self, timer: Timer, value: Any = None, error: BaseException | None = None) -> None:
         self.timers.remove(timer)
         if timer.listener is not None:
-            self.engine.listeners.remove(timer.listener)
+            self.engine.notification_handlers.remove(timer.listener)
         timer.settle(value, error)
 
     def _step_tree(self, task: Task) -> bool:
@@ -315,7 +315,7 @@ class TaskTree(Generic[T]):
                 self._end(timer, error=error)
 
         timer.listener = listen
-        self.engine.listeners.append(listen)
+        self.engine.notification_handlers.append(listen)
         self.timers.append(timer)
 
     # -- cancelled ---------------------------------------------------------------------------------------------

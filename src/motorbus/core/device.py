@@ -1,7 +1,12 @@
-"""Methods of device classes, blocking and async, made of one list of driver functions, with their types.
+"""One list of driver functions for a blocking and an async device class.
 
-A class lists the functions: `position = verb(driver.position)`; `Servo` and `AsyncServo` derive from it. Every verb
-does I/O and is a method; an attribute never does.
+    class Methods:
+        position = device_method(driver.position)
+
+    class Servo(Methods, BlockingDevice): ...      # position() -> float
+    class AsyncServo(Methods, AsyncDevice): ...    # await position() -> float
+
+A device method does I/O; a plain attribute of a device never does.
 """
 
 from __future__ import annotations
@@ -32,15 +37,15 @@ class AsyncRunner(Protocol):
     async def run(self, runnable: Runnable[T], /) -> T: ...
 
 
-class _Owner:
-    """Base of devices with verbs. A copy drops the cached methods: they are bound to the original."""
+class _Device:
+    """Base of devices. A copy of a device drops the cached methods: they are bound to the original."""
 
     _is_async: ClassVar[bool] = False
 
     def __getstate__(self) -> dict[str, Any]:
         kind = type(self)
         cached = {
-            name for name in self.__dict__ if isinstance(getattr_static(kind, name, None), DeviceMethod)
+            name for name in self.__dict__ if isinstance(getattr_static(kind, name, None), MethodDescriptor)
         }
         return {name: value for name, value in self.__dict__.items() if name not in cached}
 
@@ -48,15 +53,15 @@ class _Owner:
         return f"<{type(self).__name__} {getattr(self, 'node', '')} on {getattr(self, 'bus', None)!r}>"
 
 
-class BlockingDevice(_Owner):
-    """A device whose verbs run on a blocking bus."""
+class BlockingDevice(_Device):
+    """A device whose methods run on a blocking bus."""
 
     def __init__(self, bus: BlockingRunner) -> None:
         self.bus = bus
 
 
-class AsyncDevice(_Owner):
-    """A device whose verbs run on an async bus."""
+class AsyncDevice(_Device):
+    """A device whose methods are coroutines and run on an async bus."""
 
     _is_async = True
 
@@ -64,7 +69,7 @@ class AsyncDevice(_Owner):
         self.bus = bus
 
 
-class DeviceMethod(Generic[P, T]):
+class MethodDescriptor(Generic[P, T]):
     """Base of descriptors that make a method of a driver function; a subclass says how the method runs it.
 
     On a class it gives a function with the signature of the method; `function` of that is the driver function.
@@ -103,8 +108,6 @@ class DeviceMethod(Generic[P, T]):
 
             self._describe(method, owner, self.signature)
             method.function = self.function  # type: ignore[attr-defined]
-            if getattr(owner, "_is_async", False) and sys.version_info >= (3, 12):
-                inspect.markcoroutinefunction(method)
             self._of_class[owner] = method
         return self._of_class[owner]
 
@@ -127,9 +130,11 @@ class DeviceMethod(Generic[P, T]):
         method.__qualname__ = f"{owner.__name__}.{self.name}"
         method.__doc__ = self.function.__doc__
         method.__signature__ = shown
+        if getattr(owner, "_is_async", False) and sys.version_info >= (3, 12):
+            inspect.markcoroutinefunction(method)
 
 
-class device_method(DeviceMethod[P, T]):  # noqa: N801 - used like a function
+class device_method(MethodDescriptor[P, T]):  # noqa: N801 - used like a function
     """Make a method of a driver function: blocking on a `BlockingDevice`, a coroutine on an `AsyncDevice`."""
 
     function: Callable[Concatenate[Any, P], Runnable[T]]
@@ -154,7 +159,7 @@ class device_method(DeviceMethod[P, T]):  # noqa: N801 - used like a function
             return device.bus.run(procedure)
 
         method = self._described(call, device)
-        # Cache it, so that the next call skips this descriptor; not if a subclass overrides the verb and calls `super`.
+        # Cache it, so that the next call skips this descriptor; not if a subclass overrides it and calls `super`.
         if getattr_static(type(device), self.name, None) is self:
             device.__dict__[self.name] = method
         return method

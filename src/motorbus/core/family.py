@@ -124,7 +124,7 @@ class State(NamedTuple):
 
 
 class Health(NamedTuple):
-    """Health of a device, from one cheap exchange. Values that it does not report are None, in `state` too.
+    """Health of a device, from one short request. Values that it does not report are None, in `state` too.
 
     `torque`: torque is on; None without a torque switch. `blank`: volatile settings have their power-up values, as
     after a restart. `restarts`: number of start-up messages received from the device.
@@ -147,9 +147,9 @@ class Positions(NamedTuple):
 class PositionStream(Protocol):
     """Devices of one bus in a control loop, with all data that a cycle needs; see `Family.axis`.
 
-    Its exchanges can run without reading anything first. Those on different lanes may be in flight at once. Before
+    Its requests can run without reading anything first. Those on different lanes may be in flight at once. Before
     `begin` runs or goals are sent, nothing is written. If settings of a device are written through the object that
-    `train` was given, goal exchanges made before are refused; `goals` then uses the new settings or raises
+    `train` was given, goal requests made before are refused; `goals` then uses the new settings or raises
     RequestError.
     """
 
@@ -159,13 +159,13 @@ class PositionStream(Protocol):
 
     @property
     def positions(self) -> Sequence[Request[Positions]]:
-        """Exchanges that together read all positions; may be kept and run again.
+        """Requests that together read all positions; may be kept and run again.
 
-        An exchange that reads several nodes lists silent ones as missing; an exchange for one node raises NoReply.
+        A request that reads several nodes lists silent ones as missing; a request for one node raises NoReply.
         """
 
     def goals(self, to: Mapping[int, float]) -> Sequence[Request[Any]]:
-        """Exchanges that order these goals (rad) for some or all nodes; the gate judges them when they leave.
+        """Requests that order these goals (rad) for some or all nodes; the gate judges them when they leave.
 
         Raises LimitExceeded for a goal that is not finite or that no device of this kind can take, RequestError for
         a node that is not one of these.
@@ -302,7 +302,7 @@ class Device(Protocol):
         value(row, raw) raw(row, value)         conversion with the factors of this device
 
     Persistent rows are written in a guarded sequence. If it opens a lock, the lock is a row named `lock` with a choice
-    "closed", and is always closed again. Reads have rank POLL and effect NONE, so a dry run can identify them.
+    "closed", and is always closed again. Reads have priority POLL and effect NONE, so a dry run can identify them.
     """
 
     @property
@@ -359,13 +359,13 @@ class Family(Protocol):
         """Time (s) on the wire of the request and all expected replies, with the gaps of the protocol."""
 
     def turnaround(self, request: Request[Any]) -> float:
-        """Maximum total time (s) of devices before and between their replies; depends on `exchange.timeout`."""
+        """Maximum total time (s) of devices before and between their replies; depends on `request.reply_within`."""
 
     def quiet_time(self, rate: int) -> float:
         """Time (s) after which no part of an old reply can still arrive; then a node out of sync is probed."""
 
     def echo_test(self) -> Request[Any] | None:
-        """An exchange whose reply has another length than its echo, sent when a bus is opened; None: no echo."""
+        """A request whose reply has another length than its echo, sent when a bus is opened; None: no echo."""
 
     def explain(self, data: bytes) -> list[Explanation]:
         """Explain all frames in these bytes, field by field; a CAN frame is serialized by `CanFrame.flat()`."""
@@ -373,7 +373,7 @@ class Family(Protocol):
     def receiver(self) -> Receiver: ...
 
     def probe(self, node: int, attempt: int) -> Request[bool]:
-        """An exchange without effect; its value is True for the expected content of the reply.
+        """A request without effect; its value is True for the expected content of the reply.
 
         Attempts cycle through several probes whose replies differ in key or length. No reply has the length of the echo
         of its request.
@@ -396,10 +396,10 @@ class Family(Protocol):
     def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:
         """Capabilities of devices of this model, by name, in SI units; what a model does not support is absent.
 
-        Each is a function of a device (see `devices`), or several for `train`, and returns an operation:
+        Each is a function of a device (see `devices`), or several for `train`, and returns a procedure or a step:
 
             state position velocity load current voltage temperature    its `State`, or one number
-            health(device)                      its `Health`; for an identified device an exchange that can be kept
+            health(device)                      its `Health`; for an identified device a request that can be kept
             enable_torque(device)               torque on without a jump
             disable_torque(device)              torque off
             move(device, to, *, wait)           to a position (rad)
@@ -411,8 +411,8 @@ class Family(Protocol):
             limits(device)                      lowest and highest position (rad) in its settings; read if unknown
             travel(device)                      range (rad) in which its limits must lie; None: unknown
             cap_torque(device, fraction)  cap_current(device, ampere)   limit until power-off
-            train(devices, *, rate) -> Operation[Train]                 for a control loop; rate in bit/s
-            keep_time(device, angle, timing, *, velocity, acceleration) -> Operation[Turned]
+            train(devices, *, rate) -> PositionStream                 for a control loop; rate in bit/s
+            keep_time(device, angle, timing, *, velocity, acceleration) -> Turned
                 turn by `angle` (rad) with its own profile, begin and end with the other devices of `timing`; at most
                 `velocity` (rad/s) and `acceleration` (rad/s²) where the device supports that
         """

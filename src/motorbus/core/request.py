@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Final, Generic, NamedTuple, TypeAlias, TypeVar
 
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.setpoint import Deferred, Setpoint
-from motorbus.errors import MotorbusError
+from motorbus.errors import MotorbusError, RequestError
 
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
@@ -22,7 +22,7 @@ Key: TypeAlias = Hashable
 
 
 class Priority(IntEnum):
-    """Priority among waiting exchanges: the lowest number leaves first."""
+    """Priority among waiting requests: the lowest number leaves first."""
 
     STOP = 0
     CONTROL = 1
@@ -68,7 +68,7 @@ class Any_(Enum):  # noqa: N801 - typing.Any is taken
 ANY: Final = Any_.ANY
 EVERY_LANE: Final = -1
 """Lane of a request to all nodes of a bus where each node has its own lane. Its replies are `ANY`: it takes the replies
-of any lane that no other exchange expects."""
+of any lane that no other request expects."""
 
 
 class Reply(NamedTuple):
@@ -129,7 +129,14 @@ class Step(Generic[T_co]):
     __slots__ = ()
 
     def __await__(self) -> Generator[Step[Any], Any, T_co]:
-        value: T_co = yield self
+        try:
+            value: T_co = yield self
+        except RuntimeError as error:
+            if not str(error).startswith("Task got bad yield"):  # of asyncio
+                raise
+            raise RequestError(
+                f"{type(self).__name__} was awaited outside of a procedure", advice="use `await bus.run(...)`"
+            ) from None
         return value
 
 

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 
 
 class Stays(Enum):
-    """Marks a goal that moves nothing. The driver sets it; it is never derived from the numbers of the goal."""
+    """Marks a setpoint that moves nothing. The driver sets it; it is never derived from the numbers."""
 
     STILL = "still"
     """Hold the present position, or rest without torque: ends a movement; the gate always lets it pass."""
@@ -19,7 +19,7 @@ class Setpoint(NamedTuple):
     """What a motion request asks of one node, in API units, with the limits in force when the request was made.
 
     `quantity` is position or relative (rad); velocity (rad/s), load (fraction) or current (A), which the node follows
-    until the next order; speed (rad/s), cap (A) or time (a share of the longest), which only bound a movement; or
+    until the next setpoint; speed (rad/s), cap (A) or time (a share of the longest), which only bound a movement; or
     torque (1: on). A limit is None where it is unknown; the gate refuses what it cannot judge.
     """
 
@@ -32,21 +32,21 @@ class Setpoint(NamedTuple):
 
 
 def torque_on(node: int) -> Setpoint:
-    """The goal of a request that only enables torque, or lets the node accept goals."""
+    """The setpoint of a request that only enables torque, or lets the node accept goals."""
     return Setpoint(node, "torque", 1.0, 1.0, 1.0, Stays.ON)
 
 
 def torque_off(node: int) -> Setpoint:
-    """The goal of a request that disables torque: the node rests, whatever its earlier goals."""
+    """The setpoint of a request that disables torque: the node rests, whatever its earlier goals."""
     return Setpoint(node, "torque", 0.0, 0.0, 0.0, Stays.STILL)
 
 
 class Deferred:
-    """Marks a request whose goals do not take effect on arrival, or that makes such goals take effect.
+    """Marks a request whose setpoints do not take effect on arrival, or that makes such setpoints take effect.
 
-    Without `begins` its goals wait in `node` and replace those that waited there. With `begins` the goals that wait in
-    `node` (None: in all nodes) take effect. `done`: the request was acknowledged; the driver sets it, where devices
-    acknowledge such a request at all.
+    Without `begins` its setpoints wait in `node` and replace those that waited there. With `begins` the setpoints that
+    wait in `node` (None: in all nodes) take effect. `done`: the request was acknowledged; the driver sets it where
+    devices acknowledge such a request.
     """
 
     __slots__ = ("begins", "done", "node")

@@ -177,9 +177,7 @@ class Guard:
             await Shielded(self.leave(error))
 
 
-class CleanUp(Guard):
-    """A guarded sequence that ends with the procedure that this function makes."""
-
+class _CleanUp(Guard):
     def __init__(self, function: Callable[[], Runnable[object]]) -> None:
         self._function = function
 
@@ -189,7 +187,7 @@ class CleanUp(Guard):
 
 async def with_cleanup(runnable: Runnable[T], clean_up: Callable[[], Runnable[object]]) -> T:
     """Run `runnable`, then `clean_up()`, whatever is raised; see `Guard`."""
-    async with CleanUp(clean_up):
+    async with _CleanUp(clean_up):
         return await runnable
 
 

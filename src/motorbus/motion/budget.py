@@ -17,10 +17,10 @@ from motorbus.core.family import Family, PositionStream
 from motorbus.core.request import ANY, Request
 from motorbus.errors import RequestError
 from motorbus.motion import limits
-from motorbus.motion.abreast import Abreast, settled
 from motorbus.motion.body import Body
 from motorbus.motion.capabilities import AxisVerbs
 from motorbus.motion.loop.cycle import train_of
+from motorbus.motion.parallel import Parallel, settled
 
 ROUNDING: Final = 1e-9
 
@@ -84,7 +84,7 @@ class RobotBudget:
 
 def budget(
     body: Body, rate: float = 0.0, axes: str | Iterable[str] | None = None, *, turnaround: float = 0.0
-) -> Abreast[RobotBudget]:
+) -> Parallel[RobotBudget]:
     """What a loop over these axes would load each bus with, and the highest rate (Hz) it could have.
 
     `turnaround` is how long (s) each device thinks before it answers; it counts where one exchange follows the other.
@@ -104,7 +104,7 @@ def budget(
     def combine(results: Mapping[str, Any]) -> RobotBudget:
         return RobotBudget(rate, settled(results), without)
 
-    return Abreast({bus: of(bus, there) for bus, there in body.by_bus(led).items()}, combine)
+    return Parallel({bus: of(bus, there) for bus, there in body.by_bus(led).items()}, combine)
 
 
 def divided(axes: Mapping[str, AxisVerbs]) -> tuple[dict[str, AxisVerbs], tuple[str, ...]]:

@@ -17,9 +17,9 @@ from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion.command import Command
 from motorbus.motion.machine import AxisSpec
 from motorbus.motion.reckoning import Movement, Place, Reckoning, checked_place, is_reckoned
-from motorbus.motion.safety import canary
+from motorbus.motion.safety import restarts
 from motorbus.motion.safety.blame import blamed
-from motorbus.motion.safety.canary import Canary
+from motorbus.motion.safety.restarts import RestartDetector
 from motorbus.motion.safety.track import Track, believed
 from motorbus.motion.safety.turning import Resting
 from motorbus.motion.several import named, names
@@ -115,7 +115,7 @@ class AxisVerbs:
         self.orders = 0
         self._movement: Movement | None = None
         self.track = Track()
-        self.canary = Canary()
+        self.restarts = RestartDetector()
         self.recognised(able)
 
     def recognised(self, able: Able, model: str = "") -> None:
@@ -191,7 +191,7 @@ class AxisVerbs:
         Where the position is reckoned it is not known until `arrives`. Raises as `refuse_under_way`.
         """
         self.refuse_under_way()
-        canary.expected(self)
+        restarts.expected(self)
         self.orders += 1
         begun = Movement(accounted=False) if movement is None else movement
         begun.engaged, begun.under_way = self.engaged, self.under_way
@@ -268,7 +268,7 @@ async def state(axis: AxisVerbs) -> State:
     found, quality = await _judged(axis)
     if quality is Quality.SUSPECT:
         found, quality = await _judged(axis)
-    await canary.looked_after(axis, found.at)
+    await restarts.looked_after(axis, found.at)
     spec = axis.spec
     return found._replace(
         quality=quality,
@@ -334,12 +334,12 @@ async def enable_torque(axis: AxisVerbs) -> None:
     when somebody lets it go, stops it or moves it meanwhile: then no torque comes behind that; Refused while it is at
     fault; Faulted where it had torque from here and its device has not kept it.
     """
-    canary.check(axis)
+    restarts.check(axis)
     axis.orders += 1
     command = Command([axis])
-    await canary.unbroken(axis)
+    await restarts.unbroken(axis)
     command.check()
-    canary.expected(axis)
+    restarts.expected(axis)
     axis.engaged = True
     try:
         await command.watched(_given_torque(axis))
@@ -347,7 +347,7 @@ async def enable_torque(axis: AxisVerbs) -> None:
         if (lost := command.lost()) is not None:
             raise lost from error
         raise
-    canary.armed(axis)
+    restarts.armed(axis)
 
 
 async def _given_torque(axis: AxisVerbs) -> None:
@@ -393,6 +393,6 @@ async def hold(axis: AxisVerbs) -> None:
     if "enable_torque" in axis.able:
         await enable_torque(axis)
         axis.under_way = False
-        await canary.kept(axis)
+        await restarts.kept(axis)
     else:
         await stop(axis)

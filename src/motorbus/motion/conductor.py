@@ -12,7 +12,7 @@ from motorbus.bus import aio, running
 from motorbus.bus.aio import AsyncBus
 from motorbus.bus.blocking import Bus
 from motorbus.errors import MotorbusError
-from motorbus.motion.abreast import Abreast
+from motorbus.motion.parallel import Parallel
 from motorbus.motion.safety.blame import raise_blamed
 
 T = TypeVar("T")
@@ -24,7 +24,7 @@ class Conductor:
     def __init__(self, buses: Mapping[str, Bus]) -> None:
         self._buses = buses
 
-    def run(self, work: Abreast[T]) -> T:
+    def run(self, work: Parallel[T]) -> T:
         """Carry out everything, then combine.
 
         Raises what `combine` raises, and Refused for what was ended because the lease was lost. Whatever is no
@@ -37,7 +37,7 @@ class Conductor:
             raise_blamed(error, self._buses.values())
             raise
 
-    def _run(self, work: Abreast[T]) -> T:
+    def _run(self, work: Parallel[T]) -> T:
         procedures = work.operations
         if len(procedures) != 1:
             values = running.run_on({self._buses[name]: wanted for name, wanted in procedures.items()})
@@ -56,7 +56,7 @@ class LoopConductor:
     def __init__(self, buses: Mapping[str, AsyncBus]) -> None:
         self._buses = buses
 
-    async def run(self, work: Abreast[T]) -> T:
+    async def run(self, work: Parallel[T]) -> T:
         """As `Conductor.run`. A cancelled task first cleans up on every bus, then raises CancelledError."""
         try:
             return await self._run(work)
@@ -64,7 +64,7 @@ class LoopConductor:
             raise_blamed(error, self._buses.values())
             raise
 
-    async def _run(self, work: Abreast[T]) -> T:
+    async def _run(self, work: Parallel[T]) -> T:
         procedures = work.operations
         if len(procedures) != 1:
             values = await aio.run_on({self._buses[name]: wanted for name, wanted in procedures.items()})

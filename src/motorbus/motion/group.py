@@ -16,9 +16,9 @@ from motorbus.core.steps import Procedure
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion import capabilities as one
 from motorbus.motion import reckoning
-from motorbus.motion.abreast import Abreast
 from motorbus.motion.body import Body
 from motorbus.motion.capabilities import AxisVerbs
+from motorbus.motion.parallel import Parallel
 from motorbus.motion.safety import standstill
 from motorbus.motion.safety.standstill import Stopped
 from motorbus.motion.several import Act, Told, everyone, insisted, of_each, raised
@@ -27,7 +27,7 @@ Names: TypeAlias = "str | Iterable[str] | None"
 """Names of axes, groups and buses; None: all axes that are open."""
 
 
-def positions(body: Body, names: Names = None) -> Abreast[dict[str, float | None]]:
+def positions(body: Body, names: Names = None) -> Parallel[dict[str, float | None]]:
     """Where each is (rad, m), by name, as its device measures it or, where it does not, *estimated*: see `estimated`.
 
     None where nobody knows: a reckoned axis that was not homed. Raises what one of them raised, when all were asked.
@@ -41,13 +41,13 @@ def positions(body: Body, names: Names = None) -> Abreast[dict[str, float | None
     return _each(body, measured, one.position, told)
 
 
-def states(body: Body, names: Names = None) -> Abreast[dict[str, State]]:
+def states(body: Body, names: Names = None) -> Parallel[dict[str, State]]:
     """One sample of each that tells one, by name. Raises what one of them raised, when all were asked."""
     axes = {name: axis for name, axis in body.chosen(names).items() if "state" in axis.able}
     return _each(body, axes, one.state, dict)
 
 
-def enable_torque(body: Body, names: Names = None) -> Abreast[None]:
+def enable_torque(body: Body, names: Names = None) -> Parallel[None]:
     """Torque on, without a jump, for each that has a switch for it, with the caps of the machine file.
 
     Raises RequestError when none of them has one, else what one of them raised, when all were visited.
@@ -55,12 +55,12 @@ def enable_torque(body: Body, names: Names = None) -> Abreast[None]:
     return _each(body, _able(body, names, "enable_torque"), one.enable_torque, _nothing)
 
 
-def disable_torque(body: Body, names: Names = None) -> Abreast[None]:
+def disable_torque(body: Body, names: Names = None) -> Parallel[None]:
     """Limp: each that has a switch for its torque, whatever happens. Raises as `enable_torque`."""
     return _each(body, _able(body, names, "disable_torque"), one.disable_torque, _nothing, insisted)
 
 
-def stop(body: Body, names: Names = None) -> Abreast[dict[str, Enum]]:
+def stop(body: Body, names: Names = None) -> Parallel[dict[str, Enum]]:
     """Decelerate and stay, each of them, whatever happens; gives what each device promises, by name.
 
     An interruption, and what one of them raised, is raised when all were visited.
@@ -70,7 +70,7 @@ def stop(body: Body, names: Names = None) -> Abreast[dict[str, Enum]]:
 
 def stopped(
     body: Body, names: Names = None, *, patience: float = standstill.PATIENCE
-) -> Abreast[dict[str, Stopped]]:
+) -> Parallel[dict[str, Stopped]]:
     """As `stop`, then look whether they rest, for at most `patience` s; gives what was promised and what was seen.
 
     Everyone is stopped before anybody is looked at. That one was not seen to rest is no error: see `Stopped.rest`. An
@@ -86,14 +86,14 @@ async def _looked_at(axes: Sequence[AxisVerbs], act: Act[Enum], patience: float)
     return {**told, **looked}
 
 
-def hold(body: Body, names: Names = None) -> Abreast[None]:
+def hold(body: Body, names: Names = None) -> Parallel[None]:
     """Stay, with torque: torque on without a jump where there is a switch for it, else a stop. Raises as `stop`."""
     return _each(body, body.chosen(names), one.hold, _nothing)
 
 
 def home(
     body: Body, names: Names = None, *, deadline: float | None = None, velocity: float | None = None
-) -> Abreast[dict[str, float]]:
+) -> Parallel[dict[str, float]]:
     """Send each that has a switch to go to there, at most for so long (s); gives where each is then (rad, m).
 
     The `velocity` (rad/s, m/s) is that of each; None: as its device is set, or `max_velocity` where that is less.
@@ -110,7 +110,7 @@ def _each(
     act: Act[Any],
     combined: Callable[[dict[str, Any]], Any],
     how: Callable[[list[AxisVerbs], Act[Any]], Procedure[Told]] = everyone,
-) -> Abreast[Any]:
+) -> Parallel[Any]:
     """Do it to each of these, and make of what came of them what is wanted; in the order of the names."""
     parts = body.by_bus(axes)
 
@@ -118,7 +118,7 @@ def _each(
         told = of_each(parts, results)
         return combined(raised({name: told[name] for name in axes}))
 
-    return Abreast({bus: how(there, act) for bus, there in parts.items()}, combine)
+    return Parallel({bus: how(there, act) for bus, there in parts.items()}, combine)
 
 
 def _able(body: Body, names: Names, needs: str) -> dict[str, AxisVerbs]:

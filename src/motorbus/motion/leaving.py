@@ -16,10 +16,10 @@ from typing import Any, Final, TypeAlias
 from motorbus.core.steps import Procedure, catch
 from motorbus.errors import Interrupted, MotorbusError, NotHomed, Stalled
 from motorbus.motion import capabilities as one
-from motorbus.motion.abreast import Abreast
 from motorbus.motion.body import Body
 from motorbus.motion.capabilities import AxisVerbs
 from motorbus.motion.moving.verbs import park
+from motorbus.motion.parallel import Parallel
 from motorbus.motion.safety.gate import Gate
 from motorbus.motion.safety.standstill import Rest, watched
 from motorbus.motion.several import Act, Told, errors_of, everyone, gathered, insisted, of_each
@@ -54,7 +54,7 @@ class Leaving:
         self._parking: list[str] = []
         self._hurried = False
 
-    def work(self) -> Abreast[Any] | None:
+    def work(self) -> Parallel[Any] | None:
         """What to do next; None when all is done."""
         return (
             self._visit("stop", self._to_stop(), one.stop)
@@ -123,7 +123,7 @@ class Leaving:
 
     def _visit(
         self, step: str, names: Iterable[str], act: Act[Any], how: How = insisted
-    ) -> Abreast[Any] | None:
+    ) -> Parallel[Any] | None:
         """Do it to each of these who has not been visited in this step; None when there is none left."""
         axes = {name: self._axes[name] for name in names if (step, name) not in self._visited}
         if not axes or self._tries.get(step, 0) >= TRIES:
@@ -136,7 +136,7 @@ class Leaving:
             self._visited.update((step, name) for name in told)
             self.errors.update(errors_of(told))
 
-        return Abreast({bus: how(there, self._noting(step, act)) for bus, there in parts.items()}, combine)
+        return Parallel({bus: how(there, self._noting(step, act)) for bus, there in parts.items()}, combine)
 
     def _noting(self, step: str, act: Act[Any]) -> Act[Any]:
         """The same, which counts as visited as soon as it has ended, even when an interruption takes the result."""
@@ -153,7 +153,7 @@ class Leaving:
 
         return noted
 
-    def _park(self) -> Abreast[Any] | None:
+    def _park(self) -> Parallel[Any] | None:
         if self._parks is None:
             self._parks = self._first_parks()
         self._parking = []
@@ -190,7 +190,7 @@ class Leaving:
 
 def _fell(axis: AxisVerbs) -> bool:
     """It had torque from here when it came to be at fault, and may have some again: letting go is all that is done."""
-    return axis.canary.fell and axis.spec.exit == "torque_off"
+    return axis.restarts.fell and axis.spec.exit == "torque_off"
 
 
 async def _rest(axis: AxisVerbs) -> Rest:

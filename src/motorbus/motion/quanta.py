@@ -17,10 +17,10 @@ from typing import Any, Final, Self
 
 from motorbus.errors import RequestError
 from motorbus.motion import limits
-from motorbus.motion.abreast import Abreast, settled
 from motorbus.motion.loop.faces import AsyncLoop, Loop
 from motorbus.motion.loop.readings import LoopState
 from motorbus.motion.moving.jogging import jog
+from motorbus.motion.parallel import Parallel, settled
 
 QUANTUM: Final = 0.2
 """s of travel that a beat is worth; with what a command is ahead of the device less than the 0.25 s that it may be."""
@@ -81,9 +81,9 @@ class _Jog:
             yield
             self._goal = ahead
 
-    def _own(self) -> Abreast[Any]:
+    def _own(self) -> Parallel[Any]:
         """One bounded move, of an axis that nobody can lead."""
-        return Abreast({self._axis.spec.bus: jog(self._axis, self._velocity, QUANTUM)}, settled)
+        return Parallel({self._axis.spec.bus: jog(self._axis, self._velocity, QUANTUM)}, settled)
 
 
 class Jogging(_Jog):

@@ -16,7 +16,7 @@ from motorbus.core.steps import Runnable, discard
 from motorbus.errors import LimitExceeded, MotionError, MotorbusError, NotHomed, RequestError
 from motorbus.motion import limits
 from motorbus.motion.machine.model import FARTHEST
-from motorbus.motion.safety import canary
+from motorbus.motion.safety import restarts
 
 if TYPE_CHECKING:
     from motorbus.motion.capabilities import AxisVerbs
@@ -126,7 +126,7 @@ async def journey(axis: AxisVerbs, work: Runnable[T], place: Callable[[Movement,
     """
     movement = Movement()
     try:
-        canary.check(axis)
+        restarts.check(axis)
     except MotorbusError:
         discard(work)
         raise

@@ -12,11 +12,11 @@ from typing import Any, Final, NamedTuple
 from motorbus.core.family import Identity
 from motorbus.core.steps import Runnable
 from motorbus.errors import DeviceError, LimitExceeded, MotorbusError, NoReply, RequestError
-from motorbus.motion.abreast import Abreast
 from motorbus.motion.body import Body
 from motorbus.motion.capabilities import AxisVerbs
 from motorbus.motion.limits import Device, check_goal
 from motorbus.motion.machine.refusal import of_file
+from motorbus.motion.parallel import Parallel
 from motorbus.motion.several import everyone, of_each, raised
 
 ASKED: Final = "nothing was sent but questions"
@@ -24,7 +24,7 @@ _SLACK: Final = 1e-6
 """Of the travel: a limit in degrees is rounded."""
 
 
-def recognise(body: Body) -> Abreast[None]:
+def recognise(body: Body) -> Parallel[None]:
     """Ask each device what it is, the buses at the same time, and tell its axis what it can do.
 
     Raises NoReply, naming axis, device and address, for one that does not answer; RequestError for one of which nobody
@@ -40,7 +40,7 @@ def recognise(body: Body) -> Abreast[None]:
         with of_file(body.machine.file):
             raised(told)
 
-    return Abreast({bus: everyone(there, _asked) for bus, there in parts.items()}, combine)
+    return Parallel({bus: everyone(there, _asked) for bus, there in parts.items()}, combine)
 
 
 class Asked(NamedTuple):

@@ -121,7 +121,7 @@ def _try(address: str) -> None:
 
 
 def _can_be_judged(address: str) -> bool:
-    """False without python-can: whoever opens that bus is told so, and others can do without it."""
+    """False without python-can: opening that bus raises an error, other buses do not need it."""
     try:
         lock_name(address, {})
     except LinkError:
@@ -130,9 +130,9 @@ def _can_be_judged(address: str) -> bool:
 
 
 def estop_options(machine: Machine, bus: str) -> dict[str, object]:
-    """The options with which this bus of a machine is opened, so that its emergency stop does as `estop` says.
+    """The options of this bus of a machine by the `estop` of its axes.
 
-    All axes of the file count, also those that are not wanted, and whom the address itself names as well.
+    All axes of the file count, also those that are not opened, and the ids that the address names.
     """
     address = parse_address(machine.buses[bus].address)
     held = [str(axis.node) for axis in machine.axes.values() if (axis.bus, axis.estop) == (bus, "hold")]

@@ -29,7 +29,6 @@ from motorbus.bus.stop_socket import StopOutcome
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.link.memory import MemoryLink, share_clock
 from motorbus.motion import group
-from motorbus.motion.abreast import Led, LedAsync, together
 from motorbus.motion.axis import AsyncAxis, Axis
 from motorbus.motion.body import Body
 from motorbus.motion.budget import budget
@@ -39,11 +38,12 @@ from motorbus.motion.leaving import Leaving
 from motorbus.motion.loop.faces import awaiting_loop, blocking_loop, looped
 from motorbus.motion.machine import NAME, Machine
 from motorbus.motion.moving import verbs as moving
+from motorbus.motion.parallel import Led, LedAsync, together
 from motorbus.motion.quanta import awaiting_jogging, blocking_jogging
 from motorbus.motion.recognition import recognise
 from motorbus.motion.safety.fence import fence
 from motorbus.motion.teach import teach
-from motorbus.session.attended import Leased, awaiting_attended, blocking_attended
+from motorbus.session.deadman import Leased, awaiting_attended, blocking_attended
 from motorbus.session.echo import LOG
 from motorbus.session.faults import clear, distrust, faults
 from motorbus.session.plan import Plan, loaded
@@ -115,16 +115,16 @@ class RobotVerbs(Leased):
 
     @property
     def faults(self) -> dict[str, str]:
-        """Why each axis that is at fault is so, by its name: its device has restarted, or has let go by itself, or a
-        guarded change of it was cut off. Such an axis is not moved and gets no torque; stop and torque off always go.
+        """The reason of each axis that is at fault, by name: its device restarted, lost its torque, or a guarded change
+        of it is unfinished. Such an axis does not move and gets no torque; stop and torque off always pass.
         """
         return faults(self)
 
     def clear_fault(self, names: Names = None) -> None:
-        """Somebody has seen to these axes: they may be given torque and moved again. None: all that are at fault.
+        """Clear the fault of these axes, so that they may move again. None: all that are at fault.
 
-        Nothing is sent. Raises RequestError for a name that there is not; Refused, and none is cleared, for one whose
-        guarded change is unfinished still: `motorbus recover` ends that.
+        Sends nothing. Raises RequestError for an unknown name; Refused, and clears none, if a guarded change of one is
+        unfinished: `motorbus recover` ends it.
         """
         clear(self, names)
 
@@ -155,9 +155,9 @@ class RobotVerbs(Leased):
         reset(self)
 
     def _ended(self, leaving: Leaving, others: BaseException | None) -> None:
-        """Say what leaving did not achieve, and let whoever wants to know look at what came of it."""
+        """Report what leaving did not achieve, then call `when_left`."""
         try:
-            self._told(leaving, others)
+            self._report_errors(leaving, others)
         finally:
             self._shown(leaving, others)
 
@@ -165,8 +165,8 @@ class RobotVerbs(Leased):
         if self.when_left is not None:
             self.when_left(leaving, others)
 
-    def _told(self, leaving: Leaving, others: BaseException | None) -> None:
-        """As an error, or as a note of what is being raised already."""
+    def _report_errors(self, leaving: Leaving, others: BaseException | None) -> None:
+        """Raise the error of leaving, or add it as a note to `others`."""
         self._said = tuple(leaving.said)
         for text in leaving.said:
             LOG.warning("%s", text)
@@ -387,9 +387,9 @@ class AsyncRobot(RobotVerbs, LedAsync):
                 await self.conductor.run(work)
             except MotorbusError as error:
                 leaving.failed(error)
-            except GeneratorExit:  # nobody will await us again: what was begun has cleaned up
+            except GeneratorExit:  # the coroutine was closed: what was begun has cleaned up
                 raise
-            except BaseException as interruption:  # cancelled once more: less waiting, and nobody is left out
+            except BaseException as interruption:  # cancelled again: wait less, visit every axis
                 caught = interruption
 
 

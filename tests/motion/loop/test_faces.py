@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 from motorbus.errors import LimitExceeded, RequestError
-from motorbus.motion.abreast import Abreast, Led
 from motorbus.motion.body import Body
 from motorbus.motion.loop.faces import AsyncLoop, Errand, Loop, LoopFace, looped
 from motorbus.motion.loop.readings import LoopState
+from motorbus.motion.parallel import Led, Parallel
 from motorbus.session.robot import AsyncRobot, Robot
 from tests.support.machines import Heard, machine
 
@@ -138,7 +138,7 @@ def counted(body: Body, count: int, *, interrupts: bool = False, endless: bool =
         return await body.axes["a1"].able["position"](body.axes["a1"].device)
 
     return Errand(
-        Counting(count, interrupts), 100, ("a1",), lambda: Abreast({"arm": asks()}, dict), endless=endless
+        Counting(count, interrupts), 100, ("a1",), lambda: Parallel({"arm": asks()}, dict), endless=endless
     )
 
 

@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 
 from motorbus.errors import Faulted, MotorbusError, Overloaded, Refused
-from motorbus.motion.safety.canary import HEALTH
+from motorbus.motion.safety.restarts import HEALTH
 from motorbus.motion.safety.watch import OVERDUE
 from motorbus.session.robot import Robot
 from tests.motion.loop.test_rounds import RATE, cycles, looping
-from tests.safety.test_canary import Drops
+from tests.safety.test_restarts import Drops
 from tests.support.machines import Heard, machine
 
 

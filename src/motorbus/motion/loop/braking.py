@@ -11,9 +11,9 @@ from typing import Any
 
 from motorbus.core.request import Request
 from motorbus.errors import Interrupted, LimitExceeded, MotorbusError
-from motorbus.motion.abreast import Abreast, settled
 from motorbus.motion.loop.cycle import Part
 from motorbus.motion.loop.grid import Grid
+from motorbus.motion.parallel import Parallel, settled
 
 
 async def braked(parts: Mapping[str, Part], grid: Grid) -> None:
@@ -51,7 +51,7 @@ async def _cycle(parts: Mapping[str, Part], moment: float, failures: dict[str, M
             orders[bus] = part.orders(1)
         except MotorbusError as error:
             failures[bus] = error
-    told: Mapping[str, Any] = await Abreast(
+    told: Mapping[str, Any] = await Parallel(
         {bus: parts[bus].cycle(sent, moment) for bus, sent in orders.items()}, dict
     )
     for bus, found in told.items():

@@ -28,7 +28,7 @@ from motorbus.motion.command import Command
 from motorbus.motion.loop.errors import stopped
 from motorbus.motion.loop.place import Place
 from motorbus.motion.moving.forgiving import LOST
-from motorbus.motion.safety import canary
+from motorbus.motion.safety import restarts
 from motorbus.motion.safety.track import FASTEST, MARGIN, TREMBLING
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ class Part:
         self.reads: Final = tuple(train.positions)
         self.exactly = False
         self.began = self.ended = 0.0
-        self.abreast: Final = len({request.lane for request in self.reads}) > 1
+        self.overlaps: Final = len({request.lane for request in self.reads}) > 1
         self.command = Command(())
         self.refused: list[LimitExceeded] = []
         self.watch = watch
@@ -154,7 +154,7 @@ class Part:
         self.began = self.link.now() - self.origin
         told: list[Any] = []
         wanted = (*orders, *self.reads)
-        if self.abreast:
+        if self.overlaps:
             told = list(await gather(*[_kept(request) for request in wanted]))
         else:
             for request in wanted:
@@ -281,12 +281,12 @@ class Part:
         """
         axes = [place.axis for place in fresh]
         for axis in axes:
-            canary.check(axis)
+            restarts.check(axis)
         command = _claimed(fresh)
         train = await train_of(self.bus, axes)
         try:
             for axis in axes:
-                await canary.unbroken(axis)
+                await restarts.unbroken(axis)
             command.depart()
             angles = await _begun(train, command, self.watch)
         except Faulted:

@@ -30,15 +30,15 @@ from contextlib import contextmanager
 from typing import Any, Concatenate, Generic, NamedTuple, ParamSpec, Protocol, Self, TypeVar, overload
 
 from motorbus.bus.blocking import Bus
-from motorbus.core.device import DeviceMethod
+from motorbus.core.device import MethodDescriptor
 from motorbus.errors import MotorbusError
-from motorbus.motion.abreast import Abreast, AsyncConductor, BlockingConductor, Led, LedAsync, Works
 from motorbus.motion.body import Body
 from motorbus.motion.budget import RobotBudget
 from motorbus.motion.clamping import Policy
 from motorbus.motion.loop.grid import Statistics
 from motorbus.motion.loop.readings import LoopState
 from motorbus.motion.loop.rounds import Rounds
+from motorbus.motion.parallel import AsyncConductor, BlockingConductor, Led, LedAsync, Parallel, Works
 from motorbus.motion.safety.blame import raise_blamed
 
 P = ParamSpec("P")
@@ -254,7 +254,7 @@ def _told(failure: MotorbusError, error: BaseException | None) -> None:
     error.add_note(f"and on leaving the loop: {failure}")
 
 
-def _carried(works: Works[T], run: Callable[[Abreast[Any]], Any]) -> T:
+def _carried(works: Works[T], run: Callable[[Parallel[Any]], Any]) -> T:
     """Carry out one piece of work after the other, and give what they come to."""
     try:
         work = works.send(None)
@@ -270,7 +270,7 @@ def _carried(works: Works[T], run: Callable[[Abreast[Any]], Any]) -> T:
         return found
 
 
-async def _awaited(works: Works[T], run: Callable[[Abreast[Any]], Coroutine[Any, Any, Any]]) -> T:
+async def _awaited(works: Works[T], run: Callable[[Parallel[Any]], Coroutine[Any, Any, Any]]) -> T:
     try:
         work = works.send(None)
         while True:
@@ -312,14 +312,14 @@ class Errand(NamedTuple, Generic[T]):
     course: Course[T]
     rate: float
     axes: tuple[str, ...]
-    before: Callable[[], Abreast[Any]] | None = None
+    before: Callable[[], Parallel[Any]] | None = None
     jerk: float | None = None
     endless: bool = False
     failed: Callable[[MotorbusError], None] | None = None
     policy: Policy = "reject"
 
 
-class looped(DeviceMethod[P, T]):  # noqa: N801 - reads as a word in a list of verbs
+class looped(MethodDescriptor[P, T]):  # noqa: N801 - reads as a word in a list of verbs
     """Makes a method of a function that gives an `Errand`: blocking on what is `Led`, awaitable on `LedAsync`."""
 
     returns = "Errand"

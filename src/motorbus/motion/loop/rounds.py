@@ -19,7 +19,6 @@ from motorbus.core.request import Request
 from motorbus.core.steps import Emit
 from motorbus.errors import Faulted, Interrupted, LinkLost, MotorbusError, Overloaded, RequestError
 from motorbus.motion import limits
-from motorbus.motion.abreast import Abreast, settled
 from motorbus.motion.body import Body
 from motorbus.motion.budget import RobotBudget, bus_budget, divided, refuse_above
 from motorbus.motion.capabilities import AxisVerbs
@@ -33,6 +32,7 @@ from motorbus.motion.loop.grid import Grid, Statistics
 from motorbus.motion.loop.place import CATCH_UP, Place
 from motorbus.motion.loop.readings import PATIENCE, SILENCE, LoopState, state_of
 from motorbus.motion.moving.forgiving import LOST
+from motorbus.motion.parallel import Parallel, settled
 from motorbus.motion.safety.watch import Watch
 from motorbus.motion.several import named
 
@@ -106,7 +106,7 @@ class Rounds:
                 "the loop was entered before", expected="a new one for each `with`", advice="nothing was sent"
             )
         parts = self._body.by_bus(self._led)
-        opened = await Abreast({bus: self._opening(bus, there) for bus, there in parts.items()}, settled)
+        opened = await Parallel({bus: self._opening(bus, there) for bus, there in parts.items()}, settled)
         self.budget = RobotBudget(self.rate, {bus: found[2] for bus, found in opened.items()}, self.without)
         refuse_above(self.budget)
         for bus, (train, devices, _) in opened.items():
@@ -151,7 +151,7 @@ class Rounds:
         unheard, begun, looks = set(self.places), self.now, 0
         while looks <= PATIENCE or self.now < begun + SILENCE:
             looks += 1
-            told = await Abreast({bus: part.cycle((), 0.0) for bus, part in self.parts.items()}, settled)
+            told = await Parallel({bus: part.cycle((), 0.0) for bus, part in self.parts.items()}, settled)
             for bus, part in self.parts.items():
                 missing = part.take(told[bus])
                 unheard -= {place.name for place in part.places.values()} - set(missing)
@@ -212,7 +212,7 @@ class Rounds:
         if self.buses:
             told = self._exchange(self.buses, orders, moment)
         else:
-            told = await Abreast(
+            told = await Parallel(
                 {bus: part.cycle(orders[bus], moment) for bus, part in self.parts.items()}, dict
             )
         return self._taken(told, moment, grid.number)
@@ -272,7 +272,7 @@ class Rounds:
                 events.setdefault(self.places[event.axis].axis.spec.bus, []).append(event)
         self._clamps.clear()
         if events:
-            await Abreast({bus: _reported(found) for bus, found in events.items()}, settled)
+            await Parallel({bus: _reported(found) for bus, found in events.items()}, settled)
 
     def _release_lost(self) -> None:
         lost = [name for part in self.parts.values() for name in part.release_lost()]
@@ -297,7 +297,7 @@ class Rounds:
     async def _begin(self, fresh: Mapping[str, list[Place]]) -> None:
         self._fresh = True
         try:
-            await Abreast({bus: self.parts[bus].begin(there) for bus, there in fresh.items()}, settled)
+            await Parallel({bus: self.parts[bus].begin(there) for bus, there in fresh.items()}, settled)
         except MotorbusError:
             for part in self.parts.values():
                 part.release_unbegun()

@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 from motorbus.core.steps import gather
 from motorbus.errors import Interrupted, MotorbusError, RequestError
-from motorbus.motion.abreast import Abreast
 from motorbus.motion.command import Command
 from motorbus.motion.meeting import Beat, Meeting, Seat
 from motorbus.motion.moving import parts
 from motorbus.motion.moving.moved import Moved
 from motorbus.motion.moving.plan import Fact, Gone, Plan, Planned
 from motorbus.motion.moving.stream import Fate
+from motorbus.motion.parallel import Parallel
 from motorbus.motion.profile import Limiting
 from motorbus.motion.profile.shapes import NOTHING
-from motorbus.motion.safety import canary
+from motorbus.motion.safety import restarts
 
 if TYPE_CHECKING:
     from motorbus.motion.capabilities import AxisVerbs
@@ -62,7 +62,7 @@ class Journey:
         self._origins: Final = origins
         self._parties: Final = _parties(axes)
         for axis in axes.values():
-            canary.check(axis)
+            restarts.check(axis)
         self._facts: Final = Meeting[Mapping[str, Fact]](self._parties)
         self._beat: Final = Beat(self._parties)
 
@@ -73,10 +73,10 @@ class Journey:
 
     # -- as work on buses ----------------------------------------------------------------------------------------------
 
-    def abreast(self) -> Abreast[Moved]:
+    def work(self) -> Parallel[Moved]:
         """The work on each bus, and what comes of it."""
         buses = dict.fromkeys(axis.spec.bus for axis in self._axes.values())
-        return Abreast({bus: self.on(bus) for bus in buses}, self.combine)
+        return Parallel({bus: self.on(bus) for bus in buses}, self.combine)
 
     async def on(self, bus: str) -> list[Gone]:
         """All that is to do on one bus."""

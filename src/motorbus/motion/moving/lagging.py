@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 from motorbus.errors import Interrupted, NoReply, Stalled
-from motorbus.motion.safety.canary import PROTECTIVE
+from motorbus.motion.safety.restarts import PROTECTIVE
 
 if TYPE_CHECKING:
     from motorbus.motion.capabilities import AxisVerbs

@@ -22,7 +22,7 @@ from motorbus.motion.moving.moved import STILL, Arrived, Track
 from motorbus.motion.moving.plan import Fact, Gone, Planned
 from motorbus.motion.moving.stream import SETTLE, SHOWN, TOLERANCE, Stream, Streamed, grains, rate_for
 from motorbus.motion.reckoning import Movement, cut_short
-from motorbus.motion.safety import canary
+from motorbus.motion.safety import restarts
 from motorbus.motion.safety.watch import Watch
 from motorbus.motion.several import named, names
 
@@ -184,7 +184,7 @@ class LedPart:
         angles = await self._angles(train)
         for axis in self._axes:
             _check_still(axis, facts[axis.name].position, axis.spec.from_device(angles[axis.spec.node]))
-            await canary.unbroken(axis)
+            await restarts.unbroken(axis)
         self.command.depart()
         self.begun = True
         try:

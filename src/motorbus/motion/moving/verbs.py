@@ -14,12 +14,12 @@ from motorbus.core.register import shown
 from motorbus.core.steps import catch
 from motorbus.errors import RequestError
 from motorbus.motion import limits, reckoning
-from motorbus.motion.abreast import Abreast
 from motorbus.motion.moving.along import Along, Approach, Paced
 from motorbus.motion.moving.journey import Journey
 from motorbus.motion.moving.moved import Arrived, Moved
 from motorbus.motion.moving.plan import Fact, Planned
 from motorbus.motion.moving.stream import USUAL
+from motorbus.motion.parallel import Parallel
 from motorbus.motion.profile import Kind, Limits, Move, Profile, Synchronised, synchronised
 from motorbus.motion.profile.shapes import NOTHING
 from motorbus.motion.profile.together import KINDS
@@ -106,7 +106,7 @@ def move(
     speed: float = 1.0,
     tolerance: float | None = None,
     timeout: float | None = None,
-) -> Abreast[Moved]:
+) -> Parallel[Moved]:
     """Move axes to these goals (rad, m, by their names): all begin together and all end together.
 
     It is as quick as the slowest axis can, or takes `duration` (s). `speed` (above 0, at most 1) makes all of it so
@@ -121,7 +121,7 @@ def move(
     """
     _check_end(tolerance, timeout)
     made = _moving(body, goals, duration, kind, speed)
-    return Journey(*made, tolerance=tolerance, timeout=timeout).abreast()
+    return Journey(*made, tolerance=tolerance, timeout=timeout).work()
 
 
 def pose(
@@ -131,7 +131,7 @@ def pose(
     duration: float | None = None,
     kind: Kind = "trapezoid",
     speed: float = 1.0,
-) -> Abreast[Moved]:
+) -> Parallel[Moved]:
     """Move to a pose of the machine file; see `move`. Raises RequestError when there is none of this name."""
     return move(body, body.machine.pose(name), duration=duration, kind=kind, speed=speed)
 
@@ -143,7 +143,7 @@ def park(
     duration: float | None = None,
     kind: Kind = "trapezoid",
     speed: float = 1.0,
-) -> Abreast[Moved]:
+) -> Parallel[Moved]:
     """Move axes to where the machine file says that they park; see `move`. Without names, all that have such a place.
 
     Raises RequestError for an axis that has none, and when none has one.
@@ -168,7 +168,7 @@ def replay(
     speed: float = 1.0,
     rate: float | None = None,
     interpolation: Interpolation = "spline",
-) -> Abreast[Moved]:
+) -> Parallel[Moved]:
     """Go along a trajectory: first to its beginning in one movement, then as it says. Its goals leave at `rate` (Hz).
 
     `speed` (above 0) is how much faster it goes: 0.5 takes twice the time. Samples of a `Trajectory` are joined by
@@ -193,7 +193,7 @@ def replay(
             raise
         return list(await journey.on(bus))
 
-    return Abreast({bus: on(bus) for bus in buses}, journey.combine)
+    return Parallel({bus: on(bus) for bus in buses}, journey.combine)
 
 
 def _moving(

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 from motorbus.core.steps import Runnable
 from motorbus.errors import RequestError
 from motorbus.motion.reckoning import UNDER_WAY, Reckoning
-from motorbus.motion.safety.canary import unknown
 from motorbus.motion.safety.gate import Gate
 from motorbus.motion.safety.guard import Bounds, Guard, untold
+from motorbus.motion.safety.restarts import unknown
 
 if TYPE_CHECKING:
     from motorbus.bus.base import BaseBus
@@ -59,7 +59,7 @@ def enclose(bus: BaseBus, axes: Mapping[str, AxisSpec]) -> None:
 
 def _watched(bus: BaseBus, gate: Gate) -> None:
     bus.attach(gate)
-    bus.readdressed = partial(follow, bus, gate)
+    bus.on_id_change = partial(follow, bus, gate)
 
 
 def follow(bus: BaseBus, gate: Gate, event: IdChanged) -> None:

@@ -20,8 +20,8 @@ from motorbus.core.family import Health
 from motorbus.core.request import Request
 from motorbus.core.steps import Emit, Sleep, catch
 from motorbus.errors import Faulted, MotorbusError, NoReply, Overloaded, WireError
-from motorbus.motion.safety import canary
-from motorbus.motion.safety.canary import HEALTH
+from motorbus.motion.safety import restarts
+from motorbus.motion.safety.restarts import HEALTH
 from motorbus.motion.safety.strain import Strain, Verdict
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ class Watch:
         """
         for axis in axes:
             node = axis.spec.node
-            canary.armed(axis)
+            restarts.armed(axis)
             if node not in self._axes:
                 continue
             self.dismiss(node)
@@ -130,7 +130,7 @@ class Watch:
                 self.dismiss(node)
             return
         self._alarms[node] = told.state.alarm
-        error = canary.looked_at(axis, told, led=True)
+        error = restarts.looked_at(axis, told, led=True)
         if error is not None:
             self.fault = error
             self.dismiss(node)
@@ -178,7 +178,7 @@ class Watch:
             self.take(node, told, goals, now, places)
         except Faulted:
             axis = self._axes[node]
-            await Emit(canary.FaultNoted(axis.name, canary.why(axis)))
+            await Emit(restarts.FaultNoted(axis.name, restarts.why(axis)))
             raise
 
     # -- turns -----------------------------------------------------------------------------------------------------

@@ -33,7 +33,7 @@ def telemetry(node: Node) -> Runnable[State]:
     not measure, or what cannot be told without knowing its register map, is None.
     """
     if node.table is None or node.settings is None:
-        return _after(node, telemetry)
+        return _identify_then(node, telemetry)
     return state_exchange(node, node.table)
 
 
@@ -70,7 +70,7 @@ def state_of(node: Node, table: RegisterMap, data: bytes) -> State:
     )
 
 
-async def _after(node: Node, say: Callable[[Node], Runnable[T]]) -> T:
+async def _identify_then(node: Node, say: Callable[[Node], Runnable[T]]) -> T:
     await known(node)
     return await say(node)
 
@@ -127,7 +127,7 @@ def _quantity(node: Node, name: str) -> Runnable[float]:
     if kept is not None and kept[0] is node.settings:
         return kept[1]
     if node.table is None or node.settings is None:
-        return _after(node, lambda same: _quantity(same, name))
+        return _identify_then(node, lambda same: _quantity(same, name))
     if name not in node.table or not (row := node.table[name]).unit:
         raise _untold(node, name.replace("_", " "))
 

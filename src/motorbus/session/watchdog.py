@@ -1,7 +1,7 @@
-"""Who sees to it that a machine is stopped when its lease is lost, or when nobody attends what has no end.
+"""The watchdog of a lease: it stops a machine when the lease is lost, and endless motion when its holder has left.
 
-Every bus is watched and stopped by itself, so that a slow or a dead one delays no other. Who did not accept the stop is
-told again and again while the lease is lost: a cable that was out may be in again.
+Each bus is watched separately, so a slow or dead bus does not delay the others. While the lease is lost, the stop is
+sent again to each axis that did not accept it, because a cable may be connected again.
 """
 
 from __future__ import annotations
@@ -20,17 +20,16 @@ from motorbus.motion.leaving import given_up, goes_on, moves, stopped_going_on
 from motorbus.motion.safety.lease import Lease, Standing
 from motorbus.session.echo import LOG
 
-AGAIN: Final = 0.5
-"""s after which those are told once more who did not accept the stop."""
+RETRY_PERIOD: Final = 0.5
+"""s after which the stop is sent again to axes that did not accept it."""
 IDLE: Final = 60.0
-"""s; a lease is looked at so often, though nothing is expected to happen to it."""
+"""s; a lease is checked at least so often."""
 
 
-class Sentry:
-    """Sees to it that what moves on a machine is stopped when this lease is lost, and tells what went wrong then.
+class Watchdog:
+    """Stops what moves on a machine when this lease is lost, and endless motion when its holder releases it.
 
-    What goes on without an end is stopped as well when its holder attends no longer, or gives the lease back. `errors`
-    by the names of the axes are of the last loss.
+    `errors` of the last loss, by name of the axis.
     """
 
     def __init__(self, body: Body, lease: Lease) -> None:
@@ -42,7 +41,7 @@ class Sentry:
         self._posts = {name: _Post(lease.losses - lost) for name in body.buses}
 
     def start(self) -> None:
-        """From now on: in a thread for each bus where time is real, else stepped whenever the bus is used."""
+        """Watch each bus: in a thread, in virtual time as a background task of the bus."""
         self._lease.watchers.append(self._wake)
         for name, bus in self._body.buses.items():
             post = self._posts[name]
@@ -53,7 +52,7 @@ class Sentry:
                 Thread(target=self._watch, args=(name,), name=f"motorbus lease {name}", daemon=True).start()
 
     def end(self) -> None:
-        """The lease counts no longer."""
+        """Stop watching."""
         self._over.set()
         if self._wake in self._lease.watchers:
             self._lease.watchers.remove(self._wake)
@@ -63,7 +62,7 @@ class Sentry:
                 post.along.drop()
 
     def busy(self, bus: str) -> bool:
-        """Whether the lease was lost, and what moves on this bus has not been told to stop yet."""
+        """Whether the lease was lost and the stop has not been sent on this bus yet."""
         self._lease.standing(self._body.now)
         return self._lease.losses > self._posts[bus].loss and not self._over.is_set()
 
@@ -76,11 +75,11 @@ class Sentry:
     # -- when ----------------------------------------------------------------------------------------------------------
 
     def _late(self, bus: str) -> bool:
-        """Whether somebody on this bus is to be told to stop now."""
+        """Whether a stop is due on this bus now."""
         return self.busy(bus) or (self._undone(bus) and self._body.now >= self._posts[bus].again)
 
     def _undone(self, bus: str) -> bool:
-        """Whether somebody goes on here who has nobody any more."""
+        """Whether the stop must be sent here again, or endless motion runs without a holder."""
         now = self._body.now
         if self._lease.is_attended(now):
             return False
@@ -88,7 +87,7 @@ class Sentry:
         return failed or any(map(goes_on, self._axes(bus)))
 
     def _left(self, bus: str) -> float:
-        """s until it is to be looked at again."""
+        """s until the next check."""
         now = self._body.now
         left = min(max(self._lease.until - now, 0.0) + 1e-6, IDLE)
         return min(left, max(self._posts[bus].again - now, 0.0) + 1e-6) if self._undone(bus) else left
@@ -108,56 +107,58 @@ class Sentry:
         woken = self._posts[bus].woken
         while not self._over.is_set():
             woken.clear()
-            left = AGAIN
+            left = RETRY_PERIOD
             try:
                 if self._late(bus):
                     there = self._body.buses[bus]
                     BackgroundTask(there, partial(self._stopping, bus)).carried()
                 left = self._left(bus)
             except Exception as error:  # the bus cannot be used: try again later
-                with suppress(Exception):  # nor may want of memory end this thread
+                with suppress(Exception):  # this thread must not end
                     self._failed(bus, self._lease.losses, self._body.axes.keys(), error)
             woken.wait(0.0 if self._over.is_set() else left)
 
     async def _stopping(self, bus: str) -> None:
-        """Tell to stop whoever must; nothing that goes wrong is raised, for this bus is looked at again."""
+        """Stop the axes that must stop. Errors are kept and logged, not raised: the bus is checked again."""
         post, lost = self._posts[bus], self._lease.standing(self._body.now) is Standing.LOST or self.busy(bus)
         loss, axes = self._lease.losses, self._axes(bus)
         moving = {axis.name for axis in axes if moves(axis) or axis.name in post.failed}
         failed = {axis.name for axis in axes if axis.name in moving and axis.bus.latched}
-        anew = loss > post.loss
-        again = () if anew else post.failed
+        is_new = loss > post.loss
+        again = () if is_new else post.failed
         try:
             errors = await (given_up(axes, again) if lost else stopped_going_on(axes))
-        except MemoryError:  # an interruption, behind which nothing here may go on
+        except MemoryError:  # an interrupt
             raise
-        except Exception as error:  # the port is gone: this bus is told again, and the others at any rate
+        except Exception as error:  # the port is gone: try again later
             self._failed(bus, loss, moving if lost else (), error)
         else:
-            self._note(axes, errors, anew)
-            post.take(loss, failed | errors.keys() if lost else (), self._body.now + AGAIN)
+            self._note(axes, errors, is_new)
+            post.take(loss, failed | errors.keys() if lost else (), self._body.now + RETRY_PERIOD)
 
     def _failed(self, bus: str, loss: int, names: Iterable[str], error: Exception) -> None:
         if loss > self._posts[bus].loss:
-            LOG.warning("%s: nobody attends any more, and nothing could be told to stop: %s", bus, error)
-        self._posts[bus].take(loss, names, self._body.now + AGAIN)
+            LOG.warning("%s: the lease is lost, and no stop could be sent: %s", bus, error)
+        self._posts[bus].take(loss, names, self._body.now + RETRY_PERIOD)
 
-    def _note(self, axes: list[Any], errors: dict[str, MotorbusError], anew: bool) -> None:
-        """Keep what went wrong of these axes, and say what is new of it."""
+    def _note(self, axes: list[Any], errors: dict[str, MotorbusError], is_new: bool) -> None:
+        """Keep the errors of these axes, and log what has changed."""
         for axis in axes:
             before = self.errors.pop(axis.name, None)
             error = errors.get(axis.name)
             if error is not None:
                 self.errors[axis.name] = error
-            if error is not None and (anew or before is None):
-                LOG.warning("%s: nobody attends it any more, and it may go on: %s", axis.name, error.summary)
-            elif error is None and before is not None and not anew:
-                LOG.warning("%s: it has accepted the stop now", axis.name)
+            if error is not None and (is_new or before is None):
+                LOG.warning(
+                    "%s: the lease is lost, and the axis may still move: %s", axis.name, error.summary
+                )
+            elif error is None and before is not None and not is_new:
+                LOG.warning("%s: the axis has accepted the stop", axis.name)
 
 
 class _Post:
-    """What is known of one bus: the number of the `loss` after which it was stopped, those who `failed` to accept that,
-    and from when on they are told `again` (s)."""
+    """State of one bus: number of the `loss` after which it was stopped, names of axes that `failed` to accept the
+    stop, and the time (s) at which it is sent `again`."""
 
     def __init__(self, loss: int) -> None:
         self.loss = loss
@@ -167,5 +168,5 @@ class _Post:
         self.along: BackgroundTask[None] | None = None
 
     def take(self, loss: int, failed: Iterable[str], again: float) -> None:
-        """They were told to stop."""
+        """The stop was sent."""
         self.loss, self.failed, self.again = loss, frozenset(failed), again

@@ -1,15 +1,14 @@
-"""Who attends a machine, and what becomes of it when he falls silent.
+"""Dead-man: a machine is stopped when the program that attends it falls silent.
 
-    with robot.attended():                       # as long as the block lasts: this program attends
+    with robot.attended():                       # this program attends for the duration of the block
         robot["lift"].home()
 
-    with robot.attended(lasts=0.5) as hand:      # who attends says so, at least every half a second
+    with robot.attended(lasts=0.5) as hand:      # and calls `beat` at least every 0.5 s
         hand.beat()
 
-Endless motion, which only its stop ends, is refused unless somebody attends, and does not outlive that. A lease that is
-lost stops what moves, whatever the program does then: a `Sentry` sees to it, in threads of its own while the program
-sleeps or its event loop hangs, and where time is virtual along with whoever lets it pass. It needs this process. One
-that is killed, or frozen for good, stops nothing, and what turns without an end goes on turning.
+Endless motion, which only a stop ends, is refused outside such a block and is stopped at its end. When the lease is
+lost, a `Watchdog` stops what moves: in threads, also while the program sleeps or its event loop hangs; in virtual
+time as a background task of the bus. It needs this process: if the process is killed or frozen, nothing is stopped.
 """
 
 from __future__ import annotations
@@ -20,31 +19,31 @@ from typing import Any, Final, Self
 
 from motorbus.core.steps import Sleep, catch
 from motorbus.errors import MotorbusError, RequestError
-from motorbus.motion.abreast import Abreast
 from motorbus.motion.body import Body
 from motorbus.motion.leaving import goes_on, stopped_going_on
+from motorbus.motion.parallel import Parallel
 from motorbus.motion.safety.gate import Gate
 from motorbus.motion.safety.lease import Lease, Standing, check_lasts
 from motorbus.motion.several import errors_of, gathered
-from motorbus.session.sentry import Sentry
+from motorbus.session.watchdog import Watchdog
 
 WHO: Final = "this program"
-LOOK: Final = 0.02
-"""s between two looks at whether all that moved has been told to stop."""
+POLL_PERIOD: Final = 0.02
+"""s between two checks whether the watchdog has stopped everything that moved."""
 
 
 class Leased(Body):
-    """A machine with a lease, or without one: then the program that has opened it moves it as it likes."""
+    """A machine with a lease, or without one; without one the program may move it at any time."""
 
     _lease: Lease | None = None
-    _sentry: Sentry | None = None
+    _watchdog: Watchdog | None = None
 
     @property
     def lease(self) -> Lease | None:
-        """Who may move it, None while there is no such rule. A program that moves it for somebody else sets one.
+        """The right to move the machine; None: not needed. A program that moves it for another one sets a lease.
 
-        Its time is `now`, the clock of the robot. When it is lost, what moves is stopped by itself, and nothing moves
-        until `robot.lease.reset(robot.now)`.
+        Its time is `now`, the clock of the robot. When it is lost, what moves is stopped, and nothing moves until
+        `robot.lease.reset(robot.now)`.
         """
         return self._lease
 
@@ -52,32 +51,32 @@ class Leased(Body):
     def lease(self, lease: Lease | None) -> None:
         self._put(lease)
         if lease is None and any(map(goes_on, self.axes.values())):
-            lease = Lease(None, needed=False)  # it ends, for nobody attends it any more
+            lease = Lease(None, needed=False)  # its watchdog stops the endless motion
         if lease is not None and self.buses:
-            self._sentry = Sentry(self, lease)
-            self._sentry.start()
+            self._watchdog = Watchdog(self, lease)
+            self._watchdog.start()
 
     def _put(self, lease: Lease | None) -> None:
-        if self._sentry is not None:
-            self._sentry.end()
-        self._lease, self._sentry = lease, None
+        if self._watchdog is not None:
+            self._watchdog.end()
+        self._lease, self._watchdog = lease, None
         for bus in self.buses.values():
             if isinstance(bus.interlock, Gate):
                 bus.interlock.lease = lease
 
     def _lay_down(self) -> None:
-        """The machine is left: only a lease that was lost keeps it from parking."""
+        """Remove the lease before the machine is left, unless it is lost: then nothing parks."""
         if self._lease is not None and self._lease.standing(self.now) is not Standing.LOST:
             self._put(None)
 
     def _retire(self) -> None:
-        """Its ports are about to be closed: nobody watches the lease any more."""
-        if self._sentry is not None:
-            self._sentry.end()
+        """End the watchdog before the ports are closed."""
+        if self._watchdog is not None:
+            self._watchdog.end()
 
 
 class Attending:
-    """What a blocking and an async block that attends have in common."""
+    """The common part of `Attended` and `AsyncAttended`."""
 
     def __init__(self, robot: Any, lasts: float | None, who: str) -> None:
         check_lasts(lasts)
@@ -87,17 +86,14 @@ class Attending:
         self._own = False
 
     def beat(self) -> None:
-        """Whoever attends is still there. From any thread. Raises Refused when that comes too late: the lease is lost.
-
-        On a machine whose lease does not run out it changes nothing.
-        """
+        """Renew the lease, from any thread. Raises Refused when it is lost. No effect on a lease without time."""
         self._lease.beat(self._holder, self._robot.now)
 
     @property
     def _lease(self) -> Lease:
         lease: Lease | None = self._robot.lease
         if lease is None:
-            raise RequestError("nobody attends", expected="inside the `with` of attended()")
+            raise RequestError("the machine is not attended", expected="inside the `with` of attended()")
         return lease
 
     def _take(self) -> None:
@@ -117,30 +113,30 @@ class Attending:
         if self._own:
             robot.lease = lease
 
-    def _ending(self) -> Abreast[dict[str, MotorbusError]]:
-        """What goes on without an end is told to stop; where the lease is lost, until all that moves was told so."""
+    def _ending(self) -> Parallel[dict[str, MotorbusError]]:
+        """Stop endless motion; if the lease is lost, wait until the watchdog has stopped all axes that move."""
         parts = self._robot.by_bus(self._robot.axes)
 
         async def on(bus: str) -> dict[str, MotorbusError]:
-            sentry = self._robot._sentry
-            while sentry is not None and sentry.busy(bus):
-                await catch(Sleep(LOOK))
+            watchdog = self._robot._watchdog
+            while watchdog is not None and watchdog.busy(bus):
+                await catch(Sleep(POLL_PERIOD))
             return await stopped_going_on(parts[bus])
 
         def combine(results: Mapping[str, Any]) -> dict[str, MotorbusError]:
             found = {
-                name: one for told in results.values() if isinstance(told, dict) for name, one in told.items()
+                name: one for part in results.values() if isinstance(part, dict) for name, one in part.items()
             }
             return {**errors_of(results), **found}
 
-        return Abreast({bus: on(bus) for bus in parts}, combine)
+        return Parallel({bus: on(bus) for bus in parts}, combine)
 
     def _given_back(self, errors: dict[str, MotorbusError], error: BaseException | None) -> None:
-        """Raise what is wrong, or note it to what is being raised; a lease that was lost stays so until its reset."""
+        """Release the lease, if it is not lost. Raise the errors, or add them as notes to `error`."""
         robot, lease = self._robot, self._robot.lease
         wrong: MotorbusError | None = gathered(errors) if errors else None
         if lease is not None and (loss := lease.loss(robot.now)) is not None:
-            for name, one in {**errors, **(robot._sentry.errors if robot._sentry else {})}.items():
+            for name, one in {**errors, **(robot._watchdog.errors if robot._watchdog else {})}.items():
                 loss.add_note(f"{name} did not accept the stop: {one.summary}")
             wrong = loss
         elif lease is not None and lease.holder == self._holder:
@@ -156,7 +152,7 @@ class Attending:
 
 
 class Attended(Attending):
-    """A block that attends, of a `Robot`; made by `Robot.attended`."""
+    """The block of `Robot.attended`."""
 
     def __enter__(self) -> Self:
         self._take()
@@ -174,7 +170,7 @@ class Attended(Attending):
 
 
 class AsyncAttended(Attending):
-    """A block that attends, of an `AsyncRobot`; made by `AsyncRobot.attended`."""
+    """The block of `AsyncRobot.attended`."""
 
     async def __aenter__(self) -> Self:
         self._take()
@@ -192,14 +188,14 @@ class AsyncAttended(Attending):
 
 
 def blocking_attended(robot: Any, lasts: float | None = None, *, who: str = WHO) -> Attended:
-    """Attend the machine for as long as a `with` lasts, so that endless motion is allowed; it is stopped at its end.
+    """Attend the machine during a `with` block: endless motion is allowed, and is stopped at the end of the block.
 
-    With `lasts` (s) only while `beat()` of what this gives comes at least so often. When it does not, the lease is
-    lost: what moves is stopped, the verb that is at work raises Refused with the reason "lease", or the end of the
-    `with` does, and nothing moves until `robot.lease.reset(robot.now)`. `who` is named in messages.
+    With `lasts` (s) the block must call `beat()` at least so often. Otherwise the lease is lost: what moves is stopped,
+    the method that runs, or the end of the block, raises Refused with the reason "lease", and nothing moves until
+    `robot.lease.reset(robot.now)`. `who` is named in messages.
 
-    Raises RequestError for a time that is none, at once; on entering Refused when somebody else holds the lease or it
-    is lost, and RequestError for another time than that of a lease that was set.
+    Raises RequestError for an invalid time; on entry Refused when another holder has the lease or it is lost, and
+    RequestError for a time other than that of a lease that was set.
     """
     return Attended(robot, lasts, who)
 

@@ -17,7 +17,7 @@ from motorbus.errors import MotorbusError, Refused
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion import capabilities
 from motorbus.motion.safety.lease import Lease, Standing
-from motorbus.session.sentry import AGAIN
+from motorbus.session.watchdog import RETRY_PERIOD
 from motorbus.simulation.named import Simulation
 from tests.support.machines import listened, machine, said
 
@@ -73,10 +73,10 @@ def test_a_second_loss_stops_as_the_first_did_though_that_was_reset_while_it_was
             passes(robot, 0.001)
         lease.reset(robot.now)
         lease.take("page", robot.now, attended=True)
-        sentry = robot._sentry
-        assert sentry is not None
-        assert sentry.busy("arm"), "who is silent keeps it waiting"
-        while sentry.busy("arm"):
+        watchdog = robot._watchdog
+        assert watchdog is not None
+        assert watchdog.busy("arm"), "who is silent keeps it waiting"
+        while watchdog.busy("arm"):
             passes(robot, 0.01)
             lease.beat("page", robot.now)
         deaf.lost = lambda _: False
@@ -96,15 +96,15 @@ def test_who_did_not_accept_the_stop_is_told_again_until_he_does_and_no_longer()
         sims["arm"].line = Deaf(lambda _: out[0])
         passes(robot, 3.0)
         assert lease.standing(robot.now) is Standing.LOST
-        assert robot._sentry is not None
-        assert robot._sentry.errors.keys() == {"a1"}
+        assert robot._watchdog is not None
+        assert robot._watchdog.errors.keys() == {"a1"}
         assert turning(sims)
         out[0] = False
-        passes(robot, AGAIN + 0.5)
+        passes(robot, RETRY_PERIOD + 0.5)
         assert not turning(sims)
-        assert not robot._sentry.errors
+        assert not robot._watchdog.errors
         listened(sims)
-        passes(robot, 10 * AGAIN)
+        passes(robot, 10 * RETRY_PERIOD)
         assert not said(sims)
 
 
@@ -120,7 +120,7 @@ def test_it_is_told_so_at_a_bounded_rate() -> None:
         passes(robot, 1.0)
         first = len(heard)
         assert first
-        passes(robot, 10 * AGAIN)
+        passes(robot, 10 * RETRY_PERIOD)
         assert first < len(heard) <= 12 * first
         deaf.lost = lambda _: False
 
@@ -147,7 +147,7 @@ def test_what_an_emergency_stop_was_to_stop_is_stopped_once_that_is_reset_while_
         deaf.lost = lambda _: False
         assert turning(sims)
         robot.reset()
-        passes(robot, 2 * AGAIN)
+        passes(robot, 2 * RETRY_PERIOD)
         assert not turning(sims)
 
 
@@ -254,7 +254,7 @@ def test_a_stop_that_was_lost_is_said_again_while_nobody_attends() -> None:
         lease.release("page", robot.now)
         passes(robot, 2.0)
         out[0] = False
-        passes(robot, AGAIN + 0.5)
+        passes(robot, RETRY_PERIOD + 0.5)
         assert not turning(sims)
 
 
@@ -310,9 +310,9 @@ def test_nothing_that_goes_wrong_ends_the_watch(caplog: pytest.LogCaptureFixture
     with turned() as (robot, sims, _):
         deaf = sims["arm"].line = Deaf(lambda _: True)
         passes(robot, 5.0)
-        assert sum("a1: nobody attends" in text for text in caplog.messages) == 1
+        assert sum("a1: the lease is lost" in text for text in caplog.messages) == 1
         deaf.lost = lambda _: False
         passes(robot, 1.0)
-        assert any("a1: it has accepted the stop now" in text for text in caplog.messages)
+        assert any("a1: the axis has accepted the stop" in text for text in caplog.messages)
         with suppress(MotorbusError):
             robot["a1"].state()

@@ -37,7 +37,7 @@ class FaultNoted(NamedTuple):
     why: str
 
 
-class Canary:
+class RestartDetector:
     """What is known of one axis by which a restart of its device shows. `at` is when it was looked at last (s);
     `fell` is true where it had torque from here when it came to be at fault, until it is given some again."""
 
@@ -91,7 +91,7 @@ class Canary:
 
 def looked_at(axis: AxisVerbs, health: Health, *, led: bool = False) -> Faulted | None:
     """Judge a sample of an axis; when that shows a fault the axis is at fault from here on, and this is the error."""
-    reason = axis.canary.take(health, armed=holds(axis), led=led)
+    reason = axis.restarts.take(health, armed=holds(axis), led=led)
     if not reason or not (axis.engaged or axis.under_way):
         return None
     error = _faulted(axis, health, reason)
@@ -104,7 +104,7 @@ async def looked_after(axis: AxisVerbs, now: float) -> None:
 
     A fault is noted and reported, and raises nothing; an answer that was lost tells nothing.
     """
-    if not axis.engaged or "health" not in axis.able or now - axis.canary.at < HEALTH:
+    if not axis.engaged or "health" not in axis.able or now - axis.restarts.at < HEALTH:
         return
     found = await catch(axis.able["health"](axis.device))
     if isinstance(found, Health) and looked_at(axis, found) is not None:
@@ -122,7 +122,7 @@ async def unbroken(axis: AxisVerbs) -> None:
 
 def holds(axis: AxisVerbs) -> bool:
     """Whether it was given torque from here, and nothing has left since that may have let it go."""
-    return axis.engaged and axis.canary.is_armed(_stops(axis))
+    return axis.engaged and axis.restarts.is_armed(_stops(axis))
 
 
 async def kept(axis: AxisVerbs) -> None:
@@ -137,12 +137,12 @@ async def kept(axis: AxisVerbs) -> None:
 
 def expected(axis: AxisVerbs) -> None:
     """It is about to be given torque from here. A stop that comes from now on explains why it has none."""
-    axis.canary.prepare(_stops(axis))
+    axis.restarts.prepare(_stops(axis))
 
 
 def armed(axis: AxisVerbs) -> None:
     """It has been given torque from here, since it was `expected`."""
-    axis.canary.arm()
+    axis.restarts.arm()
 
 
 def fault(axis: AxisVerbs, why: str) -> None:
@@ -159,8 +159,8 @@ def fault(axis: AxisVerbs, why: str) -> None:
     axis.track.forget()
     if axis.reckoning is not None:
         axis.reckoning.forget(why)
-    axis.canary.disarm()
-    axis.canary.fell = axis.canary.fell or axis.engaged
+    axis.restarts.disarm()
+    axis.restarts.fell = axis.restarts.fell or axis.engaged
     axis.orders += 1
     axis.engaged = axis.under_way = False
 
@@ -171,7 +171,7 @@ def unknown(axis: AxisVerbs) -> None:
     Nothing is sent. Whoever is to move it, or to give it torque, asks first whether it has kept that it had.
     """
     axis.track.forget()
-    axis.canary.at = -inf
+    axis.restarts.at = -inf
     if axis.reckoning is not None:
         axis.reckoning.forget("the port of its bus was gone for a while")
 

@@ -212,7 +212,7 @@ def test_a_time_that_is_none_is_refused_and_changes_nothing() -> None:
         with pytest.raises(RequestError, match="cannot last"):
             robot.attended(lasts=-1.0).__enter__()
         assert robot.lease is None
-        with pytest.raises(RequestError, match="nobody attends"):
+        with pytest.raises(RequestError, match="is not attended"):
             robot.attended().beat()
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Coroutine, Generator, Mapping
 from dataclasses import dataclass
 from typing import Any, Concatenate, Generic, ParamSpec, Protocol, Self, TypeAlias, TypeVar, overload
 
-from motorbus.core.device import DeviceMethod
+from motorbus.core.device import MethodDescriptor
 from motorbus.core.steps import Runnable
 from motorbus.errors import MotorbusError
 
@@ -20,7 +20,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
-class Abreast(Generic[T]):
+class Parallel(Generic[T]):
     """An operation for each bus, by its name, and what the whole comes to.
 
     `combine` gets what each returned, or the MotorbusError that it raised; it raises what is to be raised.
@@ -29,25 +29,25 @@ class Abreast(Generic[T]):
     operations: Mapping[str, Runnable[Any]]
     combine: Callable[[Mapping[str, Any]], T]
 
-    def __await__(self) -> Generator[Abreast[Any], Any, T]:
+    def __await__(self) -> Generator[Parallel[Any], Any, T]:
         value: T = yield self
         return value
 
 
-Works: TypeAlias = Coroutine[Abreast[Any], Any, T]
+Works: TypeAlias = Coroutine[Parallel[Any], Any, T]
 """A procedure on several buses: it awaits pieces of work, one after the other."""
 
 
 class BlockingConductor(Protocol):
     """What a blocking machine needs to carry its work out."""
 
-    def run(self, work: Abreast[T], /) -> T: ...
+    def run(self, work: Parallel[T], /) -> T: ...
 
 
 class AsyncConductor(Protocol):
     """What an async machine needs to carry its work out."""
 
-    async def run(self, work: Abreast[T], /) -> T: ...
+    async def run(self, work: Parallel[T], /) -> T: ...
 
 
 class Led:
@@ -63,12 +63,12 @@ class LedAsync:
     conductor: AsyncConductor
 
 
-class together(DeviceMethod[P, T]):  # noqa: N801 - reads as a word in a list of verbs
-    """Makes a method of a function that gives an `Abreast`: blocking on what is `Led`, awaitable on `LedAsync`."""
+class together(MethodDescriptor[P, T]):  # noqa: N801 - reads as a word in a list of verbs
+    """Makes a method of a function that gives an `Parallel`: blocking on what is `Led`, awaitable on `LedAsync`."""
 
-    returns = "Abreast"
+    returns = "Parallel"
 
-    def __init__(self, function: Callable[Concatenate[Any, P], Abreast[T]]) -> None:
+    def __init__(self, function: Callable[Concatenate[Any, P], Parallel[T]]) -> None:
         super().__init__(function)
 
     @overload

@@ -12,8 +12,8 @@ from motorbus.core.family import Health, State
 from motorbus.core.request import Data
 from motorbus.errors import Faulted, Refused, RequestError
 from motorbus.link.base import Delivery, PerfectLine, Side
-from motorbus.motion.safety import canary
-from motorbus.motion.safety.canary import HEALTH, LET_GO, RESTART, Canary, FaultNoted
+from motorbus.motion.safety import restarts
+from motorbus.motion.safety.restarts import HEALTH, LET_GO, RESTART, FaultNoted, RestartDetector
 from motorbus.session.robot import AsyncRobot, Robot
 from tests.safety.decoders import READ, REG_WRITE, SYNC_WRITE, WRITE
 from tests.support.machines import machine
@@ -56,7 +56,7 @@ def sample(torque: bool | None = True, blank: bool | None = False, **rest: Any) 
     return Health(State(1.0, **rest), torque, blank, restarts)
 
 
-# -- the canary alone --------------------------------------------------------------------------------------------------
+# -- the detector alone --------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -73,43 +73,43 @@ def sample(torque: bool | None = True, blank: bool | None = False, **rest: Any) 
     ],
 )
 def test_torque_that_is_gone_is_a_fault_and_an_alarm_is_none(found: Health, reason: str) -> None:
-    assert Canary().take(found, armed=True, led=True) == reason
+    assert RestartDetector().take(found, armed=True, led=True) == reason
 
 
 def test_who_was_given_no_torque_may_be_limp() -> None:
-    assert Canary().take(sample(torque=False, blank=True), armed=False, led=False) == ""
+    assert RestartDetector().take(sample(torque=False, blank=True), armed=False, led=False) == ""
 
 
 def test_torque_that_came_back_by_itself_hides_no_restart_from_who_leads_it() -> None:
-    bird = Canary()
-    bird.arm()
-    assert bird.take(sample(), armed=True, led=True) == ""
-    assert bird.take(sample(blank=True), armed=True, led=True) == RESTART
-    bird.arm()
+    detector = RestartDetector()
+    detector.arm()
+    assert detector.take(sample(), armed=True, led=True) == ""
+    assert detector.take(sample(blank=True), armed=True, led=True) == RESTART
+    detector.arm()
     assert (
-        bird.take(sample(blank=True), armed=True, led=True) == ""
+        detector.take(sample(blank=True), armed=True, led=True) == ""
     )  # nothing was told to it that could be lost
-    bird.arm()
-    assert bird.take(sample(), armed=True, led=False) == ""
-    assert bird.take(sample(blank=True), armed=True, led=False) == ""  # others may tell it how fast to be
+    detector.arm()
+    assert detector.take(sample(), armed=True, led=False) == ""
+    assert detector.take(sample(blank=True), armed=True, led=False) == ""  # others may tell it how fast to be
 
 
 def test_a_device_that_says_that_it_starts_has_restarted() -> None:
-    bird = Canary()
-    for restarts, reason in ((2, ""), (2, ""), (3, RESTART), (3, "")):
-        assert bird.take(sample(torque=None, blank=None, restarts=restarts), armed=True, led=True) == reason
+    detector = RestartDetector()
+    for count, reason in ((2, ""), (2, ""), (3, RESTART), (3, "")):
+        assert detector.take(sample(torque=None, blank=None, restarts=count), armed=True, led=True) == reason
 
 
 def test_a_stop_since_it_got_torque_makes_torque_no_news() -> None:
-    bird = Canary()
-    assert not bird.is_armed(0)
-    bird.prepare(4)
-    assert not bird.is_armed(4)
-    bird.arm()
-    assert bird.is_armed(4)
-    assert not bird.is_armed(5)
-    bird.disarm()
-    assert not bird.is_armed(4)
+    detector = RestartDetector()
+    assert not detector.is_armed(0)
+    detector.prepare(4)
+    assert not detector.is_armed(4)
+    detector.arm()
+    assert detector.is_armed(4)
+    assert not detector.is_armed(5)
+    detector.disarm()
+    assert not detector.is_armed(4)
 
 
 # -- in mid-motion -----------------------------------------------------------------------------------------------------
@@ -140,7 +140,7 @@ def test_d3_a_servo_that_restarts_in_mid_motion_is_at_fault_within_two_looks_and
         assert told.value.node == 2
         assert "clear_fault" in told.value.advice
         assert seen - line.moment < 2 * HEALTH
-        assert robot.faults == {"a2": canary.why(robot["a2"])}
+        assert robot.faults == {"a2": restarts.why(robot["a2"])}
         assert FaultNoted("a2", robot.faults["a2"]) in noted
         assert not robot["a2"].engaged
         assert robot["a2"].track.sample is None
@@ -334,7 +334,7 @@ def test_only_faults_that_there_are_can_be_cleared() -> None:
         robot.clear_fault()
         with pytest.raises(RequestError):
             robot.clear_fault("nobody")
-        canary.fault(robot["a1"], "it was seen to smoke")
+        restarts.fault(robot["a1"], "it was seen to smoke")
         assert robot.faults == {"a1": "it was seen to smoke"}
         robot.clear_fault()
         assert robot.faults == {}
