@@ -80,5 +80,5 @@ def test_a_borrow_that_was_cut_off_is_one_error_for_every_command(
         bus.journal(JournalEntry("jog", INTENT, {"node": 1, "what": "the borrow of project 1 (for jog)"}))
     told = run(*command.split())
     assert told.code == Exit.UNSAFE, told.err
-    assert "error: lift is at fault: untrusted: the borrow of project 1 (for jog) did not" in told.err
+    assert "error: lift is at fault: untrusted: the borrow of project 1 (for jog) is" in told.err
     assert told.err.count("what to do: end that change first; nothing was sent") == 1

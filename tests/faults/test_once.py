@@ -70,7 +70,7 @@ def test_l18_feetech_says_once_what_would_do_more_when_said_twice(what: str) -> 
     rig = Rig(model="hls3606")
     request = FEETECH_ONCE[what](Servo(rig.bus, 1))
     line, error = said_by(rig, lambda: rig.bus.run(request))
-    assert line.said.count(request.request) == 1
+    assert line.said.count(request.wire) == 1
     assert isinstance(error, OutcomeUnknown)
 
 
