@@ -13,8 +13,8 @@ from motorbus import kst
 from motorbus.bus.blocking import Bus
 from motorbus.core.steps import gather
 from motorbus.diagnose.budget import Budget, Transfer, budget
+from motorbus.families.kst.sdo import encode_upload, encode_upload_reply
 from motorbus.families.kst.simulator import KstBus
-from motorbus.families.kst.wire import encode_upload, encode_upload_reply
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
 from tests.support.can_wire import CanWire

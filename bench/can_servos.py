@@ -15,10 +15,10 @@ from contextlib import closing
 from bench.can_loop import BITRATE, POSITION, position
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Data
+from motorbus.families.kst.profiles import PROFILES
+from motorbus.families.kst.sdo import decode_request
 from motorbus.families.kst.simulator import KstBus
 from motorbus.families.kst.simulator.switches import Switches
-from motorbus.families.kst.table import PROFILES
-from motorbus.families.kst.wire import decode_request
 from motorbus.simulation.clients import CanClient
 from motorbus.simulation.mount import Mount
 from motorbus.simulation.pty import PtyMaster

@@ -31,7 +31,7 @@ from motorbus.cli.simulated import Simulated
 from motorbus.core.can_bits import bits
 from motorbus.core.can_frame import CanFrame
 from motorbus.families.feetech import wire as feetech
-from motorbus.families.kst import wire as kst
+from motorbus.families.kst import sdo as kst
 
 RATE = 1_000_000
 BYTE = 10 / RATE

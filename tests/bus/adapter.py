@@ -19,7 +19,7 @@ from motorbus.core.setpoint import Setpoint
 from motorbus.core.steps import Exclusive, WaitFor
 from motorbus.errors import LinkLost
 from motorbus.families import feetech, kst
-from motorbus.families.kst.wire import download_due, upload_due
+from motorbus.families.kst.sdo import download_due, upload_due
 from motorbus.link.memory import MemoryLink
 from tests.bus.script import Check
 

@@ -19,7 +19,7 @@ from tests.support.subjects import FAMILIES, PACKAGES, line_of, possible
 from tests.support.world import IDS, World, world
 
 MOST_MEMBERS = 18
-ROOMS = ("wire", "table", "driver", "simulator")
+ROOMS = ("driver", "simulator")
 # A family has no clock, no threads and no I/O; and nothing foreign, for it is loaded below floor 3.
 FORBIDDEN = {
     "_thread",
@@ -237,7 +237,7 @@ def rooms(package: str) -> set[str]:
     return {f"{package}.{room}" for room in ROOMS}
 
 
-def test_a_family_has_its_four_rooms(family: Family) -> None:
+def test_a_family_has_a_driver_and_a_simulator(family: Family) -> None:
     package = PACKAGES[family.name]
     assert rooms(package) <= graph(package).modules
 

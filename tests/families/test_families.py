@@ -35,32 +35,11 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def has_four_rooms(folder: Path) -> bool:
-    return all(
-        (folder / f"{room}.py").exists() or (folder / room / "__init__.py").exists()
-        for room in families.ROOMS
-    )
-
-
-def test_every_folder_inside_with_four_rooms_is_a_family() -> None:
-    found = [path.parent for path in Path(families.__file__).parent.glob("*/__init__.py")]
-    folders = {folder.name for folder in found if has_four_rooms(folder)}
+def test_every_package_inside_is_a_family() -> None:
+    folders = {path.parent.name for path in Path(families.__file__).parent.glob("*/__init__.py")}
     assert folders
     assert folders <= set(families.names())
     assert {families.load(name).name for name in folders} == folders
-
-
-def test_a_folder_without_all_rooms_is_passed_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for room in ("wire", "table", "simulator"):
-        (tmp_path / "half" / room).mkdir(parents=True)
-        (tmp_path / "half" / room / "__init__.py").touch()
-    (tmp_path / "half" / "__init__.py").touch()
-    monkeypatch.setattr(families, "__path__", [*families.__path__, str(tmp_path)])
-    assert "half" not in families.names()
-    with pytest.raises(RequestError, match="no family 'half'"):
-        families.load("half")
-    (tmp_path / "half" / "driver.py").touch()
-    assert "half" in families.names()
 
 
 def test_a_family_from_outside_is_found_by_its_entry_point(site: Path) -> None:
@@ -82,7 +61,7 @@ def test_names_are_sorted_and_told_once(site: Path) -> None:
 
 def test_what_is_inside_goes_before_what_is_outside(site: Path) -> None:
     found = sorted(path.parent for path in Path(families.__file__).parent.glob("*/__init__.py"))
-    inside = next(folder.name for folder in found if has_four_rooms(folder))
+    inside = found[0].name
     install(site, points={inside: "motorbus_template:FAMILY"})
     assert families.names().count(inside) == 1
     assert families.load(inside).name == inside

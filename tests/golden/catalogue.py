@@ -30,7 +30,7 @@ EXCLUDED = {
         "value": "converts a value; sends nothing",
     },
     "kst": {
-        "dialect_of": "settings of an open bus; sends nothing",
+        "settings_of": "settings of an open bus; sends nothing",
         "raw": "converts a value; sends nothing",
         "value": "converts a value; sends nothing",
     },
@@ -41,7 +41,7 @@ EXCLUDED = {
 }
 
 DEVICES = Argument(lambda bench: list(bench.devices.values()))
-DIALECT = Argument(lambda bench: bench.family.dialect_of(bench.bus.family))
+SETTINGS = Argument(lambda bench: bench.family.settings_of(bench.bus.family))
 NO_FACTS: dict[str, Any] = {}
 
 
@@ -353,15 +353,15 @@ KST: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("set_reversed", True), "", ()),
 ]
 KST_GROUP: list[tuple[Call, str]] = [
-    (shared("scan", (1, 2, 3), (), DIALECT), "ids"),
-    (shared("scan_bit_rates", DIALECT, rates=(500_000, 250_000)), "listen"),
-    (shared("scan_bit_rates", DIALECT, rates=(250_000, 500_000), isolated=True), "isolated"),
-    (shared("broadcast_read", "node_id", DIALECT), ""),
-    (shared("broadcast_position", 0.2, (1, 2), DIALECT), ""),
-    (shared("broadcast_save", DIALECT), ""),
-    (shared("broadcast_bit_rate", 250_000, DIALECT), ""),
-    (shared("broadcast_node_id", 9, DIALECT), "refused"),
-    (shared("broadcast_node_id", 9, DIALECT, force=True), "forced"),
+    (shared("scan", (1, 2, 3), (), SETTINGS), "ids"),
+    (shared("scan_bit_rates", SETTINGS, rates=(500_000, 250_000)), "listen"),
+    (shared("scan_bit_rates", SETTINGS, rates=(250_000, 500_000), isolated=True), "isolated"),
+    (shared("broadcast_read", "node_id", SETTINGS), ""),
+    (shared("broadcast_position", 0.2, (1, 2), SETTINGS), ""),
+    (shared("broadcast_save", SETTINGS), ""),
+    (shared("broadcast_bit_rate", 250_000, SETTINGS), ""),
+    (shared("broadcast_node_id", 9, SETTINGS), "refused"),
+    (shared("broadcast_node_id", 9, SETTINGS, force=True), "forced"),
 ]
 """On a bus of two servos."""
 
@@ -390,12 +390,12 @@ def _kst() -> list[Case]:
                     keep="requests" if reports else "all",
                 )
             )
-    cases.append(Case("kst", "kst", shared("scan", (), (), DIALECT), "all", ids=(1, 2), lanes=True))
+    cases.append(Case("kst", "kst", shared("scan", (), (), SETTINGS), "all", ids=(1, 2), lanes=True))
     for one in (call("move", 0.2, wait=False), call("save"), call("set_node_id", 9)):
         for form, value in (("sized_only", "accept_unsized"), ("unsized_only", "accept_sized")):
             cases.append(Case("kst", "kst", one, form, options={"profile": "kst", value: False}))
     cases.append(Case("kst", "kst", call("version"), "long", options={"firmware": "1.00 of 2024"}))
-    beyond = shared("broadcast_position", 99.0, (1, 2), DIALECT)
+    beyond = shared("broadcast_position", 99.0, (1, 2), SETTINGS)
     cases.append(Case("kst", "kst", beyond, "beyond_limits", ids=(1, 2), lanes=True))
     extended = {"profile": "kst-ext", "id_format": "ext"}
     cases.append(Case("kst", "kst-ext", call("position"), "extended_id", options=extended))

@@ -13,7 +13,7 @@ import pytest
 
 from motorbus.core.register import Access, Coding, Register
 from motorbus.families.kst.eds import eds
-from motorbus.families.kst.table import PROFILES, RATES, Profile
+from motorbus.families.kst.profiles import PROFILES, RATES, Profile
 from tests.interop.canopen_peer import LIBRARY, describe
 
 TYPES = {(1, False): 0x05, (2, False): 0x06, (4, False): 0x07, (1, True): 0x02, (2, True): 0x03}

@@ -14,7 +14,7 @@ import pytest
 from motorbus.core.register import Register
 from motorbus.core.request import Effect
 from motorbus.families.kst.eds import eds
-from motorbus.families.kst.table import PROFILES, Profile
+from motorbus.families.kst.profiles import PROFILES, Profile
 from tests.interop.can_bus import WAYS, Way, can_bus
 from tests.interop.canopen_peer import Canopen, CanopenError
 

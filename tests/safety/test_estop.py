@@ -20,7 +20,7 @@ from motorbus.core.setpoint import Setpoint
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import wire as feetech
 from motorbus.families.feetech.driver.exchanges import read_block
-from motorbus.families.kst.driver.feedback import position_exchange
+from motorbus.families.kst.driver.feedback import position
 from motorbus.families.stepper import wire as stepper
 from tests.support.noisy_line import NoisyLine
 from tests.support.world import Bus, has_queued_motion, queue, turn
@@ -60,7 +60,7 @@ def question(bus: Bus, node: int) -> Request[Any]:
     if bus.family.name == "feetech":
         return read_block(device, 0, 200, bytes)
     if bus.family.name == "kst":
-        return position_exchange(device)
+        return position(device)
     return bus.family.probe(node, 0)
 
 

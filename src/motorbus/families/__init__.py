@@ -1,10 +1,7 @@
-"""Discovery of families, and the rule they live by.
+"""Discovery of families: packages in this folder, and packages named in the entry point group `motorbus.families`.
 
-THE RULE: a family is a folder here, or a package named by an entry point in the group `motorbus.families`. It
-has four rooms, each a module or a package of that name: `wire` (what the bytes mean), `table` (what can be
-addressed), `driver` (what to say to get a thing done), `simulator` (how a real one behaves). Its `__init__`
-holds `FAMILY`, which fulfils `motorbus.core.family.Family`. `driver` and `simulator` never reach each other.
-Nothing else in motorbus names a family. A folder here that lacks a room is not finished and passed over.
+The `__init__` of a family holds `FAMILY`, see `motorbus.core.family.Family`. Its `driver` and `simulator` never
+import each other. Only `cli` names a family.
 """
 
 from __future__ import annotations
@@ -20,7 +17,6 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 GROUP = "motorbus.families"
-ROOMS = frozenset({"wire", "table", "driver", "simulator"})
 
 
 def names() -> list[str]:
@@ -30,7 +26,7 @@ def names() -> list[str]:
 
 def load(name: str) -> Family:
     """The family of this name. Raises RequestError when there is none."""
-    if name.isidentifier() and _is_whole(name):
+    if name in _inside():
         return _family(import_module(f"{__name__}.{name}").FAMILY)
     for point in _outside():
         if point.name == name:
@@ -43,12 +39,7 @@ def load(name: str) -> Family:
 
 
 def _inside() -> set[str]:
-    return {module.name for module in iter_modules(__path__) if module.ispkg and _is_whole(module.name)}
-
-
-def _is_whole(name: str) -> bool:
-    folders = [f"{path}/{name}" for path in __path__]
-    return {module.name for module in iter_modules(folders)} >= ROOMS
+    return {module.name for module in iter_modules(__path__) if module.ispkg}
 
 
 def _outside() -> list[EntryPoint]:

@@ -22,7 +22,7 @@ def test_it_is_one_servo_of_this_family() -> None:
         ("feetech:sim", "no kst bus"),
         ("kst:sim", "exactly one device"),
         ("kst:sim#1+2", "exactly one device"),
-        ("kst:sim#0", "0 addresses everyone"),
+        ("kst:sim#0", "0 addresses all servos"),
         ("kst:sim#128", "not the id of a servo"),
     ],
 )

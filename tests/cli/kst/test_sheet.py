@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from motorbus.families.kst.eds import eds
-from motorbus.families.kst.table import PROFILES
+from motorbus.families.kst.profiles import PROFILES
 from tests.cli.conftest import Run
 
 

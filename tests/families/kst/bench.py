@@ -16,8 +16,7 @@ from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import ANY, EVERY_LANE, Effect, Reply, Request, Response
 from motorbus.core.steps import Emit, Exclusive, Gather, Runnable, SetBitrate, Sleep, WaitFor
 from motorbus.errors import NoReply, OutcomeUnknown
-from motorbus.families.kst import FAMILY, Kst, Servo, wire
-from motorbus.families.kst.driver import Node
+from motorbus.families.kst import FAMILY, Kst, Node, Servo, notifications, sdo
 from motorbus.families.kst.simulator import KstBus
 from motorbus.families.kst.simulator import Servo as SimulatedServo
 from motorbus.link.base import Line
@@ -96,7 +95,7 @@ def bench(ids: Sequence[int] = (5,), **how: Any) -> Iterator[Bench]:
 
 def node(profile: str = "kst", number: int = 5, **settings: object) -> Node:
     """A servo of which nothing is known."""
-    return Node(number, FAMILY.configured(profile=profile, **settings)._dialect)
+    return Node(number, FAMILY.configured(profile=profile, **settings)._settings)
 
 
 class Played:
@@ -126,7 +125,7 @@ class Played:
             self.alone += 1
             return self.run(step.runnable)
         if isinstance(step, Gather):
-            return [self.run(operation) for operation in step.runnables]
+            return tuple(self.run(one) for one in step.runnables)
         if isinstance(step, SetBitrate):
             self.rates += [step.rate] if step.rate else []
             return 500_000
@@ -163,8 +162,8 @@ class Played:
 
     def _reply(self, lane: int, line: str) -> Reply:
         who, colon, data = line.rpartition(":")
-        frame = CanFrame(wire.REPLY + (int(who) if colon else max(lane, 1)), bytes.fromhex(data))
-        (event,) = wire.FrameReceiver().feed(frame)
+        frame = CanFrame(sdo.REPLY + (int(who) if colon else max(lane, 1)), bytes.fromhex(data))
+        (event,) = notifications.FrameReceiver().feed(frame)
         assert isinstance(event, Reply)
         assert colon or lane != EVERY_LANE
         return event

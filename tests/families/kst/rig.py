@@ -16,8 +16,8 @@ from motorbus.core.request import Data
 from motorbus.core.steps import gather
 from motorbus.errors import MotorbusError
 from motorbus.families.kst import FAMILY, Servo
+from motorbus.families.kst.sdo import encode_abort_reply
 from motorbus.families.kst.simulator import KstBus
-from motorbus.families.kst.wire import encode_abort_reply
 from motorbus.link.base import Delivery, Line, PerfectLine, Side
 from motorbus.link.memory import MemoryLink
 from tests.support.world import make_bus

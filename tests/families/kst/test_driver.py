@@ -11,7 +11,7 @@ import pytest
 from motorbus.core.family import Family
 from motorbus.errors import LimitExceeded, LinkLost, NoReply, RequestError
 from motorbus.families.kst import FAMILY, Servo
-from motorbus.families.kst.table import PROFILES
+from motorbus.families.kst.profiles import PROFILES
 from tests.conformance import test_notices, test_quiet, test_registers, test_stop
 from tests.families.kst.bench import bench
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from motorbus.core.arrival import PATIENCE
 from motorbus.errors import MotionError, Stalled
-from motorbus.families.kst.driver.arrival import PATIENCE, Move, arrive
+from motorbus.families.kst.driver.motion import wait_arrival
 from tests.families.kst.bench import bench, node, play
 
 LOOK = "605#4002600000000000"
@@ -16,24 +17,21 @@ def at(raw: int) -> tuple[str, str]:
 
 
 def test_in_position_is_two_looks_in_a_row() -> None:
-    move = Move(0.1, 0.02, None)
-    play(arrive(node(), move), at(0), at(30), at(57), at(58))
-    play(arrive(node(), move), at(0), at(57), at(90), at(57), at(58))
-    play(arrive(node(), move), at(57), at(57))
+    for looks in ([0, 30, 57, 58], [0, 57, 90, 57, 58], [57, 57]):
+        play(wait_arrival(node(), 0.1, 0.02, None), *map(at, looks))
 
 
 def test_who_does_not_move_has_stalled() -> None:
     looks = int(PATIENCE / 0.02) + 1
     with pytest.raises(Stalled, match="off its goal") as raised:
-        play(arrive(node(), Move(1.0, 0.02, None)), *[at(10 + n % 2) for n in range(looks)])
+        play(wait_arrival(node(), 1.0, 0.02, None), *[at(10 + n % 2) for n in range(looks)])
     assert "profile=xqpower" in raised.value.advice
 
 
 def test_who_is_slow_is_late() -> None:
     with pytest.raises(MotionError, match="after 0.2 s") as raised:
-        play(arrive(node(), Move(1.0, 0.02, 0.2)), *[at(3 * n) for n in range(11)])
+        play(wait_arrival(node(), 1.0, 0.02, 0.2), *[at(3 * n) for n in range(11)])
     assert not isinstance(raised.value, Stalled)
-    assert Move(1.0, 0.02, None).allowance(2.0) == 5.0
 
 
 def test_a_servo_that_is_not_started_stalls_and_the_error_says_why() -> None:

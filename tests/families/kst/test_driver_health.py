@@ -6,8 +6,9 @@ import pytest
 
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Request
-from motorbus.families.kst import driver
-from motorbus.families.kst.driver import Dialect, Ear, Memory, Node
+from motorbus.families.kst import BusSettings, Node
+from motorbus.families.kst.driver.feedback import health
+from motorbus.families.kst.notifications import BusState, FrameReceiver
 from tests.families.kst.bench import bench, node, play
 
 POSITION = "605#4002600000000000"
@@ -15,7 +16,7 @@ STATUS = "605#4005600000000000"
 
 
 def test_by_the_manual_it_tells_where_it_is_and_no_more() -> None:
-    request = driver.health(Node(5))
+    request = health(Node(5))
     assert isinstance(request, Request)
     assert request.reports_position
     found = play(request, (POSITION, "4b02600084030000"))
@@ -25,7 +26,7 @@ def test_by_the_manual_it_tells_where_it_is_and_no_more() -> None:
 
 
 def test_newer_firmware_tells_current_and_temperature_in_one_exchange() -> None:
-    request = driver.health(node("kst-ext"))
+    request = health(node("kst-ext"))
     assert isinstance(request, Request)
     assert not request.reports_position
     found = play(request, (STATUS, "430560002c01f600"))
@@ -34,16 +35,15 @@ def test_newer_firmware_tells_current_and_temperature_in_one_exchange() -> None:
     assert found.state.position is None
 
 
-def test_a_bus_that_keeps_a_memory_counts_who_says_that_he_starts() -> None:
-    memory = Memory()
-    dialect = Dialect(memory=memory)
-    ear, servo = Ear(dialect.formats, memory), Node(5, dialect)
+def test_an_open_bus_counts_the_boot_messages_of_a_node() -> None:
+    state = BusState()
+    receiver, servo = FrameReceiver(state=state), Node(5, BusSettings(state=state))
     frames = ("", "705#00", "706#00", "705#05", "705#00", "705#0000", "385#0A020000")
     for said, restarts in zip(frames, (0, 1, 1, 1, 2, 2, 2), strict=True):
         if said:
             name, _, data = said.partition("#")
-            ear.feed(CanFrame(int(name, 16), bytes.fromhex(data)))
-        found = play(driver.health(servo), (POSITION, "4b02600084030000"))
+            receiver.feed(CanFrame(int(name, 16), bytes.fromhex(data)))
+        found = play(health(servo), (POSITION, "4b02600084030000"))
         assert found.restarts == restarts
 
 
@@ -51,6 +51,6 @@ def test_a_simulated_servo_says_it_where_the_switch_says_so() -> None:
     for says in (False, True):
         with bench(boot_notice=says) as there:
             servo = there.servo()
-            assert servo.bus.run(driver.health(servo)).restarts == 0
+            assert servo.bus.run(health(servo)).restarts == 0
             there.sim().power_cycle()
-            assert servo.bus.run(driver.health(servo)).restarts == int(says)
+            assert servo.bus.run(health(servo)).restarts == int(says)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from motorbus.errors import DeviceError, NoReply, RequestError, VerificationFailed
-from motorbus.families.kst import driver
-from motorbus.families.kst.driver.identity import code_of, write_node_id
-from motorbus.families.kst.table import BIT_RATES
+from motorbus.families.kst.driver import identity as driver
+from motorbus.families.kst.driver.identity import write_node_id
+from motorbus.families.kst.profiles import BIT_RATES, bit_rate_code
 from tests.families.kst.bench import abort, bench, node, play
 
 ID = "605#4000300000000000"
@@ -98,10 +98,10 @@ def test_a_rate_is_in_force_after_save_and_restart_only() -> None:
 
 
 def test_the_codes_are_those_of_the_manual() -> None:
-    assert [code_of(rate) for rate in BIT_RATES.values()] == list(range(8))
+    assert [bit_rate_code(rate) for rate in BIT_RATES.values()] == list(range(8))
     for rate in (0, 10_000, 5, True):
         with pytest.raises(RequestError, match="no rate"):
-            code_of(rate)
+            bit_rate_code(rate)
     play(driver.set_bit_rate(node(), 1_000_000), ("605#2201300007000000", "6001300000000000"))
 
 

@@ -10,9 +10,9 @@ import pytest
 
 from motorbus.core.request import ANY, Effect, TimeoutClass
 from motorbus.errors import DeviceError, OutcomeUnknown, VerificationFailed
-from motorbus.families.kst import FAMILY, driver
-from motorbus.families.kst.driver.exchanges import order
-from motorbus.families.kst.driver.keeping import keep, save_exchange
+from motorbus.families.kst import FAMILY
+from motorbus.families.kst.driver.requests import write_register
+from motorbus.families.kst.driver.storage import save, store
 from tests.families.kst.bench import abort, bench, node, play
 
 SAVE = "605#2210100173617665"
@@ -24,15 +24,15 @@ OTHER = "4b0a300018fc0000"
 
 def test_d11_a_save_expects_no_answer_and_takes_one_that_comes() -> None:
     for back in (None, "6010100100000000", ["6010100100000000"] * 2):
-        play(driver.save(node()), (SAVE, back))
+        play(save(node()), (SAVE, back))
     with pytest.raises(DeviceError, match="hardware error"):
-        play(driver.save(node()), (SAVE, abort(0x1010, 0x0606_0000, 1)))
+        play(save(node()), (SAVE, abort(0x1010, 0x0606_0000, 1)))
     with pytest.raises(DeviceError):
-        play(driver.save(node()), (SAVE, abort(0, 0x0800_0020)))
+        play(save(node()), (SAVE, abort(0, 0x0800_0020)))
 
 
 def test_a_save_holds_its_lane_until_the_flash_is_written() -> None:
-    request = save_exchange(node())
+    request = save(node())
     assert (request.lane, request.expected, request.reply_within) == (5, ANY, TimeoutClass.STORE)
     assert (request.effect, request.repeatable) == (Effect.PERSISTENT, False)
     assert FAMILY.turnaround(request) == pytest.approx(0.170)
@@ -57,12 +57,12 @@ def test_a_write_that_fails_is_tried_three_times() -> None:
     row = one.table["negative_limit"]
     ack = "600a300000000000"
     play(
-        keep(one, [(row, -500)]),
+        store(one, [(row, -500)]),
         *[(READ, OTHER), *[(LIMIT, ack), (READ, OTHER)] * 2],
         *[(LIMIT, ack), (READ, TOLD), (READ, TOLD), (SAVE, None), (READ, TOLD)],
     )
     with pytest.raises(VerificationFailed, match="reads back -1000, not -500") as raised:
-        play(keep(one, [(row, -500)]), (READ, OTHER), *[(LIMIT, ack), (READ, OTHER)] * 3)
+        play(store(one, [(row, -500)]), (READ, OTHER), *[(LIMIT, ack), (READ, OTHER)] * 3)
     assert raised.value.received == bytes.fromhex("18fc")
 
 
@@ -70,7 +70,7 @@ def test_a_write_that_left_and_cannot_be_read_back_is_of_unknown_outcome() -> No
     one = node("kst-ext")
     with pytest.raises(OutcomeUnknown, match="whether the write of negative_limit took effect is not known"):
         play(
-            keep(one, [(one.table["negative_limit"], -500)]),
+            store(one, [(one.table["negative_limit"], -500)]),
             (READ, OTHER),
             (LIMIT, "600a300000000000"),
             (READ, None),
@@ -81,7 +81,7 @@ def test_what_the_save_undid_is_told() -> None:
     one = node("kst-ext")
     with pytest.raises(VerificationFailed):
         play(
-            keep(one, [(one.table["negative_limit"], -500)]),
+            store(one, [(one.table["negative_limit"], -500)]),
             *[
                 (READ, OTHER),
                 (LIMIT, "600a300000000000"),
@@ -123,13 +123,13 @@ def test_d9_what_this_node_wrote_and_did_not_save_is_written_and_saved_whatever_
     one = node("kst-ext")
     row = one.table["negative_limit"]
     with pytest.raises(OutcomeUnknown):
-        play(keep(one, [(row, -500)]), (READ, OTHER), (LIMIT, "600a300000000000"), (READ, None))
+        play(store(one, [(row, -500)]), (READ, OTHER), (LIMIT, "600a300000000000"), (READ, None))
     assert one.unsaved == {"negative_limit"}
     play(
-        keep(one, [(row, -500)]),
+        store(one, [(row, -500)]),
         *[(LIMIT, "600a300000000000"), (READ, TOLD), (READ, TOLD), (SAVE, None), (READ, TOLD)],
     )
-    play(keep(one, [(row, -500)]), (READ, TOLD))
+    play(store(one, [(row, -500)]), (READ, TOLD))
 
 
 def test_d9_what_others_did_not_save_cannot_be_seen_and_a_save_keeps_it() -> None:
@@ -137,7 +137,7 @@ def test_d9_what_others_did_not_save_cannot_be_seen_and_a_save_keeps_it() -> Non
         servo, stranger = there.servo(), there.servo()
         limit = servo.table["negative_limit"]
         for saves in (False, True):
-            there.run(order(stranger, limit, -500))
+            there.run(write_register(stranger, limit, -500))
             servo.write(negative_limit=radians(-50))
             if saves:
                 servo.save()

@@ -6,8 +6,8 @@ import pytest
 
 from motorbus.core.can_frame import ERROR_FLAG, CanFrame
 from motorbus.core.request import Data
-from motorbus.errors import NoReply, RequestError
-from motorbus.families.kst.driver.presence import Presence, glance, settle_format, survey
+from motorbus.errors import RequestError
+from motorbus.families.kst.driver.identity import Presence, look, survey
 from motorbus.link.base import Delivery, PerfectLine, Side
 from tests.families.kst.bench import abort, bench, node, play
 
@@ -15,19 +15,19 @@ ASK = "605#4000300000000000"
 
 
 def test_one_look() -> None:
-    assert play(glance(node()), (ASK, "4f00300005000000")) == Presence(100.001, 1, 5)
-    assert play(glance(node()), (ASK, None)).there is False
-    refused = play(glance(node()), (ASK, abort(0x3000, 0x0602_0000)))
-    assert (refused.there, refused.reads_back) == (True, None)
-    assert play(glance(node()), (ASK, ["4f00300005000000"] * 2)).several is True
-    assert play(glance(node()), (ASK, "4b02600005000000")).there is False, "a late answer to something else"
+    assert play(look(node()), (ASK, "4f00300005000000")) == Presence(100.001, 1, 5)
+    assert play(look(node()), (ASK, None)).answered is False
+    refused = play(look(node()), (ASK, abort(0x3000, 0x0602_0000)))
+    assert (refused.answered, refused.reads_back) == (True, None)
+    assert play(look(node()), (ASK, ["4f00300005000000"] * 2)).several is True
+    assert play(look(node()), (ASK, "4b02600005000000")).answered is False, "a late answer to something else"
 
 
 def test_one_servo_is_one() -> None:
     with bench() as there:
         found = there.run(survey(there.servo()))
-        assert (found.there, found.several, found.reads_back, found.errors) == (True, False, 5, False)
-        assert there.run(survey(there.servo(6))).there is False
+        assert (found.answered, found.several, found.reads_back, found.errors) == (True, False, 5, False)
+        assert there.run(survey(there.servo(6))).answered is False
 
 
 def test_a_second_answer_shows() -> None:
@@ -64,13 +64,4 @@ def test_answers_that_break_each_other_show_where_no_errors_are_told() -> None:
 def test_errors_without_any_answer_may_be_the_bit_rate() -> None:
     with bench(bit_rate=250_000) as there:
         found = there.run(survey(there.servo()))
-        assert (found.there, found.errors, found.several) == (False, True, False)
-
-
-def test_a_format_is_settled_where_somebody_answers() -> None:
-    with bench(settings={"id_format": "auto"}, id_format="ext") as there:
-        there.run(settle_format(there.servo(6)))
-        there.run(settle_format(there.servo()))
-        assert there.run(glance(there.servo())).there is True
-        with pytest.raises(NoReply):
-            there.servo(6).position()
+        assert (found.answered, found.errors, found.several) == (False, True, False)

@@ -12,7 +12,8 @@ import pytest
 from motorbus.core.request import Data
 from motorbus.core.steps import Progress
 from motorbus.errors import NoReply, OutcomeUnknown, RequestError, VerificationFailed
-from motorbus.families.kst import PowerCycleNeeded, Provisioned, driver
+from motorbus.families.kst import PowerCycleNeeded, Provisioned
+from motorbus.families.kst.driver.provisioning import provision
 from motorbus.link.memory import MemoryLink
 from tests.families.kst.bench import Bench, bench, node, play
 from tests.families.kst.test_driver_scanning import Deaf
@@ -213,8 +214,8 @@ def test_an_adapter_that_cannot_listen_provisions_all_the_same() -> None:
         assert there.servo().provision(new_rate=250_000).resumed is True
 
 
-def test_in_either_id_format() -> None:
-    with bench(settings={"id_format": "auto"}, id_format="ext") as there:
+def test_with_29_bit_identifiers() -> None:
+    with bench(settings={"id_format": "ext"}, id_format="ext") as there:
         cycling(there)
         assert there.servo().provision(new_id=9).node == 9
 
@@ -306,7 +307,7 @@ def test_a_silence_without_a_restart_is_no_restart() -> None:
 @pytest.mark.parametrize("patience", [0, -1.0, float("nan"), float("inf"), "120s", True])
 def test_nobody_waits_for_ever(patience: Any) -> None:
     with pytest.raises(RequestError, match="patience"):
-        play(driver.provision(node(), new_id=9, patience=patience))
+        play(provision(node(), new_id=9, patience=patience))
 
 
 def test_the_rate_of_one_among_others_is_not_changed() -> None:

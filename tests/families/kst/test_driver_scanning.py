@@ -9,10 +9,9 @@ from motorbus.core.family import Found
 from motorbus.core.request import Data
 from motorbus.core.steps import Progress
 from motorbus.errors import LinkError, RequestError
-from motorbus.families.kst import Skipped, Suspicion
-from motorbus.families.kst.driver import scan
-from motorbus.families.kst.driver.scanning import BROKEN, OTHER_FORMAT, TORN
-from motorbus.families.kst.table import RATES
+from motorbus.families.kst import Skipped, Suspicion, scan
+from motorbus.families.kst.driver.scan import OTHER_FORMAT, TORN, WRONG_RATE
+from motorbus.families.kst.profiles import RATES
 from motorbus.link.memory import MemoryLink
 from tests.families.kst.bench import bench
 from tests.families.kst.test_driver_presence import NoErrors
@@ -108,7 +107,7 @@ def test_a_silent_bus_at_another_rate_loses_one_frame_for_each_rate_that_was_nam
         wrong = tuple(rate for rate in RATES if rate not in (250_000, 500_000))
         found = there.run(there.family.scan((5,), (*wrong, 250_000)))
         assert [(one.node, one.rate) for one in found] == [(5, 250_000)]
-        assert there.of(Suspicion) == [Suspicion(0, rate, BROKEN) for rate in wrong]
+        assert there.of(Suspicion) == [Suspicion(0, rate, WRONG_RATE) for rate in wrong]
         assert there.sim().errors == len(wrong)
 
 
@@ -140,17 +139,11 @@ def test_frames_of_the_scan_are_of_eight_bytes() -> None:
         assert {len(one.data) for one in seen if isinstance(one, CanFrame)} == {8}
 
 
-@pytest.mark.parametrize(
-    ("spoken", "taken", "broadcast"), [("std", "ext", True), ("std", "ext", False), ("ext", "std", True)]
-)
-@pytest.mark.parametrize("ids", [(), (5, 6)])
-def test_who_answers_in_the_other_id_format_only_is_found_and_told(
-    spoken: str, taken: str, broadcast: bool, ids: tuple[int, ...]
-) -> None:
-    with bench(settings={"id_format": spoken}, id_format=taken, broadcast_read=broadcast) as there:
-        assert there.run(there.family.scan(ids)) == [Found(5, 500_000, None)]
-        assert there.of(Suspicion) == [Suspicion(5, 500_000, OTHER_FORMAT[taken == "ext"])]
-        assert there.run(there.family.scan(ids)) == [Found(5, 500_000, None)], "and again"
+@pytest.mark.parametrize(("spoken", "taken"), [("std", "ext"), ("ext", "std")])
+def test_a_scan_without_a_reply_names_the_other_id_format(spoken: str, taken: str) -> None:
+    with bench(settings={"id_format": spoken}, id_format=taken) as there:
+        assert there.run(there.family.scan()) == []
+        assert there.of(Suspicion) == [Suspicion(0, 500_000, OTHER_FORMAT)]
 
 
 def test_where_somebody_answers_the_other_id_format_is_not_tried() -> None:

@@ -9,13 +9,10 @@ import pytest
 
 import motorbus
 from motorbus import families
-from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import Family
-from motorbus.core.request import Reply
 from motorbus.families import kst
-from motorbus.families.kst import FAMILY, AsyncServo, Servo, dialect_of, wire
-from motorbus.families.kst.driver import Ear
-from motorbus.families.kst.table import PROFILES, RATES
+from motorbus.families.kst import FAMILY, AsyncServo, Servo, settings_of
+from motorbus.families.kst.profiles import PROFILES, RATES
 from tests.families.kst.bench import bench
 
 
@@ -32,27 +29,16 @@ def test_it_is_found_by_its_name_and_fulfils_the_contract() -> None:
 def test_it_asks_for_frames_at_the_rate_as_shipped() -> None:
     link = FAMILY.link
     assert (link.kind, link.rate, link.rates) == ("frames", 500_000, RATES)
-    assert [option.name for option in link.settings] == ["profile", "id_format", "sized", "nmt", "window"]
+    assert [option.name for option in link.settings] == ["profile", "id_format", "sized", "nmt"]
     assert all(option.help for option in (*link.settings, *link.options))
 
 
 def test_each_bus_has_a_family_of_its_own() -> None:
-    one = FAMILY.configured(profile="xqpower", window="4")
+    one = FAMILY.configured(profile="xqpower")
     other = one.configured(id_format="ext")
-    assert (one.link.window, other.link.window) == (4, 4)
-    assert dialect_of(other).profile.name == "xqpower", "what was set before stays"
-    assert dialect_of(one).memory is not dialect_of(other).memory
-    assert (FAMILY.configured() is FAMILY, FAMILY.link.window) == (False, 16)
-
-
-def test_a_configured_bus_hears_for_its_memory() -> None:
-    assert isinstance(FAMILY.receiver(), wire.FrameReceiver)
-    assert isinstance(FAMILY.configured().receiver(), Ear)
-    frame = CanFrame(0x585, bytes.fromhex("6003600000000000"))
-    for family in (FAMILY, FAMILY.configured(id_format="auto")):
-        (reply,) = family.receiver().feed(frame)
-        assert isinstance(reply, Reply)
-        assert (reply.lane, reply.data) == (5, frame.data)
+    assert settings_of(other).profile.name == "xqpower", "what was set before stays"
+    assert settings_of(one).state is not settings_of(other).state
+    assert settings_of(FAMILY).state is None
 
 
 @pytest.mark.parametrize("profile", PROFILES)
@@ -78,8 +64,7 @@ def test_a_simulator_is_of_the_make_the_family_is_configured_for() -> None:
 
 
 def test_from_a_bus_address() -> None:
-    with motorbus.open("kst:sim,ids=0x25,profile=xqpower,window=2,speed=20") as bus:
-        assert bus.family.link.window == 2
+    with motorbus.open("kst:sim,ids=0x25,profile=xqpower,speed=20") as bus:
         servo = kst.Servo(bus, 0x25)
         assert servo.identify().table == "xqpower"
         servo.move(0.1)
@@ -89,7 +74,7 @@ def test_from_a_bus_address() -> None:
 def test_importing_the_family_does_not_import_its_simulator() -> None:
     program = (
         "import sys, motorbus.families.kst; "
-        "print([m for m in sys.modules if 'kst.simulator' in m or 'kst.explain' in m or 'kst.eds' in m])"
+        "print([m for m in sys.modules if 'kst.simulator' in m or 'kst.decode' in m or 'kst.eds' in m])"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -7,7 +7,7 @@ from random import Random
 from typing import Any, Final
 
 from motorbus.families.feetech import wire
-from motorbus.families.kst import wire as sdo
+from motorbus.families.kst import sdo
 from tests.interop.differential.cases import Case, Request, SdoCase, SdoRequest
 from tests.interop.differential.judging import UNEXPLAINED
 from tests.interop.differential.outside import Decoder

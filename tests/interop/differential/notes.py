@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from motorbus.families.feetech import wire
-from motorbus.families.kst import wire as sdo
+from motorbus.families.kst import sdo
 from tests.interop.differential.cases import Case, Request, SdoCase, SdoRequest
 from tests.interop.differential.outside import CANOPEN, FEETECH, NEW, OLD, RUST, Decoder
 from tests.interop.differential.sdo_streams import NODE

@@ -10,14 +10,15 @@ from dataclasses import replace
 from typing import Any
 
 from motorbus.core.can_frame import CanFrame
+from motorbus.core.register import Coding
 from motorbus.core.request import Expected, Request, Response, Step
 from motorbus.core.steps import Exclusive
 from motorbus.errors import DeviceError, MotorbusError
 from motorbus.families.feetech import FAMILY as FEETECH
 from motorbus.families.feetech import wire
 from motorbus.families.kst import FAMILY as KST
-from motorbus.families.kst.driver.exchanges import download, whole
-from motorbus.families.kst.driver.node import Node
+from motorbus.families.kst import BusSettings, Node
+from motorbus.families.kst.driver.requests import read_all_bytes, write_register
 from tests.interop.differential.cases import Case, Outcome, SdoCase
 from tests.support.world import Tries
 
@@ -45,13 +46,16 @@ class Failed(Exception):
 
 def sdo_decoded(case: SdoCase) -> Outcome:
     """A transfer, as the driver carries it out. The value is the data in hexadecimal."""
-    request, node = case.request, Node(case.request.node)
+    request, node = case.request, Node(case.request.node, BusSettings(sized=True))
     tries, steps = Tries(KST.configured(), 500_000), iter(case.steps)
     row = replace(node.table["present_position"], address=request.index, subindex=request.subindex)
     try:
         if request.kind == "upload":
-            return Outcome(_run(whole(node, row), tries, steps).hex())
-        _run(download(node, row, request.data, states_length=True), tries, steps)
+            return Outcome(_run(read_all_bytes(node, row), tries, steps).hex())
+        size = len(request.data)
+        raw = int.from_bytes(request.data, "little")
+        row = replace(row, size=size, low=0, high=(1 << 8 * size) - 1, coding=Coding.UNSIGNED)
+        _run(write_register(node, row, raw), tries, steps)
     except Failed as failed:
         return Outcome(None, str(failed))
     except DeviceError as refusal:

@@ -5,7 +5,7 @@ A refusal by the servo is an answer too, so an abort that only one of them takes
 
 from __future__ import annotations
 
-from motorbus.families.kst import wire
+from motorbus.families.kst import sdo
 from tests.interop.differential.cases import Frame, Outcome, SdoCase
 from tests.interop.differential.judging import UNEXPLAINED
 
@@ -41,7 +41,7 @@ def _class(case: SdoCase, mine: str | None, others: str | None) -> str:
 
 def _is_short(case: SdoCase, frame: Frame) -> bool:
     identifier, data = frame
-    return identifier == wire.REPLY + case.request.node and len(data) < wire.LENGTH
+    return identifier == sdo.REPLY + case.request.node and len(data) < sdo.LENGTH
 
 
 def _taken(case: SdoCase, frames: list[Frame], others: str) -> str:
@@ -55,8 +55,8 @@ def _taken(case: SdoCase, frames: list[Frame], others: str) -> str:
     if request.kind == "download":
         other = about != (request.index, request.subindex) or (data[0] & 0xE0 == 0x60 and data[0] != 0x60)
         return "acknowledgement-of-another" if other else UNEXPLAINED
-    first = wire.decode_reply(data)
-    segments = [wire.decode_reply(one) for _, one in frames[1:]]
+    first = sdo.decode_reply(data)
+    segments = [sdo.decode_reply(one) for _, one in frames[1:]]
     ends = [place for place, one in enumerate(segments) if one is not None and one.last]
     segments = segments[: ends[0] + 1] if ends else segments
     sizes = [len(one.data) for one in segments if one is not None]

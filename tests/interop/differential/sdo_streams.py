@@ -13,7 +13,7 @@ from typing import Final
 
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Expected, Request
-from motorbus.families.kst import FAMILY, wire
+from motorbus.families.kst import FAMILY, notifications, sdo
 from motorbus.link.memory import MemoryLink
 from tests.interop.differential.cases import Frame, SdoCase, SdoRequest
 from tests.interop.differential.streams import AS_RECORDED
@@ -46,22 +46,22 @@ def recorded() -> tuple[SdoCase, ...]:
 def packet(request: SdoRequest) -> CanFrame:
     """As we send it, its length stated."""
     if request.kind == "upload":
-        return wire.encode_upload(request.node, request.index, request.subindex)
-    return wire.encode_download(request.node, request.index, request.subindex, request.data, sized=True)
+        return sdo.encode_upload(request.node, request.index, request.subindex)
+    return sdo.encode_download(request.node, request.index, request.subindex, request.data, sized=True)
 
 
 def _due(request: SdoRequest) -> Expected:
-    made = wire.upload_due if request.kind == "upload" else wire.download_due
+    made = sdo.upload_due if request.kind == "upload" else sdo.download_due
     return made(request.node, request.index, request.subindex)
 
 
 def _segmented(stated: bool, length: int) -> SdoCase:
     """A text that comes in segments; no servo of ours does this, newer firmware may."""
     request, text = SdoRequest("upload", NODE, 0x100A, 0), TEXT[:length]
-    first = wire.encode_upload_start(NODE, 0x100A, 0, length if stated else None)
+    first = sdo.encode_upload_start(NODE, 0x100A, 0, length if stated else None)
     pieces = [text[at : at + 7] for at in range(0, length, 7)] or [b""]
     rest = [
-        wire.encode_segment_reply(NODE, place % 2, piece, place == len(pieces) - 1)
+        sdo.encode_segment_reply(NODE, place % 2, piece, place == len(pieces) - 1)
         for place, piece in enumerate(pieces)
     ]
     steps = tuple(((frame.id, frame.data),) for frame in (first, *rest))
@@ -101,7 +101,7 @@ def _other_index(random: Random, frame: Frame) -> Step:
 
 def _aborted(random: Random, frame: Frame) -> Step:
     identifier, data = frame
-    code = random.choice(sorted(wire.ABORTS)).to_bytes(4, "little")
+    code = random.choice(sorted(sdo.ABORTS)).to_bytes(4, "little")
     return ((identifier, b"\x80" + random.choice((data[1:4], bytes(3), b"\x03\x60\x00")) + code),)
 
 
@@ -155,7 +155,7 @@ def _stale_behind(random: Random, frame: Frame) -> Step:
 
 def _report_in_front(random: Random, frame: Frame) -> Step:
     """A position report has the identifier of replies and four bytes."""
-    report = wire.encode_report(NODE, random.randrange(-900, 900))
+    report = notifications.encode_report(NODE, random.randrange(-900, 900))
     return ((report.id, report.data), frame)
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from motorbus.errors import RequestError
 from motorbus.families.kst.eds import REVISED, Moment, eds
-from motorbus.families.kst.table import PROFILES, Profile
+from motorbus.families.kst.profiles import PROFILES, Profile
 
 HERE = Path(__file__).resolve().parent
 LISTS = ("MandatoryObjects", "OptionalObjects", "ManufacturerObjects")

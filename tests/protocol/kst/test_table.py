@@ -14,7 +14,7 @@ from motorbus.core.register import Access, Coding, Register, Storage
 from motorbus.core.request import Effect
 from motorbus.core.units import parse
 from motorbus.errors import RequestError
-from motorbus.families.kst.table import (
+from motorbus.families.kst.profiles import (
     BIT_RATES,
     DEFAULT_NODE,
     DEFAULT_RATE,
@@ -26,9 +26,8 @@ from motorbus.families.kst.table import (
     Profile,
     current,
     temperature,
-    text,
     to_raw,
-    version,
+    version_text,
 )
 
 R, W, RW = Access.READ, Access.WRITE, Access.READ_WRITE
@@ -335,13 +334,12 @@ def test_it_is_the_same_to_either_side_and_never_far_off(angle: float) -> None:
     ],
 )
 def test_a_version_is_text_where_it_is_text(data: bytes, said: str) -> None:
-    row = TABLES["kst"]["firmware_version"]
-    assert text(row, row.decode(data)) == version(data) == said
+    assert version_text(data) == said
 
 
 def test_a_version_in_segments_may_be_long() -> None:
-    assert version(b"KST servo 2.10\0") == "KST servo 2.10"
-    assert version(b"") == ""
+    assert version_text(b"KST servo 2.10\0") == "KST servo 2.10"
+    assert version_text(b"") == ""
 
 
 # --- status -------------------------------------------------------------------------------------------------
@@ -362,11 +360,4 @@ def test_a_status_is_a_current_and_a_temperature(name: str, data: bytes, counts:
     profile = PROFILES[name]
     raw = profile.table["status"].decode(data)
     assert current(profile, raw) == pytest.approx(counts * {"xqpower": 0.001}.get(name, 0.01), rel=1e-12)
-    assert temperature(profile, raw) == celsius
-
-
-@pytest.mark.parametrize("decode", [current, temperature])
-def test_the_status_of_the_manual_is_not_decoded(decode: object) -> None:
-    assert callable(decode)
-    with pytest.raises(RequestError, match="profile kst does not say"):
-        decode(PROFILES["kst"], 0)
+    assert temperature(raw) == celsius

@@ -10,42 +10,39 @@ from hypothesis import strategies as st
 
 from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
 from motorbus.core.request import Event, Noise, Notification, Reply
-from motorbus.families.kst import wire
+from motorbus.families.kst import notifications, sdo
 from tests.protocol.kst.test_wire import FRAMES, NODES
 
-BOTH = frozenset({False, True})
-FORMATS = st.sampled_from([frozenset({False}), frozenset({True}), BOTH])
+FORMATS = st.booleans()
 
 
-def heard(frame: CanFrame, formats: frozenset[bool] = frozenset({False})) -> Event:
-    receiver = wire.FrameReceiver(formats)
+def heard(frame: CanFrame, extended: bool = False) -> Event:
+    receiver = notifications.FrameReceiver(extended)
     (event,) = receiver.feed(frame)
     assert receiver.flush() == []
     return event
 
 
 @given(FRAMES, FORMATS)
-def test_every_frame_is_exactly_one_event_with_all_of_its_data(
-    frame: CanFrame, formats: frozenset[bool]
-) -> None:
-    assert heard(frame, formats).data == frame.data
+def test_every_frame_is_exactly_one_event_with_all_of_its_data(frame: CanFrame, extended: bool) -> None:
+    assert heard(frame, extended).data == frame.data
 
 
 @given(FRAMES, FORMATS)
 def test_only_eight_bytes_from_a_node_in_an_expected_format_are_a_reply(
-    frame: CanFrame, formats: frozenset[bool]
+    frame: CanFrame, extended: bool
 ) -> None:
-    event = heard(frame, formats)
+    event = heard(frame, extended)
     if isinstance(event, Reply):
         assert len(frame.data) == 8
         assert 0x581 <= frame.id <= 0x5FF
-        assert frame.extended in formats
+        assert frame.extended is extended
         assert event.lane == frame.id - 0x580
-        assert wire.decode_reply(frame.data) is not None
+        assert sdo.decode_reply(frame.data) is not None
 
 
 @pytest.mark.parametrize("order", ["little", "big"])
-@pytest.mark.parametrize("code", wire.ABORTS)
+@pytest.mark.parametrize("code", sdo.ABORTS)
 def test_an_acknowledgement_with_the_code_of_a_refusal_was_a_refusal(code: int, order: Any) -> None:
     """One digit of an adapter's text makes 60 of 80."""
     refusal = b"\x80\x02\x60\x00" + code.to_bytes(4, order)
@@ -69,7 +66,7 @@ def test_every_first_byte_of_eight_bytes_from_a_node() -> None:
     for specifier in range(256):
         data = bytes((specifier, 2, 0x60, 0, 1, 2, 3, 4))
         event = heard(CanFrame(0x585, data))
-        assert (wire.decode_reply(data) is not None) is is_a_reply(specifier)
+        assert (sdo.decode_reply(data) is not None) is is_a_reply(specifier)
         if is_a_reply(specifier):
             assert isinstance(event, Reply)
             assert (event.lane, event.data) == (5, data)
@@ -86,9 +83,9 @@ def test_every_first_byte_of_four_bytes_from_a_node() -> None:
 
 @given(NODES, st.integers(-0x8000, 0x7FFF))
 def test_a_report_is_never_a_reply(node: int, raw: int) -> None:
-    frame = wire.encode_report(node, raw)
+    frame = notifications.encode_report(node, raw)
     assert isinstance(heard(frame), Notification)
-    assert wire.decode_reply(frame.data) is None
+    assert sdo.decode_reply(frame.data) is None
 
 
 @pytest.mark.parametrize("length", [0, 1, 2, 3, 5, 6, 7])
@@ -99,21 +96,21 @@ def test_no_other_length_is_anything_or_casts_doubt(length: int) -> None:
 
 
 @pytest.mark.parametrize("extended", [False, True])
-@pytest.mark.parametrize("formats", [frozenset({False}), frozenset({True}), BOTH], ids=str)
-def test_only_an_expected_id_format_is_heard(extended: bool, formats: frozenset[bool]) -> None:
-    reply = wire.encode_upload_reply(5, 0x6002, 0, b"\0\0", extended=extended)
-    report = wire.encode_report(5, 0, extended=extended)
-    alarm = wire.encode_alarm(5, extended=extended)
+@pytest.mark.parametrize("expected", [False, True])
+def test_only_an_expected_id_format_is_heard(extended: bool, expected: bool) -> None:
+    reply = sdo.encode_upload_reply(5, 0x6002, 0, b"\0\0", extended=extended)
+    report = notifications.encode_report(5, 0, extended=extended)
+    alarm = notifications.encode_alarm(5, extended=extended)
     for frame, kind in ((reply, Reply), (report, Notification), (alarm, Notification)):
-        event = heard(frame, formats)
-        assert isinstance(event, kind if extended in formats else Noise)
+        event = heard(frame, expected)
+        assert isinstance(event, kind if extended is expected else Noise)
         assert not isinstance(event, Noise) or event.fault == "foreign"
 
 
 def test_identifiers_of_29_bits_that_end_like_ours_are_foreign() -> None:
-    data = wire.encode_upload_reply(5, 0x6002, 0, b"\0\0").data
-    assert heard(CanFrame(0x1000_0585, data, extended=True), BOTH) == Noise(data, "foreign")
-    assert heard(CanFrame(0x0000_0D85, data, extended=True), BOTH) == Noise(data, "foreign")
+    data = sdo.encode_upload_reply(5, 0x6002, 0, b"\0\0").data
+    assert heard(CanFrame(0x1000_0585, data, extended=True), True) == Noise(data, "foreign")
+    assert heard(CanFrame(0x0000_0D85, data, extended=True), True) == Noise(data, "foreign")
 
 
 def test_a_remote_frame_is_foreign() -> None:
@@ -130,16 +127,16 @@ def test_an_error_frame_is_a_notice_in_every_format(extended: bool) -> None:
 
 def test_our_own_requests_are_foreign() -> None:
     for frame in (
-        wire.encode_upload(5, 0x6002),
-        wire.encode_upload(0, 0x3000),
-        wire.encode_download(5, 0x6003, 0, b"\x60\x03"),
-        wire.encode_abort(5, 0x6003, 0, 0x0504_0000),
-        wire.encode_start("vendor", 5, on=True),
-        wire.encode_start("standard", 5, on=True),
+        sdo.encode_upload(5, 0x6002),
+        sdo.encode_upload(0, 0x3000),
+        sdo.encode_download(5, 0x6003, 0, b"\x60\x03"),
+        sdo.encode_abort(5, 0x6003, 0, 0x0504_0000),
+        notifications.encode_start("vendor", 5, on=True),
+        notifications.encode_start("standard", 5, on=True),
     ):
         assert heard(frame) == Noise(frame.data, "foreign")
 
 
 def test_bytes_are_not_for_this_bus() -> None:
-    assert wire.FrameReceiver().feed(b"\xff\xff") == [Noise(b"\xff\xff", "foreign")]
-    assert wire.FrameReceiver().feed(b"") == []
+    assert notifications.FrameReceiver().feed(b"\xff\xff") == [Noise(b"\xff\xff", "foreign")]
+    assert notifications.FrameReceiver().feed(b"") == []

@@ -8,7 +8,7 @@ import pytest
 
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Noise, Notification, Reply
-from motorbus.families.kst import wire
+from motorbus.families.kst import notifications, sdo
 from tests.protocol.kst.vectors import (
     ALL,
     INVALID,
@@ -39,26 +39,26 @@ def numbered(vector: Vector) -> tuple[int, int, int]:
 
 def request_of(vector: Vector) -> CanFrame:
     if vector.kind == "upload":
-        return wire.encode_upload(*numbered(vector))
+        return sdo.encode_upload(*numbered(vector))
     if vector.kind == "segment":
-        return wire.encode_segment(vector.expected["node"], vector.expected["toggle"])
+        return sdo.encode_segment(vector.expected["node"], vector.expected["toggle"])
     if vector.kind == "abort":
-        return wire.encode_abort(*numbered(vector), int.from_bytes(vector.payload, "little"))
+        return sdo.encode_abort(*numbered(vector), int.from_bytes(vector.payload, "little"))
     sized = vector.id.startswith("sized")
-    return wire.encode_download(*numbered(vector), vector.payload, sized=sized)
+    return sdo.encode_download(*numbered(vector), vector.payload, sized=sized)
 
 
 def reply_of(vector: Vector) -> CanFrame:
     if vector.kind == "upload":
-        return wire.encode_upload_reply(*numbered(vector), vector.payload)
+        return sdo.encode_upload_reply(*numbered(vector), vector.payload)
     if vector.kind == "upload-start":
-        return wire.encode_upload_start(*numbered(vector), vector.expected.get("size"))
+        return sdo.encode_upload_start(*numbered(vector), vector.expected.get("size"))
     if vector.kind == "segment":
         node, last = vector.expected["node"], vector.expected["last"]
-        return wire.encode_segment_reply(node, vector.expected["toggle"], vector.payload, last)
+        return sdo.encode_segment_reply(node, vector.expected["toggle"], vector.payload, last)
     if vector.kind == "abort":
-        return wire.encode_abort_reply(*numbered(vector), int(vector.expected["code"], 16))
-    return wire.encode_download_reply(*numbered(vector))
+        return sdo.encode_abort_reply(*numbered(vector), int(vector.expected["code"], 16))
+    return sdo.encode_download_reply(*numbered(vector))
 
 
 def test_the_manual_is_complete() -> None:
@@ -110,7 +110,7 @@ def test_each_erratum_has_its_vectors() -> None:
 
 @pytest.mark.parametrize("vector", REQUESTS, ids=name_of)
 def test_a_request_is_taken_apart(vector: Vector) -> None:
-    request = wire.decode_request(vector.frame)
+    request = sdo.decode_request(vector.frame)
     assert request is not None
     assert (request.node, request.index, request.subindex) == numbered(vector)
     assert (request.kind, request.data, request.extended) == (vector.kind, vector.payload, False)
@@ -125,7 +125,7 @@ def test_a_request_is_made(vector: Vector) -> None:
 
 @pytest.mark.parametrize("vector", REPLIES, ids=name_of)
 def test_a_reply_is_taken_apart(vector: Vector) -> None:
-    reply = wire.decode_reply(vector.frame.data)
+    reply = sdo.decode_reply(vector.frame.data)
     assert reply is not None
     assert (reply.kind, reply.index, reply.subindex) == (vector.kind, *vector.object)
     assert reply.data == vector.payload
@@ -141,7 +141,7 @@ def test_a_reply_is_made(vector: Vector) -> None:
 
 @pytest.mark.parametrize("vector", REPLIES, ids=name_of)
 def test_a_reply_is_received_on_the_lane_of_its_node(vector: Vector) -> None:
-    (event,) = wire.FrameReceiver().feed(vector.frame)
+    (event,) = notifications.FrameReceiver().feed(vector.frame)
     assert isinstance(event, Reply)
     assert (event.lane, event.data) == (vector.expected["node"], vector.frame.data)
 
@@ -149,32 +149,33 @@ def test_a_reply_is_received_on_the_lane_of_its_node(vector: Vector) -> None:
 @pytest.mark.parametrize("vector", NOTICES, ids=name_of)
 def test_what_comes_unasked_is_a_notice(vector: Vector) -> None:
     expected = Notification(vector.expected["node"], vector.kind, vector.frame.data)
-    assert wire.FrameReceiver().feed(vector.frame) == [expected]
+    assert notifications.FrameReceiver().feed(vector.frame) == [expected]
     if vector.kind == "report":
-        assert wire.decode_report(vector.frame.data) == vector.expected["raw"]
+        assert notifications.decode_report(vector.frame.data) == vector.expected["raw"]
 
 
 @pytest.mark.parametrize("vector", STARTS, ids=name_of)
 def test_a_start_is_made_and_taken_apart(vector: Vector) -> None:
     node, on = vector.expected["node"], vector.expected["on"]
-    assert wire.decode_start(vector.frame) == wire.Start(frozenset(vector.expected["forms"]), node, on)
+    start = notifications.Start(frozenset(vector.expected["forms"]), node, on)
+    assert notifications.decode_start(vector.frame) == start
     for form in vector.expected["forms"]:
-        assert wire.encode_start(form, node, on) == vector.frame
+        assert notifications.encode_start(form, node, on) == vector.frame
 
 
 @pytest.mark.parametrize("vector", [*REQUESTS, *STARTS], ids=name_of)
 def test_what_another_client_says_is_foreign(vector: Vector) -> None:
-    assert wire.FrameReceiver().feed(vector.frame) == [Noise(vector.frame.data, "foreign")]
+    assert notifications.FrameReceiver().feed(vector.frame) == [Noise(vector.frame.data, "foreign")]
 
 
 @pytest.mark.parametrize("vector", INVALID, ids=name_of)
 def test_what_is_no_frame_is_noise_and_no_request(vector: Vector) -> None:
-    (event,) = wire.FrameReceiver(frozenset({False, True})).feed(vector.frame)
+    (event,) = notifications.FrameReceiver(vector.frame.extended).feed(vector.frame)
     assert isinstance(event, Noise)
     assert event.data == vector.frame.data
-    request = wire.decode_request(vector.frame)
+    request = sdo.decode_request(vector.frame)
     assert request is None or request.kind == "unknown"
-    assert wire.decode_start(vector.frame) is None
+    assert notifications.decode_start(vector.frame) is None
 
 
 @pytest.mark.parametrize("vector", [*REPLIES, *NOTICES], ids=name_of)
@@ -182,14 +183,14 @@ def test_cut_short_or_in_the_other_id_format_it_is_noise(vector: Vector) -> None
     frame = vector.frame
     wrong = [frame._replace(data=frame.data[:count]) for count in range(len(frame.data))]
     for other in (*wrong, frame._replace(extended=True)):
-        assert wire.FrameReceiver().feed(other) == [Noise(other.data, "foreign")]
+        assert notifications.FrameReceiver().feed(other) == [Noise(other.data, "foreign")]
 
 
 @pytest.mark.parametrize("vector", VALID, ids=name_of)
 def test_in_29_bits_a_frame_says_the_same(vector: Vector) -> None:
-    both = wire.FrameReceiver(frozenset({False, True}))
     other = vector.frame._replace(extended=True)
-    assert both.feed(other) == both.feed(vector.frame)
-    request, same = wire.decode_request(vector.frame), wire.decode_request(other)
+    short, long = notifications.FrameReceiver(False), notifications.FrameReceiver(True)
+    assert long.feed(other) == short.feed(vector.frame)
+    request, same = sdo.decode_request(vector.frame), sdo.decode_request(other)
     assert same == (request and request._replace(extended=True))
-    assert wire.decode_start(other) == wire.decode_start(vector.frame)
+    assert notifications.decode_start(other) == notifications.decode_start(vector.frame)

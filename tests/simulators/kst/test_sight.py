@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from motorbus.errors import RequestError
+from motorbus.families.kst.profiles import PROFILES
 from motorbus.families.kst.simulator import simulate
-from motorbus.families.kst.table import PROFILES
 
 
 @pytest.mark.parametrize("profile", sorted(PROFILES))

@@ -21,10 +21,10 @@ from motorbus.families.kst import (
     broadcast_read,
     broadcast_save,
 )
-from motorbus.families.kst.driver.exchanges import download, order, upload_row
-from motorbus.families.kst.driver.line import stop
+from motorbus.families.kst.driver.bus import stop
+from motorbus.families.kst.driver.requests import read_register, write_register
+from motorbus.families.kst.profiles import BIT_RATES
 from motorbus.families.kst.simulator import KstBus
-from motorbus.families.kst.table import BIT_RATES
 from motorbus.link.base import Line
 from motorbus.link.memory import MemoryLink
 from tests.support.world import make_bus
@@ -46,7 +46,7 @@ class KstRig:
         self.link = self.linked(simulator)
         self.family = FAMILY.configured(profile=profile)
         self.bus = make_bus(self.link, self.family, report=lambda event: None)
-        self.dialect = Servo(self.bus, NODE).dialect
+        self.settings = Servo(self.bus, NODE).settings
         self.count = self.here = 0
 
     def linked(self, simulator: KstBus) -> MemoryLink:
@@ -119,12 +119,12 @@ def read_segments(rig: KstRig) -> None:
 def refused_read(rig: KstRig) -> None:
     """A refusal is an answer, and never a value."""
     row = changed(rig.servo.table["status"], address=MISSING)
-    _refused(rig, upload_row(rig.servo, row, int), NO_OBJECT)
+    _refused(rig, read_register(rig.servo, row, int), NO_OBJECT)
 
 
 def refused_write(rig: KstRig) -> None:
     row = rig.servo.table["present_position"]
-    _refused(rig, download(rig.servo, row, b"\1\2", states_length=False), READ_ONLY)
+    _refused(rig, write_register(rig.servo, row, 0x0201), READ_ONLY)
 
 
 def _refused(rig: KstRig, operation: Runnable[Any], code: int) -> None:
@@ -168,7 +168,7 @@ def write_4(rig: KstRig) -> None:
     sim.raw_position = 100 + rig.count % 200
     before = sim.raw_position
     try:
-        rig.run(order(rig.servo, rig.servo.table["mid_point"], 0))
+        rig.run(write_register(rig.servo, rig.servo.table["mid_point"], 0))
     except MotorbusError:
         assert sim.raw_position in (0, before)
         raise
@@ -196,7 +196,7 @@ def start_reports(rig: KstRig) -> None:
 def broadcast_reading(rig: KstRig) -> None:
     raw = rig.stir()
     row = rig.servo.table["present_position"]
-    told = rig.run(broadcast_read("present_position", rig.dialect))
+    told = rig.run(broadcast_read("present_position", rig.settings))
     assert set(told) <= set(NODES)
     assert set(told.values()) <= {row.to_value(raw)}
 
@@ -205,28 +205,28 @@ def broadcast_move(rig: KstRig) -> None:
     """Who acknowledges has got the target."""
     raw = rig.stir() // 2
     row = rig.servo.table["goal_position"]
-    acknowledged = rig.run(broadcast_position(float(row.to_value(raw)), NODES, rig.dialect))
+    acknowledged = rig.run(broadcast_position(float(row.to_value(raw)), NODES, rig.settings))
     assert all(rig.servos[node].values["goal_position"] == raw for node in acknowledged)
 
 
 def broadcast_rate(rig: KstRig) -> None:
     rig.count += 1
     code = rig.count % len(BIT_RATES)
-    acknowledged = rig.run(broadcast_bit_rate(BIT_RATES[code], rig.dialect))
+    acknowledged = rig.run(broadcast_bit_rate(BIT_RATES[code], rig.settings))
     assert all(rig.servos[node].values["bit_rate_code"] == code for node in acknowledged)
 
 
 def broadcast_saving(rig: KstRig) -> None:
-    rig.run(broadcast_save(rig.dialect))
+    rig.run(broadcast_save(rig.settings))
     rig.link.advance(0.5)
 
 
 def stopping(rig: KstRig) -> None:
     """What an emergency stop says to a servo: where are you, and stay there. Success means that this is its target."""
     raw = rig.stir()
-    (ask,) = stop({NODE: None}, rig.dialect).requests
+    (ask,) = stop({NODE: None}, rig.settings).requests
     answer: Response = rig.run(ask)
-    (hold,) = stop({NODE: answer}, rig.dialect).requests
+    (hold,) = stop({NODE: answer}, rig.settings).requests
     _written(rig, lambda: rig.run(hold), "goal_position", raw)
 
 

@@ -15,8 +15,8 @@ from motorbus.cli.kst.servo import BusOption, Device, app, named, on_servo, one_
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.core import units
 from motorbus.errors import RequestError
-from motorbus.families.kst.driver import Node
-from motorbus.families.kst.driver.identity import code_of
+from motorbus.families.kst import Node
+from motorbus.families.kst.profiles import bit_rate_code
 
 
 @app.command(
@@ -170,5 +170,5 @@ def whole(text: str, what: str) -> int:
 def bits_per_second(text: str) -> int:
     """500000, 500k or 1M. Raises RequestError for a rate that these servos cannot have."""
     rate = units.rate(text)
-    code_of(rate)
+    bit_rate_code(rate)
     return rate

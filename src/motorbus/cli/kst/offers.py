@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 from motorbus.cli import quantity
 from motorbus.core import units
-from motorbus.families.kst import driver, wire
-from motorbus.families.kst.table import PROFILES, current, temperature, text
+from motorbus.families import kst
+from motorbus.families.kst import notifications, sdo
+from motorbus.families.kst.profiles import PROFILES, current, temperature, version_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -38,7 +39,7 @@ VERSIONS: Final = ("firmware_version", "software_version")
 
 def ping_everyone(bus: Bus) -> list[int]:
     """The servos that answer one read by everyone; on CAN their answers do not collide."""
-    return sorted(bus.run(driver.broadcast_read("node_id", driver.dialect_of(bus.family))))
+    return sorted(bus.run(kst.broadcast_read("node_id", kst.settings_of(bus.family))))
 
 
 def bit_rate_heard(
@@ -51,38 +52,38 @@ def bit_rate_heard(
     heard: dict[int, str] = {}
 
     def told(event: object) -> None:
-        if isinstance(event, driver.Skipped):
+        if isinstance(event, kst.Skipped):
             heard[event.rate] = f"not listened to: {event.why}"
         report(event)
 
-    found = bus.run(driver.scan_bit_rates(driver.dialect_of(bus.family), seconds=seconds), report=told)
+    found = bus.run(kst.scan_bit_rates(kst.settings_of(bus.family), seconds=seconds), report=told)
     heard |= {rate: one.value for rate, one in found.heard.items()}
     return found.rate, {rate: heard[rate] for rate in bus.family.link.rates if rate in heard}
 
 
 def budget_frames(family: Family, node: int) -> Mapping[str, tuple[Sequence[CanFrame], ...]]:
     """`write`: a goal and its acknowledgement; `read`: the position; for each frame all that it may be."""
-    dialect = driver.dialect_of(family)
-    table, limit = dialect.profile.table, dialect.profile.limit
+    settings = kst.settings_of(family)
+    table, limit = settings.profile.table, settings.profile.limit
     goal, present = table["goal_position"], table["present_position"]
-    extended, sized = dialect.extended(node), dialect.states_length(node)
+    extended, sized = settings.extended, settings.sized
     to, at = (goal.address, goal.subindex or 0), (present.address, present.subindex or 0)
     values = [goal.encode(raw) for raw in range(-limit, limit + 1)]
-    goals = [wire.encode_download(node, *to, data, sized=sized, extended=extended) for data in values]
-    told = [wire.encode_upload_reply(node, *at, data, extended=extended) for data in values]
+    goals = [sdo.encode_download(node, *to, data, sized=sized, extended=extended) for data in values]
+    told = [sdo.encode_upload_reply(node, *at, data, extended=extended) for data in values]
     return {
-        "write": (goals, [wire.encode_download_reply(node, *to, extended=extended)]),
-        "read": ([wire.encode_upload(node, *at, extended=extended)], told),
+        "write": (goals, [sdo.encode_download_reply(node, *to, extended=extended)]),
+        "read": ([sdo.encode_upload(node, *at, extended=extended)], told),
     }
 
 
 def report_frames(family: Family, node: int) -> list[CanFrame]:
     """A report of every position."""
-    dialect = driver.dialect_of(family)
-    profile, extended = dialect.profile, dialect.extended(node)
+    settings = kst.settings_of(family)
+    profile, extended = settings.profile, settings.extended
     form = profile.report_forms[0] if profile.report_forms else "sdo"
     return [
-        wire.encode_report(node, raw, form=form, extended=extended)
+        notifications.encode_report(node, raw, form=form, extended=extended)
         for raw in range(-profile.limit, profile.limit + 1)
     ]
 
@@ -90,21 +91,21 @@ def report_frames(family: Family, node: int) -> list[CanFrame]:
 def meaning(row: Register, raw: int) -> str:
     """A version is text, a status current and temperature; everything else as its row says."""
     if row.name in VERSIONS:
-        return text(row, raw)
+        return version_text(raw.to_bytes(row.size, "little"))
     profile = next((one for one in PROFILES.values() if row is one.status_row), None)
     if profile is None:
         return quantity.meaning(row, raw)
     here = units.show(current(profile, raw), "current")
-    return f"{here}, {units.show(temperature(profile, raw), 'temperature')}"
+    return f"{here}, {units.show(temperature(raw), 'temperature')}"
 
 
 def say(event: Any) -> str:
     """What an event of a scan or of provisioning says, in words; "" for one that says nothing to people."""
-    if isinstance(event, driver.Suspicion):
+    if isinstance(event, kst.Suspicion):
         where = f"#{event.node} " if event.node else ""
         return f"{where}at {event.rate} bit/s: {event.what}"
-    if isinstance(event, driver.PowerCycleNeeded):
+    if isinstance(event, kst.PowerCycleNeeded):
         return "take the supply of this servo away now, and give it back"
-    if isinstance(event, driver.Skipped):
+    if isinstance(event, kst.Skipped):
         return f"nothing was sent at {event.rate} bit/s: {event.why}"
     return ""

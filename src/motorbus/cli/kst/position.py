@@ -13,7 +13,7 @@ from motorbus.cli.exits import Exit
 from motorbus.cli.kst.servo import BusOption, Device, app, on_servo, one_of_ours, reads_only
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.core import units
-from motorbus.families.kst.driver import RawStatus, Servo
+from motorbus.families.kst import RawStatus, Servo
 
 
 @app.command(

@@ -20,7 +20,9 @@ from motorbus.cli.target import face, opened
 from motorbus.core import units
 from motorbus.core.steps import Progress
 from motorbus.errors import RequestError
-from motorbus.families.kst import driver
+from motorbus.families import kst
+from motorbus.families.kst import Node
+from motorbus.families.kst.driver.provisioning import provision as provision_procedure
 
 if TYPE_CHECKING:
     from motorbus.cli.output import Bar, Output
@@ -78,8 +80,8 @@ def provision(
         rehearse = partial(_rehearse, dry.DryBus(opening), node, wanted)
         consent_to(f"let {named(node)} become {become}, for good", output, yes=yes, rehearse=rehearse)
         with output.progress("provisioning") as bar:
-            operation = driver.provision(face(opening, node), patience=seconds, **wanted)
-            done = opening.run(operation, report=lambda event: _tell(event, bar, output))
+            procedure = provision_procedure(face(opening, node), patience=seconds, **wanted)
+            done = opening.run(procedure, report=lambda event: _tell(event, bar, output))
     facts = {"id": done.node, "bitrate": done.rate, "firmware": done.firmware, "resumed": done.resumed}
     output.document(SCHEMA, {"event": "provisioned", "from": node, **facts})
     before = "had all of it already" if done.resumed else "came back after the power cycle"
@@ -90,7 +92,7 @@ def provision(
 def _wanted(new_id: str, new_bitrate: str) -> dict[str, int]:
     wanted = {}
     if new_id:
-        wanted["new_id"] = driver.Node(whole(new_id, "an id")).node
+        wanted["new_id"] = Node(whole(new_id, "an id")).node
     if new_bitrate:
         wanted["new_rate"] = bits_per_second(new_bitrate)
     if not wanted:
@@ -108,7 +110,7 @@ def _tell(event: Any, bar: Bar, output: Output) -> None:
     if isinstance(event, Progress):
         bar.advance(event.done, event.total, event.what)
         output.document(SCHEMA, {"event": "progress", **event._asdict()})
-    elif isinstance(event, driver.PowerCycleNeeded):
+    elif isinstance(event, kst.PowerCycleNeeded):
         output.document(SCHEMA, {"event": "power-cycle", **event._asdict()})
         bar.say("take the supply of this servo away now, and give it back")
         if not bar.shown:

@@ -10,8 +10,8 @@ from motorbus.cli.kst.identity import whole
 from motorbus.cli.kst.servo import app
 from motorbus.cli.parameters import Flag, Silent
 from motorbus.errors import RequestError
-from motorbus.families.kst.driver import Node
-from motorbus.families.kst.table import PROFILES
+from motorbus.families.kst import Node
+from motorbus.families.kst.profiles import PROFILES
 
 
 @app.command(

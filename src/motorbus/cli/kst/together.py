@@ -1,4 +1,4 @@
-"""Several KST servos moved by one command: each gets its target, and one that is lost ends the move of all."""
+"""Move several KST servos by one command: each gets its target; if one does not answer, all stop."""
 
 from __future__ import annotations
 
@@ -8,9 +8,16 @@ from typing import TYPE_CHECKING
 from motorbus.cli.several import carried_out, or_all_stop
 from motorbus.core.interrupted import Moving, stopped_if_interrupted
 from motorbus.core.steps import gather
-from motorbus.families.kst import driver
-from motorbus.families.kst.driver.arrival import Move, arrive
-from motorbus.families.kst.driver.motion import TOLERANCE, counts, goal_of, send_goal
+from motorbus.families.kst import Servo
+from motorbus.families.kst.driver.feedback import position
+from motorbus.families.kst.driver.motion import (
+    TOLERANCE,
+    send_target,
+    setpoint,
+    stop,
+    target,
+    wait_arrival,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -21,33 +28,28 @@ if TYPE_CHECKING:
 
 
 def move_together(bus: Bus | DryBus, goals: Mapping[int, float], *, wait: bool = True) -> None:
-    """Send these targets (rad by id) one after the other, once all of them are judged; errors as `Servo.move` raises.
-
-    When a servo does not answer meanwhile the others stop.
-    """
-    servos = [driver.Servo(bus, node) for node in goals]
+    """Send these targets (rad by id) when all are checked; errors as `Servo.move` raises."""
+    servos = [Servo(bus, node) for node in goals]
     carried_out(bus, _move_together(servos, list(goals.values()), wait))
 
 
-async def _move_together(servos: Sequence[driver.Servo], to: Sequence[float], wait: bool) -> None:
-    goals = []
-    for servo, position in zip(servos, to, strict=True):
-        goals.append(await goal_of(servo, counts(servo, position)))
+async def _move_together(servos: Sequence[Servo], to: Sequence[float], wait: bool) -> None:
+    pairs = zip(servos, to, strict=True)
+    goals = [await setpoint(servo, target(servo, position)) for servo, position in pairs]
     if not wait:
-        await _sent(servos, goals)
+        await _send_all(servos, goals)
         return
-    devices = [Moving(one, partial(driver.stop, one), partial(driver.position, one)) for one in servos]
-    await stopped_if_interrupted(_gone(servos, goals), *devices)
+    devices = [Moving(one, partial(stop, one), partial(position, one)) for one in servos]
+    await stopped_if_interrupted(_send_and_wait(servos, goals), *devices)
 
 
-async def _gone(servos: Sequence[driver.Servo], goals: Sequence[Setpoint]) -> None:
-    await send_goal(servos[0], goals[0])
-    await or_all_stop(_sent(servos[1:], goals[1:]))
-    moves = [Move(goal.value, TOLERANCE, None) for goal in goals]
-    pairs = zip(servos, moves, strict=True)
-    await gather(*[or_all_stop(arrive(servo, move)) for servo, move in pairs])
+async def _send_and_wait(servos: Sequence[Servo], goals: Sequence[Setpoint]) -> None:
+    await send_target(servos[0], goals[0])
+    await or_all_stop(_send_all(servos[1:], goals[1:]))
+    pairs = zip(servos, goals, strict=True)
+    await gather(*[or_all_stop(wait_arrival(servo, goal.value, TOLERANCE, None)) for servo, goal in pairs])
 
 
-async def _sent(servos: Sequence[driver.Servo], goals: Sequence[Setpoint]) -> None:
+async def _send_all(servos: Sequence[Servo], goals: Sequence[Setpoint]) -> None:
     for servo, goal in zip(servos, goals, strict=True):
-        await send_goal(servo, goal)
+        await send_target(servo, goal)

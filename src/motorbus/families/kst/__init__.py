@@ -1,7 +1,7 @@
-"""KST CAN servos, and the makers who share their protocol: an expedited subset of CANopen SDO.
+"""KST CAN servos, and the makers that share their protocol: an expedited subset of CANopen SDO.
 
-`Servo` and `AsyncServo` are one servo each; the functions serve a whole bus. `FAMILY` is what the rest of motorbus
-knows of these servos. No servo tells its make: a bus is configured (`kst:PORT,profile=xqpower`).
+`Servo` and `AsyncServo` are one servo each; the functions serve a whole bus. No servo reports its maker, so a bus is
+opened with a profile (`kst:PORT,profile=xqpower`).
 """
 
 from __future__ import annotations
@@ -21,45 +21,34 @@ from motorbus.core.family import (
     Simulator,
     Stop,
 )
+from motorbus.core.guarantees import Guarantee, Guarantees, Level
 from motorbus.core.register import RegisterMap
 from motorbus.core.request import Request, Response
+from motorbus.core.scan import Skipped
 from motorbus.core.steps import Procedure, Runnable
 from motorbus.errors import RequestError
-from motorbus.families.kst import driver, wire
-from motorbus.families.kst.driver import (
-    AsyncServo,
-    BitRates,
-    Dialect,
-    Heard,
-    Memory,
-    Node,
-    PowerCycleNeeded,
-    Promise,
-    Provisioned,
-    RawStatus,
-    Servo,
-    Skipped,
-    Started,
-    Status,
-    Suspicion,
+from motorbus.families.kst.driver import bus, feedback, identity, motion, stream
+from motorbus.families.kst.driver.broadcast import (
     broadcast_bit_rate,
     broadcast_node_id,
     broadcast_position,
     broadcast_read,
     broadcast_save,
-    dialect_of,
-    line,
-    scan,
-    scan_bit_rates,
 )
-from motorbus.families.kst.driver.assured import ASSURANCE
-from motorbus.families.kst.table import DEFAULT_RATE, PROFILES, RATES, TABLES
+from motorbus.families.kst.driver.feedback import RawStatus, Status
+from motorbus.families.kst.driver.motion import Promise, Started
+from motorbus.families.kst.driver.node import DEFAULT, ID_FORMATS, NMT, SIZED, BusSettings, Node
+from motorbus.families.kst.driver.provisioning import PowerCycleNeeded, Provisioned
+from motorbus.families.kst.driver.scan import BitRates, Heard, Suspicion, scan, scan_bit_rates
+from motorbus.families.kst.driver.servo import AsyncServo, Servo, settings_of
+from motorbus.families.kst.notifications import BusState, FrameReceiver
+from motorbus.families.kst.profiles import DEFAULT_RATE, PROFILES, RATES, TABLES
 
 __all__ = [
     "FAMILY",
     "AsyncServo",
     "BitRates",
-    "Dialect",
+    "BusSettings",
     "Heard",
     "Kst",
     "Node",
@@ -77,59 +66,72 @@ __all__ = [
     "broadcast_position",
     "broadcast_read",
     "broadcast_save",
-    "dialect_of",
     "scan",
     "scan_bit_rates",
+    "settings_of",
 ]
 
-_AXIS: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
-    "state": driver.telemetry,
-    "position": driver.position,
-    "health": driver.health,
-    "move": driver.move,
-    "stop": driver.stop,
-    "limits": driver.limits,
-    "travel": driver.travel,
-    "train": driver.train,
-}
-_FELT: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
-    "current": driver.current,
-    "temperature": driver.temperature,
-}
 _SETTINGS: Final = (
-    Option("profile", str, "kst", f"the make of the servos: {', '.join(PROFILES)}; no servo tells it"),
-    Option(
-        "id_format", str, "std", "identifiers of 11 bits (std) or 29 (ext); auto asks each node in both once"
-    ),
-    Option(
-        "sized",
-        str,
-        "auto",
-        "whether writes state their length: no, yes, or auto (only where a node insists)",
-    ),
-    Option("nmt", str, "profile", "form of start and stop: profile, none, vendor or standard"),
-    Option("window", int, driver.WINDOW, "nodes in flight at once, 1 to 127"),
+    Option("profile", str, "kst", f"the make of the servos: {', '.join(PROFILES)}; no servo reports it"),
+    Option("id_format", str, "std", "identifiers of 11 bits (std) or 29 (ext)", ID_FORMATS),
+    Option("sized", str, "no", "whether writes state their length", SIZED),
+    Option("nmt", str, "profile", "form of start and stop: profile, none, vendor or standard", NMT),
 )
+
+GUARANTEES: Final = Guarantees(
+    measured=Guarantee(Level.YES, "it tells it when it is asked"),
+    limits=Guarantee(
+        Level.PARTLY, "the range of its make, as the bus is configured: no servo tells its make"
+    ),
+    stop=Guarantee(Level.PARTLY, Promise.HOLD_REQUESTED.value),
+    estops={"hold": Guarantee(Level.PARTLY, Promise.HOLD_REQUESTED.value)},
+    alone=Guarantee(
+        Level.PARTLY,
+        "led, it goes on to the last small goal, one cycle ahead of its course, makes up what it lags behind, and "
+        "holds; moved by itself, it goes on to its goal",
+    ),
+    ends=Guarantee(Level.YES, "it knows nothing but positions to go to"),
+    torque=Guarantee(Level.NO, "none: it holds with all its force as long as it has its supply"),
+    restart=Guarantee(
+        Level.PARTLY,
+        "where it says so, by the boot notice of CANopen, it is a fault; no sheet promises that it does, and a frame "
+        "that is lost is not seen",
+    ),
+    strain=Guarantee(
+        Level.PARTLY,
+        "current and temperature, where its make tells them; off its goal for too long counts as stalled in any case",
+    ),
+    watchdog=Guarantee(Level.NO, "none: it goes on to the last position it was told, and holds"),
+    led=True,
+)
+"""Source: the CAN protocol sheets of the makers: a target position, and no stop, torque switch or heartbeat."""
+
+_AXIS: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
+    "state": feedback.telemetry,
+    "position": feedback.position,
+    "health": feedback.health,
+    "move": motion.move,
+    "stop": motion.stop,
+    "limits": motion.limits,
+    "travel": motion.travel,
+    "train": stream.open_stream,
+}
 
 
 class Kst:
-    """The family of KST CAN servos; see `motorbus.core.family.Family` for each member.
-
-    A `configured` one serves one open bus and keeps what that has taught it; `FAMILY` keeps nothing.
-    """
+    """The family of KST CAN servos; see `core.family.Family` for each member."""
 
     name: Final = "kst"
     tables: Final[Mapping[str, RegisterMap]] = TABLES
-    devices: Final = Devices(Servo, AsyncServo, ASSURANCE)
+    devices: Final = Devices(Servo, AsyncServo, GUARANTEES)
 
-    def __init__(self, dialect: Dialect = driver.PLAIN, window: int = driver.WINDOW) -> None:
-        self._dialect = dialect
-        self._window = window
+    def __init__(self, settings: BusSettings = DEFAULT) -> None:
+        self._settings = settings
 
     @cached_property
     def link(self) -> LinkNeeds:
+        from motorbus.families.kst.recording import CAPTURES
         from motorbus.families.kst.simulator import OPTIONS
-        from motorbus.families.kst.wire.recording import CAPTURES
 
         return LinkNeeds(
             "frames",
@@ -137,7 +139,7 @@ class Kst:
             RATES,
             OPTIONS,
             _SETTINGS,
-            self._window,
+            bus.WINDOW,
             stops=("hold",),
             captures=CAPTURES,
         )
@@ -149,65 +151,56 @@ class Kst:
                 f"a kst bus has no setting {min(unknown)!r}",
                 expected=f"one of {', '.join(option.name for option in _SETTINGS)}",
             )
-        window = driver.window(settings.pop("window", self._window))
-        old = self._dialect
-        kept: dict[str, object] = {
-            "profile": old.profile.name,
-            "id_format": old.id_format,
-            "sized": old.sized,
-            "nmt": old.wanted_nmt,
-        }
-        return Kst(Dialect(**(kept | settings), memory=Memory()), window)
+        return Kst(self._settings.replace(state=BusState(), **settings))
 
     def lane(self, node: int) -> int:
         return node
 
     def air_time(self, request: Request[Any], rate: int) -> float:
-        return line.air_time(request, rate)
+        return bus.air_time(request, rate)
 
     def turnaround(self, request: Request[Any]) -> float:
-        return line.turnaround(request, self._dialect.profile.flash_wait)
+        return bus.response_delay(request, self._settings.profile.flash_wait)
 
     def quiet_time(self, rate: int) -> float:
-        return line.quiet_time(rate)
+        return bus.quiet_time(rate)
 
     def echo_test(self) -> None:
-        return None  # a CAN controller does not hear itself
+        return None  # a CAN controller does not receive its own frames
 
     def explain(self, data: bytes) -> list[Explanation]:
-        from motorbus.families.kst.explain import explain
+        from motorbus.families.kst.decode import decode
 
-        return explain(data, self._dialect.profile)
+        return decode(data, self._settings.profile)
 
     def receiver(self) -> Receiver:
-        dialect = self._dialect
-        if dialect.memory is None:
-            return wire.FrameReceiver(dialect.formats)
-        return driver.Ear(dialect.formats, dialect.memory)
+        return FrameReceiver(self._settings.extended, self._settings.state)
 
     def probe(self, node: int, attempt: int) -> Request[bool]:
-        return line.probe(Node(node, self._dialect), attempt)
+        return bus.probe(Node(node, self._settings), attempt)
 
     def stop(self, nodes: Mapping[int, Response | None]) -> Stop:
-        return line.stop(nodes, self._dialect)
+        return bus.stop(nodes, self._settings)
 
     def identify(self, node: int) -> Runnable[Identity]:
-        return driver.identify(Node(node, self._dialect))
+        return identity.identify(Node(node, self._settings))
 
     def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Procedure[list[Found]]:
-        return scan(ids, rates, self._dialect)
+        return scan(ids, rates, self._settings)
 
     def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:
         for profile in PROFILES.values():
             if model in (profile.name, profile.title):
-                return _AXIS if profile.status_row is None else {**_AXIS, **_FELT}
+                if profile.status_row is None:
+                    return _AXIS
+                return {**_AXIS, "current": feedback.current, "temperature": feedback.temperature}
         return {}
 
     def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
         from motorbus.families.kst.simulator import simulate
 
         if not model:
-            options.setdefault("profile", self._dialect.profile.name)
+            options.setdefault("profile", self._settings.profile.name)
         return simulate(ids, model, **options)
 
 

@@ -16,7 +16,7 @@ from textwrap import wrap
 from typing import Final, NamedTuple, TypeAlias
 
 from motorbus.core.register import Access, Coding, Register, Storage, changed
-from motorbus.families.kst.table import DEFAULT_NODE, RATES, Profile
+from motorbus.families.kst.profiles import DEFAULT_NODE, RATES, Profile
 
 
 class Moment(NamedTuple):

@@ -1,14 +1,12 @@
-"""Everyone at once: requests to node 0, which all carry out and each answers under its own id.
+"""Requests to node 0, which all servos carry out and answer, each under its own id.
 
-The manual says that 0 is a broadcast and not which requests it allows. A public demo driver reads so; that writes are
-carried out follows from the manual, whether they are acknowledged is not known, so silence is no error here. With one
-exception: nobody gives all servos one id by mistake.
+The manual calls 0 a broadcast and does not say which requests it allows. A public demo driver reads so; whether a servo
+acknowledges a broadcast write is not known, so silence is no error.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 
 from motorbus.core.family import IdChanged
 from motorbus.core.register import Register, Value
@@ -16,99 +14,89 @@ from motorbus.core.request import ANY, EVERY_LANE, Effect, Priority, Request, Re
 from motorbus.core.setpoint import Setpoint
 from motorbus.core.steps import Emit, Exclusive
 from motorbus.errors import RequestError
-from motorbus.families.kst import wire
-from motorbus.families.kst.driver.dialect import PLAIN, Dialect
-from motorbus.families.kst.driver.exchanges import OtherSize, sized
-from motorbus.families.kst.driver.identity import code_of
-from motorbus.families.kst.driver.motion import Started, counts
-from motorbus.families.kst.driver.node import Node, checked_id, checked_ids
-from motorbus.families.kst.table import SAVE
+from motorbus.families.kst import sdo
+from motorbus.families.kst.driver.motion import Started, target
+from motorbus.families.kst.driver.node import DEFAULT, BusSettings, Node, checked_id, checked_ids
+from motorbus.families.kst.driver.requests import OtherSize, value_bytes
+from motorbus.families.kst.notifications import encode_start
+from motorbus.families.kst.profiles import SAVE, bit_rate_code
 
 
-async def broadcast_read(name: str, dialect: Dialect = PLAIN) -> dict[int, Value]:
-    """An object of everyone, in API units, by node.
+async def broadcast_read(name: str, settings: BusSettings = DEFAULT) -> dict[int, Value]:
+    """An object of all servos, in API units, by node.
 
-    Who refuses it, is silent, says something longer, or says two different things (two servos with one id), is
-    missing. Raises RequestError for an object that is unknown or can only be written.
+    A servo is missing that refuses it, is silent, sends another size, or sends two values (two servos with one id).
+    Raises RequestError for an object that is unknown or write-only.
     """
-    row = dialect.profile.table[name]
+    row = settings.profile.table[name]
     if not row.readable:
         raise RequestError(f"{name} can only be written", advice="nothing was sent")
-    return await Exclusive(_read(row, dialect))
-
-
-async def _read(row: Register, dialect: Dialect) -> dict[int, Value]:
-    """With the bus alone: what a node says to everyone's question looks just like what it says to its own."""
-    found: dict[int, Value] = {}
-    for extended in sorted(dialect.formats):
-        frame = wire.encode_upload(wire.EVERYONE, row.address, row.subindex or 0, extended=extended)
-        answer = await Request[Response](frame, ANY, lane=EVERY_LANE)
-        found |= _values(row, answer, dialect)
-    return found
-
-
-def _values(row: Register, answer: Response, dialect: Dialect) -> dict[int, Value]:
-    told: dict[int, set[bytes]] = {}
+    frame = sdo.encode_upload(sdo.BROADCAST, row.address, row.subindex or 0, extended=settings.extended)
+    # Reserve the bus: a reply to a broadcast looks like a reply to a request to that node.
+    answer = await Exclusive(Request[Response](frame, ANY, lane=EVERY_LANE))
+    values: dict[int, set[bytes]] = {}
     for reply in answer.replies:
-        one = wire.decode_reply(reply.data)
-        if one is not None and one.kind == "upload" and _about(row, one):
-            with suppress(OtherSize):
-                told.setdefault(reply.lane, set()).add(sized(Node(reply.lane, dialect), row, one))
-    return {node: row.to_value(row.decode(data.pop())) for node, data in told.items() if len(data) == 1}
+        one = sdo.decode_reply(reply.data)
+        if one is not None and one.kind == "upload" and _is_about(row, one):
+            try:
+                values.setdefault(reply.lane, set()).add(value_bytes(Node(reply.lane, settings), row, one))
+            except OtherSize:
+                continue
+    return {node: row.to_value(row.decode(min(found))) for node, found in values.items() if len(found) == 1}
 
 
-def _about(row: Register, reply: wire.SdoReply) -> bool:
-    return (reply.index, reply.subindex) == (row.address, row.subindex or 0)
+async def broadcast_position(
+    to: float, nodes: Sequence[int], settings: BusSettings = DEFAULT
+) -> tuple[int, ...]:
+    """Send all servos to `to` rad; return the nodes that acknowledged.
 
-
-async def broadcast_position(to: float, nodes: Sequence[int], dialect: Dialect = PLAIN) -> tuple[int, ...]:
-    """Send everyone on the bus to `to` rad; returns who acknowledged. Where the profile has a start rule, everyone is
-    started first, and `Started` (node 0) tells so.
-
-    `nodes` are those that are there, for the gate and the emergency stop; everyone else on the bus moves as well.
-    Raises LimitExceeded when `to` is outside the range of the profile, RequestError for no nodes.
+    `nodes` are the servos that the gate checks: name all on the bus, because all move. Raises RequestError for no node,
+    LimitExceeded as `move`. Where the profile has a start rule, a start to all is sent first and reported.
     """
-    there = checked_ids(nodes)
-    if not there:
+    checked = checked_ids(nodes)
+    if not checked:
         raise RequestError(
-            "who is on this bus? everyone will move, and what moves must be known to be stopped",
+            "a broadcast moves all servos on the bus, and none is named",
             expected="the ids of all servos on it",
             advice="scan() lists them; nothing was sent",
         )
-    row = dialect.profile.table["goal_position"]
-    raw = counts(Node(there[0], dialect), to)
-    value, low, high = (float(row.to_value(number)) for number in (raw, row.low, row.high))
-    goals = tuple(Setpoint(node, "position", value, low, high) for node in there)
-    return await Exclusive(_moved(dialect, row, raw, goals))
+    row = settings.profile.table["goal_position"]
+    raw = target(Node(checked[0], settings), to)
+    limits = float(row.to_value(row.low)), float(row.to_value(row.high))
+    setpoints = tuple(Setpoint(node, "position", float(row.to_value(raw)), *limits) for node in checked)
 
-
-async def _moved(dialect: Dialect, row: Register, raw: int, goals: tuple[Setpoint, ...]) -> tuple[int, ...]:
-    if dialect.must_start:
-        for extended in sorted(dialect.formats):
-            frame = wire.encode_start(dialect.nmt, wire.EVERYONE, True, extended=extended)
+    async def start_and_move() -> tuple[int, ...]:
+        if settings.must_start:
+            frame = encode_start(settings.nmt, sdo.BROADCAST, True, extended=settings.extended)
             await Request[Response](
-                frame, (), lane=EVERY_LANE, priority=Priority.CONTROL, effect=Effect.MOTION, setpoints=goals
+                frame,
+                (),
+                lane=EVERY_LANE,
+                priority=Priority.CONTROL,
+                effect=Effect.MOTION,
+                setpoints=setpoints,
             )
-            await Emit(Started(wire.EVERYONE, frame))
-    return await _written(dialect, row, raw, goals)
+            await Emit(Started(sdo.BROADCAST, frame))
+        return await _write(settings, row, raw, setpoints)
+
+    return await Exclusive(start_and_move())
 
 
-async def broadcast_save(dialect: Dialect = PLAIN) -> tuple[int, ...]:
-    """Let everyone save; returns who acknowledged, which by the manual is nobody. The bus is then left alone until the
-    flash of all has been written."""
-    row = dialect.profile.table["store"]
-    return await Exclusive(_written(dialect, row, SAVE, timeout=TimeoutClass.STORE))
+async def broadcast_save(settings: BusSettings = DEFAULT) -> tuple[int, ...]:
+    """Let all servos save, and wait for their flash; return the nodes that acknowledged, by the manual none."""
+    row = settings.profile.table["store"]
+    return await Exclusive(_write(settings, row, SAVE, reply_within=TimeoutClass.STORE))
 
 
-async def broadcast_bit_rate(rate: int, dialect: Dialect = PLAIN) -> tuple[int, ...]:
-    """Give everyone another bit rate (bit/s), in force after a save and a restart; returns who acknowledged."""
-    row = dialect.profile.table["bit_rate_code"]
-    return await Exclusive(_written(dialect, row, code_of(rate)))
+async def broadcast_bit_rate(rate: int, settings: BusSettings = DEFAULT) -> tuple[int, ...]:
+    """Give all servos another bit rate (bit/s), see `set_bit_rate`; return the nodes that acknowledged."""
+    return await Exclusive(_write(settings, settings.profile.table["bit_rate_code"], bit_rate_code(rate)))
 
 
-async def broadcast_node_id(new: int, dialect: Dialect = PLAIN, *, force: bool = False) -> tuple[int, ...]:
-    """Give everyone on the bus this id. Raises RequestError without `force`: with more than one servo there, they could
-    not be told apart any more."""
+async def broadcast_node_id(
+    new: int, settings: BusSettings = DEFAULT, *, force: bool = False
+) -> tuple[int, ...]:
+    """Give all servos on the bus this id. Raises RequestError without `force`: several servos then have one id."""
     checked_id(new)
     if not force:
         raise RequestError(
@@ -116,55 +104,46 @@ async def broadcast_node_id(new: int, dialect: Dialect = PLAIN, *, force: bool =
             cause="servos with one id answer together, and cannot be given different ids any more but one at a time",
             advice="connect one servo and use provision(); force=True does it all the same; nothing was sent",
         )
-    return await Exclusive(_readdressed(dialect, new))
+
+    async def write() -> tuple[int, ...]:
+        await Emit(IdChanged(None, new))
+        return await _write(settings, settings.profile.table["node_id"], new)
+
+    return await Exclusive(write())
 
 
-async def _readdressed(dialect: Dialect, new: int) -> tuple[int, ...]:
-    await Emit(IdChanged(None, new))
-    return await _written(dialect, dialect.profile.table["node_id"], new)
-
-
-async def _written(
-    dialect: Dialect,
+async def _write(
+    settings: BusSettings,
     row: Register,
     raw: int,
-    goals: tuple[Setpoint, ...] = (),
+    setpoints: tuple[Setpoint, ...] = (),
     *,
-    timeout: TimeoutClass = TimeoutClass.REPLY,
+    reply_within: TimeoutClass = TimeoutClass.REPLY,
 ) -> tuple[int, ...]:
-    acknowledged: list[int] = []
-    for extended in sorted(dialect.formats):
-        answer = await _write(dialect, row, row.encode(raw), goals, timeout, extended)
-        for reply in answer.replies:
-            one = wire.decode_reply(reply.data)
-            if one is not None and one.kind == "download" and _about(row, one):
-                acknowledged.append(reply.lane)
-    return tuple(dict.fromkeys(acknowledged))
-
-
-def _write(
-    dialect: Dialect,
-    row: Register,
-    data: bytes,
-    goals: tuple[Setpoint, ...],
-    timeout: TimeoutClass,
-    extended: bool,
-) -> Request[Response]:
-    frame = wire.encode_download(
-        wire.EVERYONE,
+    frame = sdo.encode_download(
+        sdo.BROADCAST,
         row.address,
         row.subindex or 0,
-        data,
-        sized=dialect.sized == "yes",
-        extended=extended,
+        row.encode(raw),
+        sized=settings.sized,
+        extended=settings.extended,
     )
-    priority = Priority.CONTROL if row.effect is Effect.MOTION else Priority.CONFIGURATION
-    return Request(
+    answer = await Request[Response](
         frame,
         ANY,
         lane=EVERY_LANE,
-        priority=priority,
+        priority=Priority.CONTROL if row.effect is Effect.MOTION else Priority.CONFIGURATION,
         effect=row.effect,
-        setpoints=goals,
-        reply_within=timeout,
+        setpoints=setpoints,
+        reply_within=reply_within,
     )
+    acknowledged = []
+    for reply in answer.replies:
+        one = sdo.decode_reply(reply.data)
+        if one is not None and one.kind == "download" and _is_about(row, one):
+            acknowledged.append(reply.lane)
+    return tuple(dict.fromkeys(acknowledged))
+
+
+def _is_about(row: Register, reply: sdo.SdoReply) -> bool:
+    return (reply.index, reply.subindex) == (row.address, row.subindex or 0)

@@ -1,7 +1,7 @@
-"""What a servo feels: its position, and with newer firmware its current and its temperature.
+"""Position, current, temperature, health.
 
-The manual reads the status by the very frame that reads the position, and answers alike; four public drivers read it
-elsewhere. So by the profile `kst` a status is two bytes that nothing decodes, and a warning.
+The manual reads the status by the same frame as the position (commands 6 and 7); four public drivers read it at
+0x6005. So by the profile `kst` a status is two bytes that are not decoded.
 """
 
 from __future__ import annotations
@@ -9,15 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, NamedTuple, TypeVar
 
-from motorbus.core.family import State
+from motorbus.core.family import Health, State
 from motorbus.core.register import Register
 from motorbus.core.request import Request
-from motorbus.core.steps import Runnable
-from motorbus.families.kst import table
-from motorbus.families.kst.driver.exchanges import decided, ready, upload, upload_row
-from motorbus.families.kst.driver.node import Node
-from motorbus.families.kst.driver.refusals import lacking
-from motorbus.families.kst.wire import SdoReply
+from motorbus.families.kst import profiles
+from motorbus.families.kst.driver.node import Node, lacking
+from motorbus.families.kst.driver.requests import read_object, read_register
+from motorbus.families.kst.sdo import SdoReply
 
 T = TypeVar("T")
 
@@ -28,7 +26,7 @@ SAME_FRAME: Final = (
 
 
 class RawStatus(NamedTuple):
-    """The two status bytes of the manual's command 7, as they came; `warning` says why nothing decodes them."""
+    """The two status bytes of command 7 as received; `warning` says why they are not decoded."""
 
     x1: int
     x2: int
@@ -36,98 +34,100 @@ class RawStatus(NamedTuple):
 
 
 class Status(NamedTuple):
-    """The status of a servo with newer firmware: supply current in A, temperature in °C."""
+    """Supply current (A) and temperature (°C) of a servo with newer firmware."""
 
     current: float
     temperature: float
 
 
-def position(node: Node) -> Runnable[float]:
+def position(node: Node) -> Request[float]:
     """Present position, rad."""
-    return ready(node, position_exchange)
+    return _kept(node, "position", _position)
 
 
-def position_exchange(node: Node) -> Request[float]:
-    """As `position`, of a servo whose id format is known: one exchange that can be kept and run again."""
-    return kept(node, "position", _position)
+def _kept(node: Node, name: str, make: Callable[[Node], Request[T]]) -> Request[T]:
+    if name not in node.kept:
+        node.kept[name] = make(node)
+    return node.kept[name]
 
 
 def _position(node: Node) -> Request[float]:
     row = node.table["present_position"]
-    return upload_row(node, row, lambda raw: float(row.to_value(raw)), reports_position=True)
+    return read_register(node, row, lambda raw: float(row.to_value(raw)), reports_position=True)
 
 
-def kept(node: Node, name: str, make: Callable[[Node], Request[T]]) -> Request[T]:
-    """The exchange that brings this quantity: made once, and anew when the node is asked in another id format."""
-    extended = node.dialect.extended(node.node)
-    found = node.kept.get(name)
-    if found is None or found[0] is not extended:
-        found = node.kept[name] = extended, make(node)
-    return found[1]
-
-
-def status(node: Node) -> Runnable[RawStatus | Status]:
-    """By the profile `kst` the two raw bytes of command 7, with a warning; else current (A) and temperature (°C)."""
-    return ready(node, raw_status if node.profile.status_row is None else _felt)
+def status(node: Node) -> Request[RawStatus | Status]:
+    """Current (A) and temperature (°C); by the profile `kst` the two raw bytes of command 7, with a warning."""
+    return raw_status(node) if node.profile.status_row is None else _decoded_status(node)
 
 
 def raw_status(node: Node) -> Request[RawStatus]:
-    """The manual's command 7, whatever the profile: the bytes may be a position."""
-    return kept(node, "raw_status", _raw_status)
-
-
-def _raw_status(node: Node) -> Request[RawStatus]:
+    """Command 7 of the manual with any profile: the bytes may be a position."""
     row = node.table["present_position"]
 
     def take(reply: SdoReply) -> RawStatus:
         return RawStatus(*(reply.data + bytes(2))[:2])
 
-    return upload(node, row.address, row.subindex or 0, take)
+    return read_object(node, row.address, row.subindex or 0, take)
 
 
-def current(node: Node) -> Runnable[float]:
+def _decoded_status(node: Node) -> Request[Status]:
+    def take(raw: int) -> Status:
+        return Status(profiles.current(node.profile, raw), float(profiles.temperature(raw)))
+
+    return _kept(node, "status", lambda same: read_register(same, _status_row(same), take))
+
+
+def current(node: Node) -> Request[float]:
     """Supply current, A. Raises RequestError where the profile has no status object."""
-    _status_row(node)
-    return ready(node, lambda same: kept(same, "current", _current))
+
+    def take(raw: int) -> float:
+        return profiles.current(node.profile, raw)
+
+    return _kept(node, "current", lambda same: read_register(same, _status_row(same), take))
 
 
-def temperature(node: Node) -> Runnable[float]:
-    """Temperature inside, °C. Raises RequestError where the profile has no status object."""
-    _status_row(node)
-    return ready(node, lambda same: kept(same, "temperature", _temperature))
+def temperature(node: Node) -> Request[float]:
+    """Temperature, °C. Raises RequestError where the profile has no status object."""
+
+    def take(raw: int) -> float:
+        return float(profiles.temperature(raw))
+
+    return _kept(node, "temperature", lambda same: read_register(same, _status_row(same), take))
 
 
 async def telemetry(node: Node) -> State:
-    """One sample: position (rad); current (A) and temperature (°C) where the profile has them; alarms heard lately.
-
-    Whether it moves, how fast, at what voltage and under what load is None: these servos do not tell.
-    """
-    await decided(node)
-    here = await position_exchange(node)
+    """One sample: position (rad), with newer firmware current (A) and temperature (°C), recent alarms."""
+    here = await position(node)
     at = node.at
     if node.profile.status_row is None:
         return State(at=at, position=here, alarm=node.alarm)
-    felt = await _felt(node)
-    return State(at=at, position=here, current=felt.current, temperature=felt.temperature, alarm=node.alarm)
+    now = await _decoded_status(node)
+    return State(at=at, position=here, current=now.current, temperature=now.temperature, alarm=node.alarm)
 
 
-def _felt(node: Node) -> Request[Status]:
-    return kept(node, "status", _status)
+def health(node: Node) -> Request[Health]:
+    """Current (A), temperature (°C) and recent alarms; by a profile without a status object the position (rad).
 
+    `restarts` counts the boot messages (CiA 301) received from the node. No source says that these servos send one: a
+    servo that does not restarts unnoticed, or is silent for a while.
+    """
+    row, state = node.profile.status_row, node.settings.state
 
-def _status(node: Node) -> Request[Status]:
-    def take(raw: int) -> Status:
-        return Status(table.current(node.profile, raw), float(table.temperature(node.profile, raw)))
+    def take(raw: int) -> Health:
+        restarts = None if state is None else state.boots[node.node]
+        if row is None:
+            here = float(node.table["present_position"].to_value(raw))
+            return Health(State(at=node.at, position=here, alarm=node.alarm), restarts=restarts)
+        sample = State(
+            at=node.at,
+            current=profiles.current(node.profile, raw),
+            temperature=float(profiles.temperature(raw)),
+            alarm=node.alarm,
+        )
+        return Health(sample, restarts=restarts)
 
-    return upload_row(node, _status_row(node), take)
-
-
-def _current(node: Node) -> Request[float]:
-    return upload_row(node, _status_row(node), lambda raw: table.current(node.profile, raw))
-
-
-def _temperature(node: Node) -> Request[float]:
-    return upload_row(node, _status_row(node), lambda raw: float(table.temperature(node.profile, raw)))
+    return read_register(node, row or node.table["present_position"], take, reports_position=row is None)
 
 
 def _status_row(node: Node) -> Register:

@@ -1,122 +1,138 @@
-"""Who is there, and under which id and at which rate it will be next time.
+"""Identity, node id and bit rate of a servo, and whether one servo or two answer to an id.
 
-No servo of this protocol tells its maker or model, so what it is taken for is the profile that was chosen. Id and bit
-rate written here are in force after a save and a restart only, and there is no command that restarts: `provision`
-guides through all of it. Source: KST CAN protocol manual, commands 1, 2, 4 and 8.
+No servo reports its maker or model, so its model is the profile of the bus. A node id or bit rate written here takes
+effect after a save and a restart, and no command restarts a servo: `provision` does all of it. Source: KST CAN protocol
+manual, commands 1, 2, 4 and 8.
+
+Two servos with one id reply at slightly different times, which gives two replies, or at the same time: equal replies
+then merge into one frame, unequal ones break each other. So several objects that seldom agree are read again and
+again, and bus errors meanwhile count as a second servo. Most slcan adapters report no bus errors: there, a position
+that never comes from a servo whose id always comes counts as two.
 """
 
 from __future__ import annotations
 
+from typing import Final, NamedTuple
+
 from motorbus.core.family import IdChanged, Identity
 from motorbus.core.register import Register
-from motorbus.core.request import Priority
-from motorbus.core.steps import Emit, Exclusive, catch
+from motorbus.core.request import Notification, Priority, Request
+from motorbus.core.steps import Emit, Exclusive, WaitFor, catch, gather
 from motorbus.errors import DeviceError, MotorbusError, NoReply, RequestError, VerificationFailed
-from motorbus.families.kst import table
-from motorbus.families.kst.driver.exchanges import (
-    ABSENT,
-    answers,
-    decided,
-    meant,
-    order,
-    ready,
-    upload_row,
-    whole,
-)
+from motorbus.families.kst import sdo
 from motorbus.families.kst.driver.node import Node, checked_id, hexadecimal
-from motorbus.families.kst.driver.presence import glance, single
-from motorbus.families.kst.table import BIT_RATES
+from motorbus.families.kst.driver.requests import (
+    FIRMWARE,
+    NODE_ID,
+    POSITION,
+    ask_presence,
+    collect,
+    is_absent,
+    read_all_bytes,
+    read_register,
+    write_register,
+)
+from motorbus.families.kst.profiles import BIT_RATES, bit_rate_code, version_text
+from motorbus.families.kst.sdo import SdoReply
 
-UNKNOWN = "unknown"
+ROUNDS: Final = 3
+OBJECTS: Final = (NODE_ID, POSITION, FIRMWARE)
+"""Two servos may agree on the id, and seldom on position and version."""
+ERROR_TIME: Final = 0.5
+"""s in which bus errors count; about the time that all reads of a survey take."""
 
 
 async def ping(node: Node) -> bool:
-    """Is it there? A refusal is an answer; silence is the answer False."""
+    """Whether a servo answers; an abort is an answer."""
     try:
-        await decided(node)
-        await answers(node)
+        await ask_presence(node)
     except NoReply:
         return False
     return True
 
 
 async def identify(node: Node) -> Identity:
-    """The profile it is taken for, the version it tells ("unknown" when it refuses), and the id it reads back."""
-    reads_back = await _if_told(node, node.table["node_id"])
+    """The profile as model, the version ("unknown" when the servo refuses it), and the id that it reads back."""
+    reads_back = await _read_if_allowed(node, node.table["node_id"])
     try:
         firmware = await version(node)
     except DeviceError:
-        firmware = UNKNOWN
-    extended = node.dialect.extended(node.node)
+        firmware = "unknown"
     details = {
         "profile": node.profile.name,
-        "id_format": "ext" if extended else "std",
+        "id_format": "ext" if node.settings.extended else "std",
         "reads_back_id": reads_back,
     }
     return Identity(node.node, node.profile.title, firmware, node.profile.name, details)
 
 
 async def version(node: Node) -> str:
-    """The firmware version as text, from 0x100A or where newer firmware has it; as hex when it is no text.
+    """The firmware version as text, from 0x100A or where newer firmware has it; as hex where it is no text.
 
-    Text of more than four letters is taken in segments. Raises DeviceError when the servo has none of these objects.
+    Raises DeviceError when the servo has none of these objects.
     """
-    refusal: DeviceError | None = None
+    first: DeviceError | None = None
     for row in node.profile.version_rows:
         try:
-            return table.version(await whole(node, row))
+            return version_text(await read_all_bytes(node, row))
         except DeviceError as error:
-            if meant(error.code) not in ABSENT:
+            if not is_absent(error):
                 raise
-            refusal = refusal or error
-    assert refusal is not None
-    raise refusal
+            first = first or error
+    assert first is not None
+    raise first
 
 
-async def node_id(node: Node) -> int:
-    """The id it reads back: its own, or after set_node_id() the one it will have after a save and a restart."""
-    return await ready(node, lambda same: upload_row(same, same.table["node_id"], int))
+async def _read_if_allowed(node: Node, row: Register) -> int | None:
+    """The raw value, or None when the servo refuses it."""
+    found = await catch(read_register(node, row, int))
+    if isinstance(found, DeviceError):
+        return None
+    if isinstance(found, MotorbusError):
+        raise found
+    return found
+
+
+# -- node id ---------------------------------------------------------------------------------------------------
+
+
+def node_id(node: Node) -> Request[int]:
+    """The id that it reads back: its own, or after set_node_id() the one after the next save and restart."""
+    return read_register(node, node.table["node_id"], int)
 
 
 async def set_node_id(node: Node, new: int) -> None:
-    """Give it another id, 1 to 127; in force after save() and a restart, lost at a restart without.
+    """Give it another id, 1 to 127: it takes effect after save() and a restart, and is lost at one without a save.
 
-    Looks first whether it is alone with its id. Raises RequestError for any other new id (nothing is sent), for two
-    servos with one id and for an id that another servo has (nothing is written), NoReply for nobody,
-    VerificationFailed when it reads back neither. To swap two ids, give one of them a third one first.
+    Raises RequestError for another new id (nothing is sent), two servos with this id or an id in use (nothing is
+    written); NoReply; VerificationFailed when it reads back neither. To swap two ids, give one of them a third one
+    first.
     """
     checked_id(new)
-    if not await Exclusive(single(node)):
-        await answers(node)  # which tells best that nobody is there
-    await _free(Node(new, node.dialect), node)
+    if not await Exclusive(answers_alone(node)):
+        await ask_presence(node)  # raises NoReply
+    if new != node.node and (await look(Node(new, node.settings))).answered:
+        raise id_taken(node.node, new)
     await write_node_id(node, new)
 
 
-async def _free(new: Node, old: Node) -> None:
-    """Raises RequestError when a servo answers as `new` already, unless that is the old id."""
-    if new.node == old.node:
-        return
-    look = await glance(new)
-    if look.there:
-        raise RequestError(
-            f"the id {hexadecimal(new.node)} is taken: a servo answers as it beside {hexadecimal(old.node)}",
-            cause="after a restart both would answer to one id, and neither could be addressed alone",
-            advice="choose a free id, or take that servo off the bus; nothing was written",
-            node=new.node,
-        )
+def id_taken(old: int, new: int) -> RequestError:
+    """The error for a new id at which a servo answers."""
+    return RequestError(
+        f"the id {hexadecimal(new)} is taken: a servo answers as it beside {hexadecimal(old)}",
+        cause="after a restart both would answer to one id, and neither could be addressed alone",
+        advice="choose a free id, or take that servo off the bus; nothing was written",
+        node=new,
+    )
 
 
 async def write_node_id(node: Node, new: int) -> None:
-    """As `set_node_id`, for who has looked already whether the servo is alone with its id."""
+    """As `set_node_id`, without the checks of both ids."""
     row = node.table["node_id"]
     await Emit(IdChanged(node.node, new))
-    await order(node, row, new, priority=Priority.CONFIGURATION)
-    found = await _if_told(node, row)
-    if found not in (
-        None,
-        new,
-        node.node,
-    ):  # its present id: what it will have does not show before the restart
+    await write_register(node, row, new, priority=Priority.CONFIGURATION)
+    found = await _read_if_allowed(node, row)
+    if found not in (None, new, node.node):  # some servos read back the id in force
         raise VerificationFailed(
             f"node {node.node} was told to be {new} and reads back {found}",
             sent=bytes((new,)),
@@ -127,50 +143,105 @@ async def write_node_id(node: Node, new: int) -> None:
         )
 
 
-async def bit_rate(node: Node) -> int | None:
-    """The rate (bit/s) it will have after a restart; None where that cannot be read: the manual has the write only.
+# -- bit rate --------------------------------------------------------------------------------------------------
 
-    Raises NoReply when nobody is there.
-    """
-    await decided(node)
+
+async def bit_rate(node: Node) -> int | None:
+    """The rate (bit/s) after the next restart; None where the servo does not report it: the manual has no read."""
     try:
-        code = await upload_row(node, node.table["bit_rate_code"], int)
+        code = await read_register(node, node.table["bit_rate_code"], int)
     except NoReply:
-        await answers(node)  # or is nobody there at all?
+        await ask_presence(node)  # raises NoReply when there is no servo
         return None
-    except DeviceError as refusal:
-        if meant(refusal.code) not in ABSENT:
+    except DeviceError as error:
+        if not is_absent(error):
             raise
         return None
     return BIT_RATES.get(code)
 
 
-async def set_bit_rate(node: Node, rate: int) -> None:
-    """Give it another bit rate (bit/s); in force after save() and a restart, lost at a restart without.
+def set_bit_rate(node: Node, rate: int) -> Request[None]:
+    """Give it another bit rate (bit/s): it takes effect after save() and a restart, and is lost at a restart without.
 
-    Raises RequestError for a rate it cannot have (nothing is sent).
+    Raises RequestError for a rate that these servos do not have.
     """
-    await order(node, node.table["bit_rate_code"], code_of(rate), priority=Priority.CONFIGURATION)
-
-
-def code_of(rate: int) -> int:
-    """The code of a bit rate; neither slcan's nor that of CiA 305. Raises RequestError for a rate without one."""
-    for code, known in BIT_RATES.items():
-        if known == rate and not isinstance(rate, bool):
-            return code
-    raise RequestError(
-        f"{rate!r} bit/s is no rate of these servos",
-        expected=f"one of {', '.join(map(str, BIT_RATES.values()))}",
-        advice="nothing was sent",
+    return write_register(
+        node, node.table["bit_rate_code"], bit_rate_code(rate), priority=Priority.CONFIGURATION
     )
 
 
-async def _if_told(node: Node, row: Register) -> int | None:
-    """The raw value, or None when the servo refuses to tell."""
-    await decided(node)
-    found = await catch(upload_row(node, row, int))
-    if isinstance(found, DeviceError):
-        return None
-    if isinstance(found, MotorbusError):
-        raise found
-    return found
+# -- one servo or two ------------------------------------------------------------------------------------------
+
+
+class Presence(NamedTuple):
+    """Result of reading an id: time (s), most replies to one request, the id read back, bus errors meanwhile.
+
+    `torn`: the id came every time and the position never, as when two unequal replies break each other.
+    """
+
+    at: float
+    most: int
+    reads_back: int | None = None
+    errors: bool = False
+    torn: bool = False
+
+    @property
+    def answered(self) -> bool:
+        return self.most > 0
+
+    @property
+    def several(self) -> bool:
+        """More than one servo replied, or some replies broke. If all broke, the bit rate may be wrong."""
+        return self.most > 1 or self.torn or (self.errors and self.answered)
+
+
+def look(node: Node, index: int = NODE_ID) -> Request[Presence]:
+    """Read an object once and count the replies; silence is a result."""
+
+    def take(replies: list[SdoReply], at: float) -> Presence:
+        mine = [reply for reply in replies if reply.index in (index, 0)]
+        ids = [reply.data[0] for reply in mine if reply.kind == "upload" and index == NODE_ID]
+        return Presence(at, len(mine), ids[0] if ids else None)
+
+    return collect(node, sdo.encode_upload(node.node, index, extended=node.settings.extended), take)
+
+
+async def survey(node: Node) -> Presence:
+    """Read several objects several times and watch for bus errors. Run it with the bus reserved."""
+    found, error = await gather(_look_often(node), WaitFor(is_bus_error, ERROR_TIME))
+    return found._replace(errors=error is not None)
+
+
+async def _look_often(node: Node) -> Presence:
+    most, reads_back = 0, None
+    counts = dict.fromkeys(OBJECTS, 0)
+    for index in OBJECTS * ROUNDS:
+        found = await look(node, index)
+        most = max(most, found.most)
+        counts[index] += found.answered
+        reads_back = found.reads_back or reads_back
+    torn = counts[NODE_ID] == ROUNDS and not counts[POSITION]
+    return Presence(found.at, most, reads_back, torn=torn)
+
+
+async def answers_alone(node: Node) -> bool:
+    """Whether a servo answers to this id. Raises RequestError when two do. Run it with the bus reserved."""
+    found = await survey(node)
+    if not found.several:
+        return found.answered
+    signs = "its id comes every time, its position never"
+    if found.most > 1:
+        signs = f"{found.most} answers to one request"
+    elif found.errors:
+        signs = "bus errors whenever it is asked"
+    raise RequestError(
+        f"two servos answer as {hexadecimal(node.node)}: {signs}",
+        cause="servos are shipped with one id, and both obey what is sent to it; or the bus is disturbed",
+        advice="connect one servo at a time, provision it, then the next; nothing was written",
+        node=node.node,
+    )
+
+
+def is_bus_error(notification: Notification) -> bool:
+    """Whether the adapter reports a bus error."""
+    return notification.kind == "bus error"

@@ -1,9 +1,8 @@
-"""Moving and standing still.
+"""Move and stop.
 
-These servos know one thing: a target position, at which they go by themselves, at once and at their own speed. They
-have no torque switch, and standing still is a target too: the position of this moment. Some makes ignore every
-target until they were started. Source: KST CAN protocol manual, command 5; the start rule is from a public XQPOWER
-module.
+These servos have one motion command, a target position that takes effect at once, at their own speed. They have no
+torque switch and no stop: a stop makes the present position the target. Some makers ignore targets until the servo is
+started. Source: KST CAN protocol manual, command 5; the start rule: a public XQPOWER module.
 """
 
 from __future__ import annotations
@@ -12,28 +11,31 @@ from enum import Enum
 from functools import partial
 from typing import Final, NamedTuple
 
+from motorbus.core.arrival import wait_in_position
 from motorbus.core.can_frame import CanFrame
+from motorbus.core.family import State
 from motorbus.core.interrupted import Moving, stopped_if_interrupted
 from motorbus.core.register import Register, changed
 from motorbus.core.request import Effect, Priority, Request
 from motorbus.core.setpoint import Setpoint, Stays, torque_on
 from motorbus.core.steps import Emit
-from motorbus.errors import DeviceError, LimitExceeded, RequestError
-from motorbus.families.kst import wire
-from motorbus.families.kst.driver.arrival import Move, arrive
-from motorbus.families.kst.driver.exchanges import ABSENT, decided, meant, order, upload_row
+from motorbus.errors import DeviceError, LimitExceeded, RequestError, Stalled
+from motorbus.families.kst import sdo
 from motorbus.families.kst.driver.feedback import position
-from motorbus.families.kst.driver.node import Node
-from motorbus.families.kst.driver.refusals import above_zero
+from motorbus.families.kst.driver.node import Node, check_above_zero
+from motorbus.families.kst.driver.requests import is_absent, read_register, write_register
+from motorbus.families.kst.notifications import encode_start
 
 TOLERANCE: Final = 0.02
-"""rad, a little more than a degree: under load a servo stays off its target, by how much no source tells."""
+"""rad, about a degree. # assumption: no source gives the error under load."""
+SLOWEST: Final = 1.0
+"""rad/s that each servo reaches; the default timeout of a move is computed with it. # assumption"""
 TOO_FAR: Final = frozenset((0x0609_0030, 0x0609_0031, 0x0609_0032))
-"""Refusals of a position beyond the range."""
+"""Abort codes of a position outside the range."""
 
 
 class Promise(Enum):
-    """What an acknowledged stop promises, and no more than that."""
+    """What an acknowledged stop means."""
 
     HOLD_REQUESTED = (
         "target := last fresh position: requested of each node that acknowledged; it goes back or on to where it "
@@ -42,7 +44,7 @@ class Promise(Enum):
 
 
 class Started(NamedTuple):
-    """An event: this servo was started, because its make ignores positions before that."""
+    """An event: this servo was started, because its maker's servos ignore positions before."""
 
     node: int
     frame: CanFrame
@@ -56,148 +58,157 @@ async def move(
     tolerance: float = TOLERANCE,
     timeout: float | None = None,
 ) -> None:
-    """Move to `to` rad, at the servo's own speed; returns when it is in position, at once with `wait=False`.
+    """Move to `to` rad at the servo's own speed; return when it is in position, at once with `wait=False`.
 
-    In position is: two looks in a row within `tolerance` rad. Raises LimitExceeded when `to` is not a finite number,
-    is outside the profile's range (nothing is sent then) or outside the travel limits of the servo, Stalled when it
-    stays off its target, MotionError after `timeout` seconds (None: from the way). Where the profile has a start rule,
-    the start is sent first and reported as `Started`. When the wait is interrupted or cancelled the servo stops and
-    holds, and a note of the interruption says where; with `wait=False` it goes to its target.
+    In position: two readings in a row within `tolerance` rad. Raises LimitExceeded when `to` is not finite, outside
+    the range of the profile (nothing is sent) or outside the travel limits of the servo; Stalled; MotionError after
+    `timeout` s (None: from the distance). Where the profile has a start rule, the start is sent first and reported as
+    `Started`. If the wait is interrupted or cancelled, the servo stops and holds, and a note of the interrupt says
+    where.
     """
-    raw = counts(node, to)
-    _checked_waiting(node, tolerance, timeout)
-    goal = await goal_of(node, raw)
+    raw = target(node, to)
+    check_above_zero("tolerance", tolerance, "rad", node=node.node)
+    if timeout is not None:
+        check_above_zero("timeout", timeout, "s", node=node.node)
+    goal = await setpoint(node, raw)
     if not wait:
         node.last_move = None
-        await send_goal(node, goal)
+        await send_target(node, goal)
         return
-    order = Move(goal.value, tolerance, timeout)
+
+    async def send_and_wait() -> None:
+        await send_target(node, goal)
+        await wait_arrival(node, goal.value, tolerance, timeout)
+
     device = Moving(node, partial(stop, node), partial(position, node))
-    await stopped_if_interrupted(_gone(node, goal, order), device)
+    await stopped_if_interrupted(send_and_wait(), device)
 
 
-async def _gone(node: Node, goal: Setpoint, order: Move) -> None:
-    await send_goal(node, goal)
-    await arrive(node, order)
+async def wait_arrival(node: Node, goal: float, tolerance: float, timeout: float | None) -> None:
+    """Wait until the servo is in position. Raises Stalled, or MotionError after `timeout` s."""
+
+    async def sample() -> State:
+        return State(position=await position(node), at=node.at)
+
+    async def stalled(state: State) -> Stalled:
+        assert state.position is not None
+        alarm = f"; alarms: {', '.join(node.alarm)}" if node.alarm else ""
+        return Stalled(
+            f"node {node.node} stands at {state.position:.4g} rad, {abs(state.position - goal):.4g} rad off its goal "
+            f"{goal:.4g} rad{alarm}",
+            expected=f"within {tolerance:.4g} rad",
+            cause="something blocks it, the load is too heavy, its supply is weak, or its make must be started first",
+            advice="clear the way, or give a wider tolerance; it still pushes towards its goal: stop() ends that. "
+            "A servo that never moves may be of another make: profile=xqpower or nmt=standard starts it",
+            node=node.node,
+        )
+
+    def longest(distance: float) -> float:
+        return 1.0 + 2.0 * distance / SLOWEST if timeout is None else timeout
+
+    await wait_in_position(
+        sample, goal, node=node.node, tolerance=tolerance, timeout=longest, stalled=stalled
+    )
 
 
-async def goal_of(node: Node, raw: int) -> Setpoint:
-    """What this raw target orders, with the limits for the gate: those of the servo, else those of the profile."""
+def target(node: Node, to: float) -> int:
+    """The raw target, half a count away from zero. Raises LimitExceeded outside the range of the profile."""
+    try:
+        return node.raw(node.table["goal_position"], to)
+    except RequestError as error:
+        if isinstance(to, bool) or not isinstance(to, int | float):
+            raise
+        raise LimitExceeded(
+            f"node {node.node}: {error.summary}", expected=error.expected, advice=error.advice, node=node.node
+        ) from None
+
+
+async def setpoint(node: Node, raw: int) -> Setpoint:
+    """This raw target as a setpoint, with the limits of the servo for the gate."""
     known = await limits(node)
     return Setpoint(node.node, "position", float(node.table["goal_position"].to_value(raw)), *known)
 
 
-async def limits(node: Node) -> tuple[float, float]:
-    """Lowest and highest position it goes to, rad: its travel limits inside the range of its profile; read once."""
-    if node.limits is None:
-        node.limits = await _limits(node)
-    return node.limits
-
-
-async def travel(node: Node) -> tuple[float, float]:
-    """Lowest and highest position of its profile, rad; nothing is sent."""
+async def send_target(node: Node, goal: Setpoint) -> None:
+    """Send a target; before it the start, each time, because a servo forgets it when it loses its supply."""
     row = node.table["goal_position"]
-    return float(row.to_value(row.low)), float(row.to_value(row.high))
+    if node.settings.must_start:
+        await start(node, goal)
+    await write_register(node, row, node.raw(row, goal.value), (goal,))
 
 
-async def send_goal(node: Node, goal: Setpoint) -> None:
-    """Order a target, with the start first where the profile has that rule; it is sent each time, for a servo that
-    lost its supply has forgotten it, and it costs a short frame."""
-    row = node.table["goal_position"]
-    if node.dialect.must_start:
-        await started(node, goal)
-    await order(node, row, node.raw(row, goal.value), (goal,))
-
-
-async def started(node: Node, goal: Setpoint | None = None) -> None:
-    """Start this servo and say so; where that is for a goal, the start is refused if the goal would be."""
-    request = start_exchange(node, True, goal)
+async def start(node: Node, goal: Setpoint | None = None) -> None:
+    """Start this servo and report it. With a `goal` the gate checks the start like that goal."""
+    request = start_request(node, True, goal)
     assert isinstance(request.wire, CanFrame)
     await request
     await Emit(Started(node.node, request.wire))
 
 
-def start_exchange(node: Node, on: bool, goal: Setpoint | None = None) -> Request[None]:
-    """Start or stop, in the form of this bus; nobody answers. Where it lets a servo move, it counts as torque; with the
-    `goal` that it is started for, as motion."""
-    form = node.dialect.nmt
-    frame = wire.encode_start(form, node.node, on, extended=node.dialect.extended(node.node))
+def start_request(node: Node, on: bool, goal: Setpoint | None = None) -> Request[None]:
+    """Start or stop, in the form of this bus; it has no reply.
+
+    Where it lets a servo move it has the effect of torque on, with a `goal` that of motion.
+    """
+    form = node.settings.nmt
+    frame = encode_start(form, node.node, on, extended=node.settings.extended)
     effect = Effect.NONE if form != "standard" else Effect.MOTION if goal else Effect.TORQUE
-    goals = () if form != "standard" or not on else (goal or torque_on(node.node),)
+    setpoints = () if form != "standard" or not on else (goal or torque_on(node.node),)
     return Request(
-        frame, (), lambda _: None, lane=node.node, priority=Priority.CONTROL, effect=effect, setpoints=goals
+        frame, (), _no_value, lane=node.node, priority=Priority.CONTROL, effect=effect, setpoints=setpoints
     )
 
 
-async def stop(node: Node) -> Promise:
-    """Stay: the target becomes the position of this moment. Returns what was promised.
+def _no_value(_: object) -> None:
+    return None
 
-    The servo comes back to where it was when it was asked. Its torque stays on: these servos have no switch for it.
-    """
-    await decided(node)
-    here = await upload_row(node, node.table["present_position"], int, reports_position=True)
-    row = node.table["goal_position"]
+
+async def stop(node: Node) -> Promise:
+    """Make the present position the target. Torque stays on: these servos have no switch for it."""
+    here = await read_register(node, node.table["present_position"], int, reports_position=True)
     try:
-        await _hold(node, row, here)
-    except DeviceError as refusal:
-        if meant(refusal.code) not in TOO_FAR or abs(here) <= node.profile.limit:
+        await _hold(node, here)
+    except DeviceError as error:
+        if sdo.meant_code(error.code) not in TOO_FAR or abs(here) <= node.profile.limit:
             raise
-        await _hold(node, row, max(-node.profile.limit, min(here, node.profile.limit)))
+        await _hold(node, max(-node.profile.limit, min(here, node.profile.limit)))
     return Promise.HOLD_REQUESTED
 
 
-async def _hold(node: Node, row: Register, raw: int) -> None:
-    """Target := this place, also when it lies beyond the range, for there it stands; the goal brings its own limits."""
+def _hold(node: Node, raw: int) -> Request[None]:
+    """Target := this position, also outside the range of the row, because the servo is there."""
+    row = node.table["goal_position"]
     value = float(row.to_value(raw))
-    goal = Setpoint(node.node, "position", value, value, value, Stays.STILL)
-    await order(node, beyond(row), raw, (goal,))
-
-
-def beyond(row: Register) -> Register:
-    """The same row with all that its bytes can say for its range."""
     reach = 1 << 8 * row.size - 1
-    return changed(row, low=-reach, high=reach - 1)
+    unlimited = changed(row, low=-reach, high=reach - 1)
+    return write_register(
+        node, unlimited, raw, (Setpoint(node.node, "position", value, value, value, Stays.STILL),)
+    )
 
 
-async def _limits(node: Node) -> tuple[float, float]:
-    """The servo's travel limits where it has and tells them, inside the range of its profile."""
-    goal = node.table["goal_position"]
-    low, high = goal.low, goal.high
-    await decided(node)
-    for name in ("negative_limit", "positive_limit"):
-        if name in node.table:
-            raw = await _if_there(node, node.table[name])
-            low, high = (max(low, raw), high) if name == "negative_limit" else (low, min(high, raw))
-    return float(goal.to_value(low)), float(goal.to_value(high))
+async def limits(node: Node) -> tuple[float, float]:
+    """Lowest and highest position (rad): the travel limits of the servo within the range of its profile; read once."""
+    if node.limits is None:
+        goal = node.table["goal_position"]
+        low, high = goal.low, goal.high
+        if "negative_limit" in node.table:
+            low = max(low, await _limit(node, node.table["negative_limit"]))
+            high = min(high, await _limit(node, node.table["positive_limit"]))
+        node.limits = float(goal.to_value(low)), float(goal.to_value(high))
+    return node.limits
 
 
-async def _if_there(node: Node, row: Register) -> int:
-    """Its raw value; where the servo lacks it, the row's own outer bound."""
+async def _limit(node: Node, row: Register) -> int:
+    """The raw travel limit; where the servo lacks the object, the outer bound of the row."""
     try:
-        return await upload_row(node, row, int)
-    except DeviceError as refusal:
-        if meant(refusal.code) not in ABSENT:
+        return await read_register(node, row, int)
+    except DeviceError as error:
+        if not is_absent(error):
             raise
         return row.low or row.high
 
 
-def counts(node: Node, to: float) -> int:
-    """The raw target, halves away from zero. Raises LimitExceeded for what is no finite angle within the profile."""
+async def travel(node: Node) -> tuple[float, float]:
+    """Lowest and highest position of the profile (rad). Sends nothing."""
     row = node.table["goal_position"]
-    try:
-        return node.raw(row, to)
-    except RequestError as refusal:
-        if isinstance(to, bool) or not isinstance(to, int | float):
-            raise
-        raise LimitExceeded(
-            f"node {node.node}: {refusal.summary}",
-            expected=refusal.expected,
-            advice=refusal.advice,
-            node=node.node,
-        ) from None
-
-
-def _checked_waiting(node: Node, tolerance: float, timeout: float | None) -> None:
-    above_zero("tolerance", tolerance, "rad", node=node.node)
-    if timeout is not None:
-        above_zero("timeout", timeout, "s", node=node.node)
+    return float(row.to_value(row.low)), float(row.to_value(row.high))

@@ -1,36 +1,39 @@
-"""The servo as a user holds it: one list of verbs, blocking on `Servo`, awaitable on `AsyncServo`.
+"""The device classes `Servo` and `AsyncServo`.
 
-There is no verb for torque: these servos have no torque switch, they hold whenever they have power.
+They have no method for torque: these servos have no torque switch and hold whenever they have power.
 """
 
 from __future__ import annotations
 
 from motorbus.core.device import AsyncDevice, AsyncRunner, BlockingDevice, BlockingRunner, device_method
 from motorbus.families.kst.driver import (
-    configuration,
+    access,
     feedback,
     identity,
-    keeping,
     motion,
     provisioning,
-    registers,
+    settings,
+    storage,
 )
-from motorbus.families.kst.driver.dialect import Dialect, dialect_of
-from motorbus.families.kst.driver.node import Node
+from motorbus.families.kst.driver.node import DEFAULT, BusSettings, Node
 
 
-class ServoVerbs(Node):
-    """What can be said to a servo. Values are in rad, A, °C, s and bit/s.
+class ServoMethods(Node):
+    """The methods of a servo. Values are in rad, A, °C, s and bit/s.
 
-    Making one costs nothing and sends nothing. It is spoken to as its bus is configured; `profile` is for a bus with
-    servos of several makers.
+    Creating one sends nothing. It has the settings of its bus; `profile` is for a bus with servos of several makers.
     """
 
     ping = device_method(identity.ping)
     identify = device_method(identity.identify)
-    read = device_method(registers.read)
-    read_raw = device_method(registers.read_raw)
-    write = device_method(registers.write)
+    version = device_method(identity.version)
+    node_id = device_method(identity.node_id)
+    set_node_id = device_method(identity.set_node_id)
+    bit_rate = device_method(identity.bit_rate)
+    set_bit_rate = device_method(identity.set_bit_rate)
+    read = device_method(access.read)
+    read_raw = device_method(access.read_raw)
+    write = device_method(access.write)
     position = device_method(feedback.position)
     telemetry = device_method(feedback.telemetry)
     status = device_method(feedback.status)
@@ -38,40 +41,41 @@ class ServoVerbs(Node):
     temperature = device_method(feedback.temperature)
     move = device_method(motion.move)
     stop = device_method(motion.stop)
-    version = device_method(identity.version)
-    node_id = device_method(identity.node_id)
-    set_node_id = device_method(identity.set_node_id)
-    bit_rate = device_method(identity.bit_rate)
-    set_bit_rate = device_method(identity.set_bit_rate)
-    save = device_method(keeping.save)
+    save = device_method(storage.save)
     provision = device_method(provisioning.provision)
     set_id = device_method(provisioning.set_id)
     set_baud = device_method(provisioning.set_baud)
-    start_reports = device_method(configuration.start_reports)
-    stop_reports = device_method(configuration.stop_reports)
-    set_mid_point = device_method(configuration.set_mid_point)
-    travel_limits = device_method(configuration.travel_limits)
-    set_travel_limits = device_method(configuration.set_travel_limits)
-    reversed = device_method(configuration.reversed_)
-    set_reversed = device_method(configuration.set_reversed)
+    start_reports = device_method(settings.start_reports)
+    stop_reports = device_method(settings.stop_reports)
+    set_mid_point = device_method(settings.set_mid_point)
+    travel_limits = device_method(settings.travel_limits)
+    set_travel_limits = device_method(settings.set_travel_limits)
+    reversed = device_method(settings.reversed_)
+    set_reversed = device_method(settings.set_reversed)
 
 
-class Servo(ServoVerbs, BlockingDevice):
+class Servo(ServoMethods, BlockingDevice):
     """One servo on a blocking bus: `Servo(bus, 0x25).position()`."""
 
     def __init__(self, bus: BlockingRunner, node: int, *, profile: str = "") -> None:
-        ServoVerbs.__init__(self, node, _dialect(bus, profile))
+        ServoMethods.__init__(self, node, _settings(bus, profile))
         BlockingDevice.__init__(self, bus)
 
 
-class AsyncServo(ServoVerbs, AsyncDevice):
+class AsyncServo(ServoMethods, AsyncDevice):
     """One servo on an async bus: `await AsyncServo(bus, 0x25).position()`."""
 
     def __init__(self, bus: AsyncRunner, node: int, *, profile: str = "") -> None:
-        ServoVerbs.__init__(self, node, _dialect(bus, profile))
+        ServoMethods.__init__(self, node, _settings(bus, profile))
         AsyncDevice.__init__(self, bus)
 
 
-def _dialect(bus: object, profile: str) -> Dialect:
-    dialect = dialect_of(getattr(bus, "family", None))
-    return dialect.like(profile) if profile else dialect
+def settings_of(family: object) -> BusSettings:
+    """The settings of a bus with this (configured) family; those of the manual otherwise."""
+    found = getattr(family, "_settings", None)
+    return found if isinstance(found, BusSettings) else DEFAULT
+
+
+def _settings(bus: object, profile: str) -> BusSettings:
+    found = settings_of(getattr(bus, "family", None))
+    return found.replace(profile=profile) if profile else found

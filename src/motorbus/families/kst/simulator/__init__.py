@@ -17,10 +17,10 @@ from motorbus.core.family import Option
 from motorbus.core.switches import options as switches_of
 from motorbus.core.switches import switched
 from motorbus.errors import RequestError
+from motorbus.families.kst.profiles import PROFILES, Profile
 from motorbus.families.kst.simulator.bus import KstBus
 from motorbus.families.kst.simulator.servo import Servo
 from motorbus.families.kst.simulator.switches import Switches
-from motorbus.families.kst.table import PROFILES, Profile
 
 OPTIONS = (
     Option("profile", str, "kst", "which relative of the protocol they speak", tuple(PROFILES)),

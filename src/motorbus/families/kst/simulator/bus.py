@@ -17,11 +17,11 @@ from motorbus.core.can_bits import precedence
 from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, Audience, CanFrame
 from motorbus.core.request import Data
 from motorbus.errors import RequestError
-from motorbus.families.kst import wire
+from motorbus.families.kst import notifications, sdo
+from motorbus.families.kst.profiles import Profile
 from motorbus.families.kst.simulator import sight as seen
 from motorbus.families.kst.simulator.servo import Servo
 from motorbus.families.kst.simulator.switches import Switches
-from motorbus.families.kst.table import Profile
 
 ERROR: Final = CanFrame(ERROR_FLAG | 0x88, bytes(8))
 """What an adapter tells of a broken frame: protocol violation and bus error, the classes of SocketCAN."""
@@ -123,10 +123,10 @@ class KstBus:
         self._disturb(self.now)
         if data.id & REMOTE_FLAG:
             return
-        if (order := wire.decode_start(data)) is not None:
+        if (order := notifications.decode_start(data)) is not None:
             for servo in self._addressed(order.node, data.extended):
                 servo.obey_start(order, self.now)
-        elif (request := wire.decode_request(data)) is not None:
+        elif (request := sdo.decode_request(data)) is not None:
             for servo in self._addressed(request.node, data.extended):
                 servo.obey(request, self.now)
 
@@ -152,13 +152,13 @@ class KstBus:
 
     def audience(self, data: Data) -> Audience:
         """Whom a frame is for. What no host sends, as replies of other devices, is for none of these."""
-        node = wire.addressed(data) if isinstance(data, CanFrame) else None
+        node = notifications.addressee(data) if isinstance(data, CanFrame) else None
         if node is None or not isinstance(data, CanFrame):
             return Audience.NONE
         heeding = [servo for servo in self.servos if servo.takes(data.extended)]
-        if not any(node in (wire.EVERYONE, servo.node) for servo in heeding):
+        if not any(node in (sdo.BROADCAST, servo.node) for servo in heeding):
             return Audience.NONE
-        return Audience.EVERYONE if node == wire.EVERYONE else Audience.OURS
+        return Audience.EVERYONE if node == sdo.BROADCAST else Audience.OURS
 
     obeys_at_once = False
 
@@ -206,7 +206,7 @@ class KstBus:
     def _addressed(self, node: int, extended: bool) -> list[Servo]:
         """Whoever hears and heeds a frame to this id."""
         roster = self._roster()
-        named = roster.hearing if node == wire.EVERYONE else roster.by_node.get(node, [])
+        named = roster.hearing if node == sdo.BROADCAST else roster.by_node.get(node, [])
         return [servo for servo in named if servo.takes(extended)]
 
     def _say(self, servo: Servo | None, when: float, frame: CanFrame) -> None:
@@ -283,6 +283,6 @@ class KstBus:
 
 
 def _checked(node: int) -> int:
-    if node not in wire.NODES:
+    if node not in sdo.NODES:
         raise RequestError(f"node id {node} is not possible", expected="1 to 127")
     return node

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import inf
 
-from motorbus.families.kst.table import REVERSED
+from motorbus.families.kst.profiles import REVERSED
 
 KEPT = frozenset(
     {"node_id", "bit_rate_code", "mid_point", "negative_limit", "positive_limit", "function_enable", "zero"}

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Final
 
+from motorbus.families.kst.profiles import BIT_RATES, SAVE
 from motorbus.families.kst.simulator.memory import REVERSE
-from motorbus.families.kst.table import BIT_RATES, SAVE
 
 if TYPE_CHECKING:
     from motorbus.families.kst.simulator.servo import Servo

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.register import Register
-from motorbus.families.kst import wire
+from motorbus.families.kst import sdo
 from motorbus.families.kst.simulator import objects
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ class SdoServer:
         """A restart: no transfer is under way any more."""
         self._transfer = None
 
-    def answer(self, request: wire.SdoRequest, at: float) -> CanFrame | None:
+    def answer(self, request: sdo.SdoRequest, at: float) -> CanFrame | None:
         """The reply to this request, or None where there is silence."""
         servo = self._servo
         if servo.values.saving(at):
@@ -61,7 +61,7 @@ class SdoServer:
 
     # -- reading ------------------------------------------------------------------------------------------------
 
-    def _upload(self, request: wire.SdoRequest, at: float) -> CanFrame | int:
+    def _upload(self, request: sdo.SdoRequest, at: float) -> CanFrame | int:
         """Data bytes of a read are ignored: the manual shows an X there (command 4), CiA 301 reserves them."""
         row = self._row(request)
         if isinstance(row, int):
@@ -73,7 +73,7 @@ class SdoServer:
             return self._value(request, data)
         self._transfer = _Transfer(request, data)
         extended = request.extended
-        return wire.encode_upload_start(
+        return sdo.encode_upload_start(
             self._servo.node, request.index, request.subindex, len(data), extended=extended
         )
 
@@ -86,12 +86,12 @@ class SdoServer:
             return bytes((servo.switches.x1, servo.switches.x2))
         return (objects.read(servo, row.name, at) & (1 << 8 * row.size) - 1).to_bytes(row.size, "little")
 
-    def _value(self, request: wire.SdoRequest, data: bytes) -> CanFrame:
-        return wire.encode_upload_reply(
+    def _value(self, request: sdo.SdoRequest, data: bytes) -> CanFrame:
+        return sdo.encode_upload_reply(
             self._servo.node, request.index, request.subindex, data, extended=request.extended
         )
 
-    def _segment(self, request: wire.SdoRequest) -> CanFrame:
+    def _segment(self, request: sdo.SdoRequest) -> CanFrame:
         """CiA 301, segmented upload: seven bytes at a time, the toggle bit turning."""
         transfer, node = self._transfer, self._servo.node
         if transfer is None:
@@ -102,11 +102,11 @@ class SdoServer:
         data, last = transfer.next()
         if last:
             self._transfer = None
-        return wire.encode_segment_reply(node, request.toggle, data, last, extended=request.extended)
+        return sdo.encode_segment_reply(node, request.toggle, data, last, extended=request.extended)
 
     # -- writing ------------------------------------------------------------------------------------------------
 
-    def _download(self, request: wire.SdoRequest, at: float) -> CanFrame | int | None:
+    def _download(self, request: sdo.SdoRequest, at: float) -> CanFrame | int | None:
         row = self._row(request)
         if isinstance(row, int):
             return row
@@ -125,13 +125,13 @@ class SdoServer:
             return refusal
         if row.name == "store" and self._servo.switches.save_reply == "none":  # manual, command 3
             return None
-        return wire.encode_download_reply(
+        return sdo.encode_download_reply(
             self._servo.node, request.index, request.subindex, extended=request.extended
         )
 
     # -- both ---------------------------------------------------------------------------------------------------
 
-    def _row(self, request: wire.SdoRequest) -> Register | int:
+    def _row(self, request: sdo.SdoRequest) -> Register | int:
         table = self._servo.profile.table
         row = table.at(request.index, request.subindex)
         if row is not None:
@@ -139,27 +139,27 @@ class SdoServer:
         known = any(entry.address == request.index for entry in table.values())
         return NO_SUBINDEX if known else NO_OBJECT
 
-    def _while_saving(self, request: wire.SdoRequest) -> CanFrame | None:
+    def _while_saving(self, request: sdo.SdoRequest) -> CanFrame | None:
         """A save keeps it busy: requests are lost, or reads tell erased flash (public flight-controller driver)."""
         row = self._row(request)
         if self._servo.switches.flash_reads == "lost" or request.kind != "upload" or isinstance(row, int):
             return None
         return self._value(request, b"\xff" * row.size) if row.readable else None
 
-    def _abort(self, request: wire.SdoRequest, code: int) -> CanFrame:
+    def _abort(self, request: sdo.SdoRequest, code: int) -> CanFrame:
         """A refusal (manual, command 9). In which order its code's bytes come, and what it names, are switches."""
         switches = self._servo.switches
         index = 0 if switches.abort_mux == "zero" else request.index
         subindex = request.subindex if switches.abort_mux == "echo" else 0
         if switches.abort_order == "big":
             code = int.from_bytes(code.to_bytes(4, "little"), "big")
-        return wire.encode_abort_reply(self._servo.node, index, subindex, code, extended=request.extended)
+        return sdo.encode_abort_reply(self._servo.node, index, subindex, code, extended=request.extended)
 
 
 class _Transfer:
     """A value on its way in segments: what is left of it, and the toggle that must come next."""
 
-    def __init__(self, request: wire.SdoRequest, data: bytes) -> None:
+    def __init__(self, request: sdo.SdoRequest, data: bytes) -> None:
         self.request = request
         self.toggle = 0
         self._left = data

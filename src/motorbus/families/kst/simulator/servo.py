@@ -12,13 +12,13 @@ from typing import Final
 
 from motorbus.core.can_frame import CanFrame
 from motorbus.errors import RequestError
-from motorbus.families.kst import wire
+from motorbus.families.kst import notifications, sdo
+from motorbus.families.kst.profiles import BIT_RATES, Profile
 from motorbus.families.kst.simulator import objects
 from motorbus.families.kst.simulator.memory import REVERSE, Memory
 from motorbus.families.kst.simulator.motor import DRIVE, Shaft, Warmth
 from motorbus.families.kst.simulator.server import SdoServer
 from motorbus.families.kst.simulator.switches import Switches
-from motorbus.families.kst.table import BIT_RATES, Profile
 
 COUNTS_PER_RADIAN = 180 / pi
 """Times the counts per degree of the profile."""
@@ -139,10 +139,10 @@ class Servo:
         """When its flash is written to the half; infinity while it is not."""
         return self.values.midway(self._now())
 
-    def alarm(self, data: bytes = wire.LOW_VOLTAGE) -> None:
+    def alarm(self, data: bytes = notifications.LOW_VOLTAGE) -> None:
         """Say an alarm of four bytes now; the usual one is low voltage (public demo of a newer protocol)."""
         if self.plugged:
-            self._say(self, self._now(), wire.encode_alarm(self.node, data, extended=self.extended))
+            self._say(self, self._now(), notifications.encode_alarm(self.node, data, extended=self.extended))
 
     def status(self) -> dict[str, object]:
         """How it is, as plain data; positions in raw counts."""
@@ -230,7 +230,7 @@ class Servo:
         """Whether it heeds identifiers of this form."""
         return self.switches.id_format in ("asked", "ext" if extended else "std")
 
-    def obey(self, request: wire.SdoRequest, at: float) -> None:
+    def obey(self, request: sdo.SdoRequest, at: float) -> None:
         """Carry a request out and answer it, one after the other: a servo has one SDO server."""
         if self.busy_until - at > MAILBOX * self.switches.turnaround:
             return  # no controller holds more; a host that floods it loses frames, and the others are served again soon
@@ -238,7 +238,7 @@ class Servo:
         reply = self._server.answer(request, at)
         if reply is None:
             return
-        if request.node == wire.EVERYONE:
+        if request.node == sdo.BROADCAST:
             asked = (
                 self.switches.broadcast_ack if request.kind == "download" else self.switches.broadcast_read
             )
@@ -247,7 +247,7 @@ class Servo:
         self.busy_until = max(at, self.busy_until) + self.switches.turnaround
         self._say(self, self.busy_until + self.delay, reply)
 
-    def obey_start(self, order: wire.Start, at: float) -> None:
+    def obey_start(self, order: notifications.Start, at: float) -> None:
         """Start or stop, when it is said in the form this one knows; nobody answers that.
 
         During a write to flash it is lost like every other order, an assumption.
@@ -284,7 +284,9 @@ class Servo:
         wanted = self.switches.report_form
         forms = ("sdo", "pdo") if wanted == "both" else (wanted,)
         raw = self.shaft.reading(at)
-        return [wire.encode_report(self.node, raw, form=form, extended=self.extended) for form in forms]
+        return [
+            notifications.encode_report(self.node, raw, form=form, extended=self.extended) for form in forms
+        ]
 
     def _report(self, on: bool, at: float) -> None:
         self._reports_from, self._reported = (at if on else inf), 0
@@ -327,7 +329,7 @@ class Servo:
         self._interval = (switches.reports_ms or self._interval_as_shipped) / 1000
         self._report(bool(switches.reports_ms), at)
         if switches.boot_notice and self.lives > 1:
-            self._say(self, at, wire.encode_boot(self.node, extended=self.extended))
+            self._say(self, at, notifications.encode_boot(self.node, extended=self.extended))
         if self._is_low:
             self.alarm()
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from motorbus.core.switches import switch
-from motorbus.families.kst.table import DEFAULT_RATE, RATES
+from motorbus.families.kst.profiles import DEFAULT_RATE, RATES
 
 _BYTE = (0, 255)
 _WORD = (-32768, 32767)

@@ -1,29 +1,34 @@
-"""The objects of a KST CAN servo row by row: what the manual has, and what real drivers add to it.
+"""Object dictionaries and profiles of the makers that share this protocol, and exact conversion of angles.
 
-`KST` is the KST CAN protocol manual and nothing else. The later tables are that table plus differences, and each
-difference names the public driver it was read from: those are programs that drive real servos, not vendor
-documents. Where sources disagree, `conflict` says who says what, and what was chosen.
+`KST` holds the objects of the KST CAN protocol manual. The other dictionaries are derived from it, and each difference
+names the public driver that it was read from: programs that drive real servos, not vendor documents. Where sources
+disagree, `conflict` says which source says what, and what was chosen. A `Profile` adds the habits of a maker. No servo
+reports its maker, so a bus is opened with a profile (`kst:PORT,profile=xqpower`).
 
-Every write of the manual uses specifier 0x22, which does not tell the length of the value; the sizes of its rows
-come from the replies it prints, those of the others from what the drivers send.
+Sizes are those of the replies that the manual prints, else of what the drivers send: the writes of the manual
+(specifier 0x22) state no length.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from decimal import ROUND_HALF_UP, Decimal
 from functools import partial
-from math import pi
+from math import degrees, isfinite, pi
 from types import MappingProxyType
 from typing import Final
 
 from motorbus.core.register import Access, Coding, Register, RegisterMap, Storage, changed
 from motorbus.core.request import Effect
+from motorbus.errors import RequestError
 
 BIT_RATES: Final = MappingProxyType(
     dict(enumerate((20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000)))
 )
 """Bit-rate code of object 0x3001 -> bit/s (KST CAN protocol manual, command 1).
 
-Neither the numbers of slcan's `Sn` nor those of CiA 305 LSS, which both count otherwise.
+Neither the numbers of slcan nor those of CiA 305 LSS.
 """
 RATES: Final[tuple[int, ...]] = tuple(BIT_RATES.values())
 DEFAULT_NODE: Final = 0x25
@@ -169,3 +174,165 @@ XQPOWER: Final = KST_EXT.derive(
     without=("software_version", "negative_limit", "positive_limit", "function_enable"),
     title="XQPOWER CAN servo",
 )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Profile:
+    """How the servos of one maker, or of one generation, speak the protocol.
+
+    `counts_per_degree` is exact and `limit` the greatest raw position, either way. `status_row` is None where status
+    is the manual's command 7, the same frame as the position, which nothing decodes. `current_scale` is A per
+    count of the status. `nmt` says how reports (and at XQPOWER motion) are started: "none", "vendor" (CAN id = node,
+    `01 00`) or "standard" (CAN id 0, `01 node`). `version_rows` are asked in order. `flash_wait` is how long a node is
+    left alone after a save, `mid_point_wait` after a new mid point (s), which is set by writing `mid_point_value`.
+    `report_forms` are the ids on which reports come, of "sdo" (0x580 + node) and "pdo" (0x180 + node); `conflicts` is
+    where sources disagree.
+    """
+
+    name: str
+    title: str
+    vendor: str
+    table: RegisterMap
+    counts_per_degree: int
+    limit: int
+    status_row: Register | None
+    current_scale: float
+    nmt: str
+    version_rows: tuple[Register, ...]
+    flash_wait: float
+    mid_point_value: int
+    mid_point_wait: float
+    report_forms: tuple[str, ...]
+    source: str
+    conflicts: str
+
+
+_KST = Profile(
+    name=KST.name,
+    title=KST.title,
+    vendor="KST",
+    table=KST,
+    counts_per_degree=10,
+    limit=900,
+    status_row=None,
+    current_scale=0.01,
+    nmt="none",
+    version_rows=(KST["firmware_version"],),
+    flash_wait=0.15,
+    mid_point_value=0,
+    mid_point_wait=0.15,
+    report_forms=(),
+    source=f"{MANUAL}; the wait after a save: {FLIGHT}",
+    conflicts="commands 6 and 7 of the manual, position and status, are one and the same frame; it prints ids of four "
+    "bytes and calls the frames standard ones",
+)
+_KST_EXT = replace(
+    _KST,
+    name=KST_EXT.name,
+    title=KST_EXT.title,
+    table=KST_EXT,
+    limit=1000,
+    status_row=KST_EXT["status"],
+    nmt="vendor",
+    version_rows=(KST_EXT["firmware_version"], KST_EXT["software_version"]),
+    report_forms=("sdo",),
+    source=f"{FLIGHT}; {DEMO}; the rest: {MANUAL}",
+    conflicts="range ±100° where the manual has ±90°; status at 0x6005 where the manual has 0x6002; version at 0x100B "
+    "where the manual has 0x100A; the demo driver uses 29-bit ids, the others 11-bit ones",
+)
+_KINGMAX = replace(
+    _KST_EXT,
+    name=KINGMAX.name,
+    title=KINGMAX.title,
+    vendor="Kingmax",
+    table=KINGMAX,
+    status_row=KINGMAX["status"],
+    version_rows=(KINGMAX["firmware_version"], KINGMAX["software_version"]),
+    source=f"{KINGMAX_DRIVER} for position, status and scale; the rest is taken over from kst-ext",
+    conflicts="that range, start rule and configuration objects are those of kst-ext is an assumption",
+)
+_XQPOWER = replace(
+    _KST_EXT,
+    name=XQPOWER.name,
+    title=XQPOWER.title,
+    vendor="XQPOWER",
+    table=XQPOWER,
+    counts_per_degree=18,
+    limit=800,
+    status_row=XQPOWER["status"],
+    current_scale=0.001,
+    nmt="standard",
+    version_rows=(XQPOWER["firmware_version"],),
+    mid_point_value=1,
+    mid_point_wait=0.5,
+    report_forms=("sdo", "pdo"),
+    source=f"{XQPOWER_DRIVER}; node id, bit rate, save and version are taken over from the {MANUAL}",
+    conflicts="18 counts per degree and 1 mA where the others have 10 and 0.01 A; position writes are ignored until "
+    "it has been started; the firmware driver writes everything by 0x22, the tools 0x2200 and 0x3009 with a length",
+)
+
+PROFILES: Final[Mapping[str, Profile]] = MappingProxyType(
+    {profile.name: profile for profile in (_KST, _KST_EXT, _KINGMAX, _XQPOWER)}
+)
+"""Every profile by its name; the first is the default."""
+TABLES: Final[Mapping[str, RegisterMap]] = MappingProxyType(
+    {profile.name: profile.table for profile in PROFILES.values()}
+)
+"""Every object dictionary by the name of its profile."""
+
+
+# -- values ----------------------------------------------------------------------------------------------------
+
+
+def to_raw(profile: Profile, radians: float, row: str = "goal_position") -> int:
+    """Angle (rad) -> nearest raw value of this row; half a count rounds away from zero, exactly as in decimal.
+
+    10.85° is 108.5 counts and must become 109; in binary radians it is 108.49999999999999, so the value is first
+    rounded to a millionth of a count. Raises RequestError outside the range of the row, or for a value that is not
+    finite.
+    """
+    register = profile.table[row]
+    counts = profile.counts_per_degree * degrees(radians)
+    if not isfinite(counts):
+        what = "out of range" if isfinite(radians) else "not a finite angle"
+        raise RequestError(f"{row}: {radians} rad is {what}", advice="give a number; nothing was sent")
+    raw = int(Decimal(f"{counts:.6f}").to_integral_value(ROUND_HALF_UP))
+    if not register.low <= raw <= register.high:
+        low, high = (f"{end / profile.counts_per_degree:.6g}°" for end in (register.low, register.high))
+        raise RequestError(
+            f"{row}: {counts / profile.counts_per_degree:.6g}° is out of range {low} to {high}",
+            expected=f"{low} to {high} (raw {register.low} to {register.high}) by the profile {profile.name}",
+            advice="give an angle inside the range, or the profile of this servo; nothing was sent",
+        )
+    return raw
+
+
+def version_text(data: bytes) -> str:
+    """The bytes of a version as text, without NUL and space at its ends; as hex where it is no text."""
+    letters = data.decode("latin-1").strip("\0 ")
+    if letters and letters.isascii() and letters.isprintable():
+        return letters
+    return data.hex(" ").upper()
+
+
+def current(profile: Profile, raw: int) -> float:
+    """Supply current (A) in the raw value of `status`."""
+    return (raw & 0xFFFF) * profile.current_scale
+
+
+def temperature(raw: int) -> int:
+    """Temperature (°C) in the raw value of `status`."""
+    byte = raw >> 16 & 0xFF
+    return byte - 256 if byte > 127 else byte
+
+
+def bit_rate_code(rate: int) -> int:
+    """Code of a bit rate (bit/s). Raises RequestError for a rate without a code."""
+    for code, known in BIT_RATES.items():
+        if known == rate and not isinstance(rate, bool):
+            return code
+    raise RequestError(
+        f"{rate!r} bit/s is no rate of these servos",
+        expected=f"one of {', '.join(map(str, RATES))}",
+        advice="nothing was sent",
+    )

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import Explanation
-from motorbus.families.kst import wire
-from motorbus.families.kst.explain import explain
-from motorbus.families.kst.table import PROFILES
+from motorbus.families.kst import notifications, sdo
+from motorbus.families.kst.decode import decode
+from motorbus.families.kst.profiles import PROFILES
 from tests.protocol.kst.test_wire import FRAMES
 from tests.protocol.kst.vectors import ALL, INVALID, MANUAL, VALID, Vector, name_of
 
@@ -18,7 +18,7 @@ KNOWN = st.sampled_from([vector.frame for vector in ALL])
 
 
 def one(frame: CanFrame, profile: str = "kst") -> Explanation:
-    (told,) = explain(frame.flat(), PROFILES[profile])
+    (told,) = decode(frame.flat(), PROFILES[profile])
     return told
 
 
@@ -28,7 +28,7 @@ def meanings(explanation: Explanation) -> dict[str, str]:
 
 def check_coverage(data: bytes, profile: str = "kst") -> None:
     """Every byte is in one explanation, and in one part of it, at the place the part says."""
-    explanations = explain(data, PROFILES[profile])
+    explanations = decode(data, PROFILES[profile])
     assert b"".join(explanation.data for explanation in explanations) == data
     for explanation in explanations:
         sizes = [len(part.data) for part in explanation.parts]
@@ -51,7 +51,7 @@ def test_every_byte_of_any_eight_is_explained_once(identifier: int, data: bytes)
 
 
 def test_nothing_needs_no_words() -> None:
-    assert explain(b"") == []
+    assert decode(b"") == []
 
 
 @pytest.mark.parametrize("vector", VALID, ids=name_of)
@@ -74,8 +74,8 @@ def test_a_bad_frame_has_its_reason(vector: Vector) -> None:
 def test_what_is_explained_as_good_is_what_the_receiver_or_a_server_takes(frame: CanFrame) -> None:
     if len(frame.data) > 8 or frame.id >> 31 or one(frame).fault:
         return
-    (event,) = wire.FrameReceiver(frozenset({False, True})).feed(frame)
-    taken = type(event).__name__ != "Noise" or wire.decode_request(frame) or wire.decode_start(frame)
+    (event,) = notifications.FrameReceiver(frame.extended).feed(frame)
+    taken = type(event).__name__ != "Noise" or sdo.decode_request(frame) or notifications.decode_start(frame)
     assert taken or frame.id == 0  # other commands of network management
 
 
@@ -130,7 +130,7 @@ def test_a_byte_swapped_refusal_is_said_to_be_one() -> None:
 
 
 def test_the_manuals_position_may_be_a_status() -> None:
-    reply = wire.encode_upload_reply(37, 0x6002, 0, b"\x40\x01")
+    reply = sdo.encode_upload_reply(37, 0x6002, 0, b"\x40\x01")
     told = meanings(one(reply))
     assert "if command 7 was meant, the status 0x40 0x01" in told["present_position"]
     assert "commands 6 and 7" in told["index"]
@@ -140,20 +140,20 @@ def test_the_manuals_position_may_be_a_status() -> None:
 
 
 def test_each_profile_counts_its_own_way() -> None:
-    write = wire.encode_download(37, 0x6003, 0, (180).to_bytes(2, "little"))
+    write = sdo.encode_download(37, 0x6003, 0, (180).to_bytes(2, "little"))
     assert meanings(one(write))["goal_position"] == "18° (raw 180, 10 per degree)"
     assert meanings(one(write, "xqpower"))["goal_position"] == "10° (raw 180, 18 per degree)"
-    status = wire.encode_upload_reply(37, 0x6005, 0, bytes((0x2C, 1, 0xF6, 0)))
+    status = sdo.encode_upload_reply(37, 0x6005, 0, bytes((0x2C, 1, 0xF6, 0)))
     assert meanings(one(status, "xqpower"))["current"] == "0.3 A (0.001 A per count)"
     assert meanings(one(status, "xqpower"))["temperature"] == "-10 °C"
 
 
 def test_what_the_profile_lacks_is_named_and_said_to_be_lacking() -> None:
-    asked = wire.encode_upload(37, 0x6005)
+    asked = sdo.encode_upload(37, 0x6005)
     assert meanings(one(asked))["index"] == "0x6005, status, not in profile kst"
     assert meanings(one(asked, "kst-ext"))["index"] == "0x6005, status"
-    assert meanings(one(wire.encode_upload(37, 0x1018, 4)))["index"] == "0x1018, no object that is known"
-    unknown = wire.encode_upload_reply(37, 0x1018, 4, b"\x01\x02")
+    assert meanings(one(sdo.encode_upload(37, 0x1018, 4)))["index"] == "0x1018, no object that is known"
+    unknown = sdo.encode_upload_reply(37, 0x1018, 4, b"\x01\x02")
     assert one(unknown).title == "reply of node 37: 0x1018:4 = 513 (01 02)"
 
 
@@ -167,19 +167,19 @@ def test_what_the_profile_lacks_is_named_and_said_to_be_lacking() -> None:
     ],
 )
 def test_a_value_out_of_range_is_said_to_be(index: int, data: bytes, said: str) -> None:
-    assert said in one(wire.encode_download(37, index, 0, data)).title
+    assert said in one(sdo.encode_download(37, index, 0, data)).title
 
 
 def test_a_wrong_signature_stores_nothing() -> None:
-    told = one(wire.encode_download(37, 0x1010, 1, b"SAVE"))
+    told = one(sdo.encode_download(37, 0x1010, 1, b"SAVE"))
     assert meanings(told)["store"] == '"SAVE", the wrong letters: nothing is stored'
 
 
 def test_the_specifier_says_whether_the_length_is_stated() -> None:
     for data, stated in ((b"\x84\x03", "2 bytes"), (b"\x84", "1 byte")):
-        sized = one(wire.encode_download(37, 0x6003, 0, data, sized=True))
+        sized = one(sdo.encode_download(37, 0x6003, 0, data, sized=True))
         assert meanings(sized)["specifier"].endswith(f": write (download), {stated}")
-    unsized = one(wire.encode_download(37, 0x6003, 0, b"\x84\x03"))
+    unsized = one(sdo.encode_download(37, 0x6003, 0, b"\x84\x03"))
     assert meanings(unsized)["specifier"] == "0x22: write (download), length not stated"
 
 
@@ -201,15 +201,15 @@ def test_reserved_bytes_are_told_apart_from_zeros() -> None:
 
 
 def test_a_run_of_frames_is_told_one_by_one_and_its_rest_as_bad() -> None:
-    request, reply = wire.encode_upload(5, 0x3000), wire.encode_upload_reply(5, 0x3000, 0, b"\x05")
+    request, reply = sdo.encode_upload(5, 0x3000), sdo.encode_upload_reply(5, 0x3000, 0, b"\x05")
     run = request.flat() + reply.flat()
-    assert [told.data for told in explain(run)] == [request.flat(), reply.flat()]
-    *good, bad = explain(run + request.flat()[:9])
+    assert [told.data for told in decode(run)] == [request.flat(), reply.flat()]
+    *good, bad = decode(run + request.flat()[:9])
     assert [told.fault for told in good] == ["", ""]
     assert bad.data == request.flat()[:9]
     assert "not a whole CAN frame" in bad.fault
 
 
 def test_a_frame_of_nine_bytes_is_none() -> None:
-    (told,) = explain(CanFrame(0x625, bytes(9)).flat())
+    (told,) = decode(CanFrame(0x625, bytes(9)).flat())
     assert "0 to 8" in told.fault

@@ -1,0 +1,70 @@
+"""Read and write objects by name, in API units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from motorbus.core.access import readable_rows, writable_values
+from motorbus.core.register import Register, Storage, Value
+from motorbus.core.request import Effect
+from motorbus.errors import DeviceError
+from motorbus.families.kst.driver.motion import send_target, setpoint, target
+from motorbus.families.kst.driver.node import Node
+from motorbus.families.kst.driver.requests import OtherSize, is_absent, read_register, write_register
+from motorbus.families.kst.driver.storage import store
+
+METHODS: Final[Mapping[str, str]] = {
+    "node_id": "set_node_id(), or provision(), which also verifies it after the restart",
+    "bit_rate_code": "set_bit_rate(), or provision(), which also verifies it after the restart",
+    "store": "save()",
+    "mid_point": "set_mid_point()",
+    "function_enable": "set_reversed(), which changes its one known bit and leaves the others",
+}
+"""The device methods that write protected rows."""
+
+
+async def read(node: Node, /, *names: str) -> dict[str, Value]:
+    """Objects in API units by name; all that this servo has without a name.
+
+    Raises RequestError for an unknown or write-only name (nothing is sent), DeviceError for a named object that the
+    servo refuses; unnamed objects that it lacks are left out.
+    """
+    raws = await read_raw(node, *names)
+    return {name: node.value(node.table[name], raw) for name, raw in raws.items()}
+
+
+async def read_raw(node: Node, /, *names: str) -> dict[str, int]:
+    """Objects as raw values by name; all that this servo has without a name. Raises as `read`."""
+    found: dict[str, int] = {}
+    for row in readable_rows(node.table, names):
+        try:
+            found[row.name] = await read_register(
+                node, row, int, reports_position=row.name == "present_position"
+            )
+        except (DeviceError, OtherSize) as error:
+            if names or (isinstance(error, DeviceError) and not is_absent(error)):
+                raise
+    return found
+
+
+async def write(node: Node, /, **values: Value) -> None:
+    """Write objects by name, in API units; all values are checked before the first is sent.
+
+    A value that survives power-off is read back, saved, and read back again. Raises RequestError for what cannot be
+    written by name, LimitExceeded for a target outside the limits, VerificationFailed when a value reads back
+    different.
+    """
+
+    def to_raw(row: Register, value: Value) -> int:
+        return target(node, value) if row.effect is Effect.MOTION else node.raw(row, value)
+
+    raws = writable_values(node.table, values, to_raw, node=node.node, methods=METHODS)
+    stored = [(row, raw) for row, raw in raws if row.storage is Storage.EEPROM]
+    if stored:
+        await store(node, stored)
+    for row, raw in raws:
+        if row.effect is Effect.MOTION:
+            await send_target(node, await setpoint(node, raw))
+        elif row.storage is not Storage.EEPROM:
+            await write_register(node, row, raw)

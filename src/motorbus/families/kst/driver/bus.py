@@ -1,0 +1,147 @@
+"""What a bus asks of this family: times, probe, stop.
+
+All times come with their source; none was measured on hardware.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from motorbus.core.can_bits import least
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.family import Stop
+from motorbus.core.request import ANY, EVERY_LANE, Effect, Priority, Request, Response, TimeoutClass
+from motorbus.families.kst import sdo
+from motorbus.families.kst.driver.motion import Promise
+from motorbus.families.kst.driver.node import BusSettings, Node
+from motorbus.families.kst.driver.requests import FIRMWARE, GOAL, NODE_ID, POSITION, refused
+from motorbus.families.kst.driver.storage import LISTEN
+
+WINDOW: Final = 16
+"""Nodes in flight at once; four to ten fill any CAN bus."""
+STUFFING: Final = 1.1
+"""Bits on the wire per bit of a frame: over all nodes and positions, frames of this protocol have 118 to 126 bits where
+111 are without stuffing."""
+REPLY_DELAY: Final = 0.030
+"""s; a public flight-controller driver gives up after 3 ms. Ten times that costs time only where a reply is missing."""
+SCAN_DELAY: Final = 0.005
+"""s for an id that probably has no servo; with the margin of the bus twice the 3 ms of that driver."""
+BROADCAST_TIME: Final = 0.100
+"""s in which all servos have answered a broadcast: a public demo driver collects until 100 ms pass without a reply."""
+QUIET: Final = 0.020
+"""s beside the frames that may still be on their way; as long as the bus waits for a late reply."""
+FRAMES_IN_ADAPTER: Final = 5
+"""Frames of one node that an adapter may hold. # assumption"""
+
+
+def air_time(request: Request[Any], rate: int) -> float:
+    """s on the wire for the request and all replies, with typical stuffing; a broadcast has up to 127 replies."""
+    frame = request.wire
+    assert isinstance(frame, CanFrame)
+    bits = least(len(frame.data), frame.extended)
+    if request.expected is ANY:
+        bits += (len(sdo.NODES) if request.lane == EVERY_LANE else 1) * least(sdo.LENGTH, frame.extended)
+    else:
+        bits += sum(least(expected.length, frame.extended) for expected in request.expected)
+    return bits * STUFFING / rate
+
+
+def response_delay(request: Request[Any], flash_wait: float) -> float:
+    """Maximum s before the reply; after a save the time to listen and the write to flash."""
+    if request.reply_within is TimeoutClass.STORE:
+        return LISTEN + flash_wait
+    if request.lane == EVERY_LANE:
+        return BROADCAST_TIME
+    return SCAN_DELAY if request.reply_within is TimeoutClass.SCAN else REPLY_DELAY
+
+
+def quiet_time(rate: int) -> float:
+    """s after which no reply to an earlier request can still arrive."""
+    return QUIET + FRAMES_IN_ADAPTER * least(sdo.LENGTH, True) * STUFFING / rate
+
+
+def probe(node: Node, attempt: int) -> Request[bool]:
+    """Read the node id, the version, or a sub-index of the node id that no servo has, in turn.
+
+    True if the reply names that object and, for the id, has a valid one (before a restart not that of the node).
+    """
+    turn, kind = divmod(attempt, 3)
+    index, subindex = ((NODE_ID, 0), (FIRMWARE, 0), (NODE_ID, 1 + turn % 254))[kind]
+
+    def decode(answer: Response) -> bool:
+        reply = sdo.decode_reply(answer.replies[0].data) if answer.replies else None
+        if reply is None or (reply.index, reply.subindex) != (index, subindex):
+            return False
+        if reply.kind == "upload" and (index, subindex) == (NODE_ID, 0):
+            return reply.data[0] in sdo.NODES
+        return reply.kind in ("upload", "upload-start", "abort")
+
+    return Request(
+        sdo.encode_upload(node.node, index, subindex, extended=node.settings.extended),
+        (sdo.upload_due(node.node, index, subindex),),
+        decode,
+        lane=node.node,
+        repeatable=True,
+    )
+
+
+def stop(nodes: Mapping[int, Response | None], settings: BusSettings) -> Stop:
+    """Target := position for each node whose position is known; the others are asked for it."""
+    requests: list[Request[Response]] = []
+    for node in (Node(number, settings) for number in sorted(nodes)):
+        here = _position(nodes[node.node])
+        requests += (_ask_position(node),) if here is None else _hold_at(node, here)
+    return Stop(tuple(requests), Promise.HOLD_REQUESTED.value)
+
+
+def _ask_position(node: Node) -> Request[Response]:
+    return Request(
+        sdo.encode_upload(node.node, POSITION, extended=node.settings.extended),
+        (sdo.upload_due(node.node, POSITION),),
+        _acknowledged(node, POSITION),
+        lane=node.node,
+        priority=Priority.STOP,
+        repeatable=True,
+        reports_position=True,
+    )
+
+
+def _hold_at(node: Node, here: bytes) -> tuple[Request[Response], ...]:
+    """Outside the range, where the servo may refuse the position, the end of the range is sent first."""
+    raw, limit = int.from_bytes(here, "little", signed=True), node.profile.limit
+    positions = dict.fromkeys((max(-limit, min(raw, limit)), raw))
+    return tuple(_hold(node, position) for position in positions)
+
+
+def _hold(node: Node, raw: int) -> Request[Response]:
+    data, settings = raw.to_bytes(2, "little", signed=True), node.settings
+    return Request(
+        sdo.encode_download(node.node, GOAL, 0, data, sized=settings.sized, extended=settings.extended),
+        (sdo.download_due(node.node, GOAL),),
+        _acknowledged(node, GOAL),
+        lane=node.node,
+        priority=Priority.STOP,
+        effect=Effect.MOTION,
+        repeatable=True,
+    )
+
+
+def _position(answer: Response | None) -> bytes | None:
+    """The two bytes of the position in a response, None without."""
+    reply = sdo.decode_reply(answer.replies[0].data) if answer is not None and answer.replies else None
+    if reply is None or reply.kind != "upload" or reply.index != POSITION or len(reply.data) < 2:
+        return None
+    return reply.data[:2]
+
+
+def _acknowledged(node: Node, index: int) -> Any:
+    """A decoder that gives the response and raises DeviceError for an abort."""
+
+    def decode(answer: Response) -> Response:
+        reply = sdo.decode_reply(answer.replies[0].data) if answer.replies else None
+        if reply is not None and reply.kind == "abort":
+            raise refused(node, reply, index, 0)
+        return answer
+
+    return decode

@@ -1,0 +1,254 @@
+"""Frames that servos send unsolicited, the frames that start and stop them, and the receiver of a bus.
+
+    report      0x580 + node or 0x180 + node   4 bytes: position (2), 0 0
+    alarm       0x380 + node                   4 bytes
+    emergency   0x080 + node                   8 bytes (CiA 301, decoded only)
+    heartbeat   0x700 + node                   1 byte (CiA 301)
+
+A report and a reply share an identifier; their length tells them apart, never the first byte.
+
+Source: the KST CAN protocol manual has none of this; public drivers of these servos (a flight-controller driver, an
+STM32 driver, a driver of XQPOWER servos) do.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from math import inf
+from typing import Final, NamedTuple
+
+from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
+from motorbus.core.request import Data, Event, Noise, Notification, Reply
+from motorbus.errors import RequestError
+from motorbus.families.kst.sdo import (
+    ABORTS,
+    BROADCAST,
+    LENGTH,
+    NODES,
+    REPLY,
+    REQUEST,
+    TOGGLE,
+    Key,
+    reply_kind,
+)
+
+PDO: Final = 0x180
+ALARM: Final = 0x380
+EMERGENCY: Final = 0x080
+HEARTBEAT: Final = 0x700
+REPORT_LENGTH: Final = 4
+"""Data bytes of a report and of an alarm."""
+LOW_VOLTAGE: Final = b"\x0a\x02\x00\x00"
+"""The only alarm that a source names."""
+START_FORMS: Final = ("vendor", "standard")
+STATES: Final = {0x00: "boot-up", 0x04: "stopped", 0x05: "operational", 0x7F: "pre-operational"}
+"""States of a heartbeat (CiA 301)."""
+ALARM_TIME: Final = 5.0
+"""s for which an alarm is shown after it was received: a servo reports that it begins, not that it is over."""
+
+
+class Start(NamedTuple):
+    """Start (`on`) or stop of reports, for one node or all (0). `forms`: a broadcast of `01 00` is of both forms."""
+
+    forms: frozenset[str]
+    node: int
+    on: bool
+
+
+def encode_report(node: int, raw: int, *, form: str = "sdo", extended: bool = False) -> CanFrame:
+    """A position (raw counts) under 0x580 + node, or with `form` "pdo" under 0x180 + node."""
+    base = {"sdo": REPLY, "pdo": PDO}.get(form)
+    if base is None:
+        raise RequestError(f"a report has no form {form!r}", expected="sdo or pdo")
+    if not -0x8000 <= raw <= 0x7FFF:
+        raise RequestError(f"position {raw} does not fit a report", expected="-32768 to 32767 counts")
+    return CanFrame(base + _node(node), raw.to_bytes(2, "little", signed=True) + b"\0\0", extended)
+
+
+def decode_report(data: bytes) -> int:
+    """Position (raw counts) of a report."""
+    return int.from_bytes(data[:2], "little", signed=True)
+
+
+def encode_alarm(node: int, data: bytes = LOW_VOLTAGE, *, extended: bool = False) -> CanFrame:
+    """An alarm of 4 bytes."""
+    if len(data) != REPORT_LENGTH:
+        raise RequestError(f"an alarm of {len(data)} bytes is impossible", expected="4 bytes")
+    return CanFrame(ALARM + _node(node), data, extended)
+
+
+def encode_boot(node: int, *, extended: bool = False) -> CanFrame:
+    """The heartbeat of a node that has just started."""
+    return CanFrame(HEARTBEAT + _node(node), b"\0", extended)
+
+
+def is_boot(data: bytes) -> bool:
+    """Whether a heartbeat with this data reports a start."""
+    return len(data) == 1 and data[0] & 0x7F == 0
+
+
+def encode_start(form: str, node: int, on: bool, *, extended: bool = False) -> CanFrame:
+    """Start or stop the reports of one node or of all (0); it has no reply.
+
+    Form "vendor" has the node as identifier and `01 00` or `02 00`; "standard" is the NMT of CiA 301, identifier 0 and
+    `01 node` or `02 node`, without which an XQPOWER servo ignores positions.
+    """
+    if form not in START_FORMS:
+        raise RequestError(f"there is no start form {form!r}", expected="vendor or standard")
+    who = BROADCAST if node == BROADCAST else _node(node)
+    command = 1 if on else 2
+    if form == "vendor":
+        return CanFrame(who, bytes((command, 0)), extended)
+    return CanFrame(0, bytes((command, who)), extended)
+
+
+def decode_start(frame: CanFrame) -> Start | None:
+    """A start or stop in either form, or None."""
+    identifier, data, _ = frame
+    if len(data) != 2 or data[0] not in (1, 2):
+        return None
+    on = data[0] == 1
+    if identifier == 0 and (data[1] == BROADCAST or data[1] in NODES):
+        return Start(frozenset(START_FORMS if data[1] == BROADCAST else ("standard",)), data[1], on)
+    if identifier in NODES and data[1] == 0:
+        return Start(frozenset({"vendor"}), identifier, on)
+    return None
+
+
+def decode_notification(frame: CanFrame) -> Notification | None:
+    """A frame that a servo or the adapter sends unsolicited, in either identifier format; else None.
+
+    Kinds: "report", "alarm", "emergency", "heartbeat", and "bus error" (node 0) from the adapter.
+    """
+    identifier, data, _ = frame
+    if identifier & ERROR_FLAG:
+        return Notification(BROADCAST, "bus error", data)
+    node = identifier & 0x7F
+    kind = _kind(identifier - node, data) if node else ""
+    return Notification(node, kind, data) if kind else None
+
+
+def _kind(base: int, data: bytes) -> str:
+    if base in (REPLY, PDO):
+        return "report" if len(data) == REPORT_LENGTH and data[2:] == b"\0\0" else ""
+    if base == ALARM:
+        return "alarm" if len(data) == REPORT_LENGTH else ""
+    if base == EMERGENCY:
+        return "emergency" if len(data) == LENGTH else ""
+    if base == HEARTBEAT:
+        return "heartbeat" if len(data) == 1 and data[0] & 0x7F in STATES else ""
+    return ""
+
+
+def addressee(frame: CanFrame) -> int | None:
+    """The node that a frame of a host addresses, 0 for all; None for a frame that no host sends."""
+    identifier = frame.id & ~REMOTE_FLAG
+    node = identifier - REQUEST
+    if node == BROADCAST or node in NODES:
+        return node
+    start = decode_start(frame)
+    return None if start is None else start.node
+
+
+def _node(node: int) -> int:
+    if node not in NODES:
+        raise RequestError(f"{node} is not a node id", expected="1 to 127", advice="nothing was sent")
+    return node
+
+
+# -- receiver --------------------------------------------------------------------------------------------------
+
+
+class BusState:
+    """What an open bus has received beside replies: counts of frames, bus errors and starts, and recent alarms."""
+
+    def __init__(self) -> None:
+        self.frames = 0
+        self.errors = 0
+        self.boots: Counter[int] = Counter()
+        self._alarms: dict[int, tuple[tuple[str, ...], float | None]] = {}
+
+    def note(self, event: Event) -> None:
+        """Count one received frame."""
+        if isinstance(event, Notification) and event.kind == "bus error":
+            self.errors += 1
+            return
+        self.frames += 1
+        if isinstance(event, Notification) and event.kind == "alarm":
+            self._alarms[event.node] = (alarm_names(event.data), None)
+        if isinstance(event, Notification) and event.kind == "heartbeat" and is_boot(event.data):
+            self.boots[event.node] += 1
+
+    def alarm(self, node: int, at: float) -> tuple[str, ...]:
+        """Alarms of this node received within `ALARM_TIME`; `at` is the time of its last reply (s), -inf for none.
+
+        A receiver has no clock, so the time of an alarm is that of the next reply of its node.
+        """
+        names, since = self._alarms.get(node, ((), None))
+        if at == -inf:
+            return names
+        if since is None and names:
+            self._alarms[node] = (names, at)
+        elif since is not None and at - since > ALARM_TIME:
+            del self._alarms[node]
+            return ()
+        return names
+
+
+def alarm_names(data: bytes) -> tuple[str, ...]:
+    """The name of an alarm; an unknown one as hex."""
+    return ("low voltage",) if data == LOW_VOLTAGE else (f"alarm {data.hex(' ').upper()}",)
+
+
+_KEY_KINDS: Final = tuple(reply_kind(specifier).removesuffix("-start") for specifier in range(256))
+"""Kind of `Key` by byte 0; "" for no reply."""
+_ABORT_CODES: Final = frozenset(code.to_bytes(4, order) for code in ABORTS for order in ("little", "big"))
+
+
+class FrameReceiver:
+    """Replies and notifications of one bus; any other frame is noise. One frame is one event.
+
+    A CAN controller drops damaged frames, so noise does not make other frames doubtful. The text of an slcan adapter
+    has no such check: one wrong digit turns an abort (80) into an acknowledgement (60). So an acknowledgement that
+    carries an abort code is noise.
+    """
+
+    __slots__ = ("_extended", "_state")
+
+    def __init__(self, extended: bool = False, state: BusState | None = None) -> None:
+        self._extended = extended
+        self._state = state
+
+    @property
+    def held(self) -> int:
+        """0: a frame is complete."""
+        return 0
+
+    def feed(self, data: Data, /) -> list[Event]:
+        """Decode one frame. Never raises."""
+        if not isinstance(data, CanFrame):
+            return [Noise(data, "foreign")] if data else []
+        identifier, payload, extended = data
+        node = identifier - REPLY
+        event: Event | None
+        if len(payload) == LENGTH and 0 < node < NODES.stop and extended is self._extended:
+            event = self._reply(node, payload)
+        else:
+            event = decode_notification(data)
+            if event is None or (extended is not self._extended and event.node):
+                event = Noise(payload, "foreign")
+        if self._state is not None:
+            self._state.note(event)
+        return [event]
+
+    def _reply(self, node: int, data: bytes) -> Event:
+        kind = _KEY_KINDS[data[0]]
+        if not kind or (kind == "download" and data[4:] in _ABORT_CODES):
+            return Noise(data, "foreign", node)
+        if kind == "segment":
+            return Reply(node, Key(kind, 0, 0, 1 if data[0] & TOGGLE else 0), data)
+        return Reply(node, Key(kind, data[1] | data[2] << 8, data[3]), data)
+
+    def flush(self) -> list[Event]:
+        """Nothing is held."""
+        return []
