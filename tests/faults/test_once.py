@@ -146,7 +146,7 @@ def test_l18_a_save_is_said_once() -> None:
     rig.put(line := Unanswered())
     rig.servo.save()
     assert (line.lost, len(line.said)) == (1, 1)
-    assert rig.servos[NODE].values.saving(rig.link.now()) or rig.servos[NODE].values.saved(rig.link.now())
+    assert rig.servos[NODE].status()["saving"] or rig.servos[NODE].status()["saved"]
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -131,7 +131,8 @@ class World:
     def state(self) -> object:
         """Where the servo is, what it would be after a restart, and what it reads back."""
         now = self.now
-        kept = self.servo.values.stored("node_id", now), self.servo.values.stored("bit_rate_code", now)
+        stored = self.servo.flash.stored(now)
+        kept = stored["node_id"], stored["bit_rate_code"]
         live = self.servo.values["node_id"], self.servo.values["bit_rate_code"]
         return self.servo.node, self.servo.bit_rate, kept, live
 

@@ -161,7 +161,7 @@ def test_a_torn_save_of_other_families() -> None:
     link, world, line, _ = host("exchange 1: torn-eeprom 0x25", "kst", (0x25,), flash_cut="new")
     servo = world.nodes[0x25]
     servo.values["node_id"] = 0x26
-    servo.values.save(0.0, 0.3)
+    servo.flash.save(servo.values, 0.0, 0.3)
     assert servo.midway() == 0.15
     link.tune(500_000)
     link.write(CanFrame(0x625, bytes.fromhex("40 02 60 00 00 00 00 00")))

@@ -115,12 +115,6 @@ def test_equal_answers_of_twins_are_one_frame_and_unequal_ones_16_broken_ones() 
     assert [servo.errors for servo in host.bus.servos] == [16, 16]
 
 
-def test_or_both_come_through_once_they_are_error_passive() -> None:
-    host = Host(0x25, duplicate="37", collision="passive")
-    host[1002].raw_position = -5
-    assert host.say(f"625#{READ}") == [ERROR] * 16 + ["5A5#4B02600000000000", "5A5#4B026000FBFF0000"]
-
-
 def test_twins_that_think_differently_long_give_two_answers() -> None:
     host = Host(0x25, duplicate="0x25", duplicate_delay="0.0005")
     assert host.timed(f"625#{READ_ID}") == [
@@ -130,7 +124,7 @@ def test_twins_that_think_differently_long_give_two_answers() -> None:
 
 
 def test_several_requests_at_once_do_not_make_a_servo_collide_with_itself() -> None:
-    host = Host(profile="kst-ext", turnaround=0.0)
+    host = Host(profile="kst-ext")
     assert host.say(f"625#{READ}", f"625#{READ_ID}") == ["5A5#4B02600000000000", "5A5#4F00300025000000"]
 
 

@@ -1,12 +1,10 @@
-"""The shaft and its warmth: counts, zero, sense of rotation, and temperatures that are exact at every moment."""
+"""The shaft: counts, zero, sense of rotation."""
 
 from __future__ import annotations
 
-from math import exp
-
 import pytest
 
-from motorbus.families.kst.simulator.motor import RISE, SLOWNESS, Shaft, Warmth
+from motorbus.families.kst.simulator.motor import Shaft
 
 
 def shaft(position: int = 0) -> Shaft:
@@ -15,7 +13,7 @@ def shaft(position: int = 0) -> Shaft:
 
 def test_a_trapezoid_ends_exactly_at_its_goal() -> None:
     one = shaft()
-    one.go(900, 0.0)
+    one.move(900, 0.0)
     assert one.motion.velocity(0.5) == 1000.0
     assert one.motion.done_at == pytest.approx(1.0)
     assert (one.reading(0.5), one.reading(1.001)) == (450, 900)
@@ -23,8 +21,8 @@ def test_a_trapezoid_ends_exactly_at_its_goal() -> None:
 
 def test_a_new_goal_takes_over_from_the_motion_under_way() -> None:
     one = shaft()
-    one.go(900, 0.0)
-    one.go(-900, 0.5)
+    one.move(900, 0.0)
+    one.move(-900, 0.5)
     assert one.motion.velocity(0.5) == 1000.0
     assert one.reading(0.55) > 450
     assert one.reading(10.0) == -900
@@ -32,14 +30,14 @@ def test_a_new_goal_takes_over_from_the_motion_under_way() -> None:
 
 def test_a_halt_is_at_once_and_where_it_is() -> None:
     one = shaft()
-    one.go(900, 0.0)
+    one.move(900, 0.0)
     one.halt(0.5)
     assert (one.reading(0.5), one.reading(9.0)) == (450, 450)
 
 
 def test_zero_and_sense_change_the_reading_and_not_the_shaft() -> None:
     one = shaft(300)
-    one.make_middle(1.0)
+    one.set_zero(1.0)
     assert one.reading(1.0) == 0
     one.reversed = True
     one.turn_by_hand(50, 1.0)
@@ -51,22 +49,3 @@ def test_a_reading_fits_sixteen_bits() -> None:
     assert one.reading(0.0) == 32767
     one.reversed = True
     assert one.reading(0.0) == -32768
-
-
-def test_warmth_follows_the_square_of_the_load() -> None:
-    warmth = Warmth(25.0)
-    assert warmth.temperature(1000.0) == 25.0
-    warmth.follow(0.5, 10.0)
-    assert warmth.load == 0.5
-    assert warmth.temperature(10.0) == pytest.approx(25.0)
-    assert warmth.temperature(10.0 + SLOWNESS) == pytest.approx(25.0 + RISE / 4 * (1 - exp(-1)))
-    assert warmth.temperature(1e6) == pytest.approx(25.0 + RISE / 4)
-    warmth.follow(0.0, 1e6)
-    assert warmth.temperature(1e6) == pytest.approx(25.0 + RISE / 4)
-    assert warmth.temperature(2e6) == pytest.approx(25.0)
-
-
-def test_it_can_be_made_as_warm_as_one_likes() -> None:
-    warmth = Warmth(25.0)
-    warmth.become(70.0, 5.0)
-    assert warmth.temperature(5.0) == warmth.temperature(500.0) == 70.0

@@ -40,7 +40,8 @@ def restarted(host: Host) -> Host:
 
 
 def test_the_status_tells_current_and_temperature() -> None:
-    host = ext(temperature=-5)
+    host = ext()
+    host[0x25].temperature = -5
     assert host.say("625#4005600000000000") == ["5A5#430560000000FB00"]
     host[0x25].temperature = 40.4
     host[0x25].load = 0.4
@@ -55,15 +56,6 @@ def test_xqpower_tells_the_current_in_milliamperes() -> None:
     assert host.say("625#4005600000000000") == ["5A5#43056000E8031900"]
 
 
-def test_a_load_warms_it_slowly() -> None:
-    host = ext()
-    host[0x25].load = 1.0
-    assert host[0x25].temperature == pytest.approx(25.0)
-    host.wait(60.0)
-    assert host[0x25].temperature == pytest.approx(25.0 + 60.0 * 0.632, abs=0.1)
-    assert host[0x25].memory["status"] >> 16 == 63
-
-
 # --- travel limits ----------------------------------------------------------------------------------------------
 
 
@@ -76,15 +68,6 @@ def test_a_position_beyond_a_travel_limit_goes_as_far_as_the_limit() -> None:
         assert host[0x25].memory["goal_position"] == reached
         host.wait(2.0)
         assert read(host, 0x6002) == reached
-
-
-def test_or_is_refused() -> None:
-    host = ext(beyond_limits="abort")
-    write(host, 0x300A, -300)
-    write(host, 0x300B, 200)
-    assert write(host, 0x6003, 201) == "8003600031000906"
-    assert write(host, 0x6003, -301) == "8003600032000906"
-    assert write(host, 0x6003, 200) == "6003600000000000"
 
 
 @pytest.mark.parametrize(
@@ -131,15 +114,6 @@ def test_the_mid_point_makes_the_present_position_zero_and_nothing_moves(data: i
     assert (read(host, 0x6002), host[0x25].shaft.motion.position(host.now)) == (100, 445)
 
 
-@pytest.mark.parametrize(("index", "data"), [(0x3009, 0), (0x300F, 0x20)])
-def test_a_target_that_keeps_its_number_is_gone_to_where_that_is_now(index: int, data: int) -> None:
-    host = ext(position=345, old_target="kept")
-    write(host, index, data)
-    host.wait(2.0)
-    assert (read(host, 0x6002), read(host, 0x6003)) == (345, 345)
-    assert host[0x25].shaft.motion.position(host.now) == (690 if index == 0x3009 else -345)
-
-
 def test_the_mid_point_is_kept_by_a_save_and_lost_without() -> None:
     host = ext(position=345)
     write(host, 0x3009, 0)
@@ -171,24 +145,13 @@ def test_the_other_bits_are_kept_and_do_nothing() -> None:
     assert read(host, 0x6002) == 200
 
 
-@pytest.mark.parametrize(("kind", "other"), [("mirror", 300), ("independent", 1000)])
-def test_in_the_reversed_state_one_limit_changes_the_other_too(kind: str, other: int) -> None:
-    host = ext(reversed_limits=kind)
+def test_in_the_reversed_state_one_limit_changes_the_other_too() -> None:
+    host = ext()
     write(host, 0x300A, -500)
     assert read(host, 0x300B) == 1000
     write(host, 0x300F, 0x20)
     write(host, 0x300A, -300)
-    assert (read(host, 0x300A), read(host, 0x300B)) == (-300, other)
-    write(host, 0x300B, 250)
-    assert read(host, 0x300A) == (-250 if kind == "mirror" else -300)
-
-
-@pytest.mark.parametrize(("back", "kept"), [("no", 0x27), ("yes", 0x07)])
-def test_the_reverse_bit_may_roll_back_at_a_restart_although_it_was_saved(back: str, kept: int) -> None:
-    host = ext(reverse_rolls_back=back)
-    write(host, 0x300F, 0x27)
-    assert restarted(host)[0x25].memory["function_enable"] == kept
-    assert host[0x25].shaft.reversed is bool(kept & 0x20)
+    assert (read(host, 0x300A), read(host, 0x300B)) == (-300, 300)
 
 
 # --- access -----------------------------------------------------------------------------------------------------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from motorbus.families.kst.simulator.servo import MAILBOX
+from motorbus.families.kst.simulator.server import MAILBOX
 from tests.simulators.kst.host import Host
 
 VERSION = "625#400A100000000000"
@@ -86,12 +86,6 @@ def test_a_restart_ends_what_was_under_way() -> None:
     assert host.say(FIRST) == ["5A5#8000000001000405"]
 
 
-def test_a_software_version_has_its_own_object_and_text() -> None:
-    host = Host(profile="kst-ext", software="2.718")
-    assert host.say("625#400B100000000000") == ["5A5#410B100005000000"]
-    assert host.say(FIRST) == ["5A5#05322E3731380000"]
-
-
 def test_the_signature_of_a_save_must_be_right() -> None:
     host = Host(profile="kst")
     host.say("625#2200300026000000")
@@ -102,7 +96,6 @@ def test_the_signature_of_a_save_must_be_right() -> None:
 
 def test_an_answer_begins_a_turnaround_after_its_request() -> None:
     assert Host().timed("625#4002600000000000") == [(0.0001, "5A5#4B02600000000000")]
-    assert Host(turnaround="0.002").timed("625#4002600000000000") == [(0.002, "5A5#4B02600000000000")]
 
 
 def test_one_servo_serves_one_request_after_the_other_and_two_serve_two_at_once() -> None:

@@ -11,7 +11,7 @@ from motorbus.core.can_frame import CanFrame
 from motorbus.core.switches import options as options_of
 from motorbus.errors import RequestError
 from motorbus.families.kst.simulator import OPTIONS, KstBus, simulate
-from motorbus.families.kst.simulator.switches import Switches
+from motorbus.families.kst.simulator.quirks import Quirks
 from motorbus.link.memory import MemoryLink
 from motorbus.simulation.control import obey
 
@@ -37,10 +37,10 @@ def test_a_profile_may_be_said_as_option_or_as_model(profile: str) -> None:
 
 
 def test_every_option_has_a_default_of_its_kind_and_can_be_said_in_text() -> None:
-    assert [option.name for option in OPTIONS] == ["profile", *(one.name for one in options_of(Switches))]
+    assert [option.name for option in OPTIONS] == ["profile", *(one.name for one in options_of(Quirks))]
     assert [one.name for one in OPTIONS if not one.help or not isinstance(one.default, one.kind)] == []
     said = {one.name: str(one.default) for one in OPTIONS}
-    assert simulate([1], **said).switches == simulate([1]).switches
+    assert simulate([1], **said).quirks == simulate([1]).quirks
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,6 @@ def test_every_option_has_a_default_of_its_kind_and_can_be_said_in_text() -> Non
         ({"profile": "futaba"}, "kst, kst-ext, kingmax, xqpower"),
         ({"firmware": ""}, "one or more ASCII"),
         ({"firmware": "1.ü"}, "one or more ASCII"),
-        ({"software": "\n"}, "one or more ASCII"),
         ({"duplicate": "twice"}, "0x25+0x26"),
         ({"duplicate": "0x80"}, "1 to 127"),
         ({"reports_ms": "0.01"}, "0, or 0.1"),

@@ -1,60 +1,56 @@
-"""How KST CAN servos and their relatives behave, frame for frame: every profile, and every doubt a named switch.
+"""Simulated KST CAN servos, frame for frame.
 
-Each behaviour says in the code where it is known from: the KST CAN protocol manual, public drivers of such servos,
-CiA 301, or nowhere, and then it is called an assumption. The simulator knows the wire and the table and never the
-driver; time comes in as an argument. What it leaves out: stall and steady error under load, other emergencies than
-low voltage, heartbeat, what a controller does at bus-off, and a host that is alone on its bus, whose frames nobody
-acknowledges.
+Each behaviour has its source in the code: the KST CAN protocol manual, public drivers of such servos, CiA 301, or none
+(`# assumption`). Left out: stall and steady error under load, other emergencies than low voltage, heartbeat, bus-off,
+and a host that is alone on its bus, whose frames no node acknowledges.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Final
 
 from motorbus.core import units
 from motorbus.core.family import Option
-from motorbus.core.switches import options as switches_of
+from motorbus.core.switches import options as quirk_options
 from motorbus.core.switches import switched
 from motorbus.errors import RequestError
 from motorbus.families.kst.profiles import PROFILES, Profile
 from motorbus.families.kst.simulator.bus import KstBus
+from motorbus.families.kst.simulator.quirks import Quirks
 from motorbus.families.kst.simulator.servo import Servo
-from motorbus.families.kst.simulator.switches import Switches
 
 OPTIONS = (
     Option("profile", str, "kst", "which relative of the protocol they speak", tuple(PROFILES)),
-    *switches_of(Switches),
+    *quirk_options(Quirks),
 )
-"""What a bus string may say of a simulated KST bus beside ids."""
-SHORTEST: Final = 0.1
-"""ms between reports; a bus of 1 Mbit/s has no room for more of them."""
+"""Options of a simulated bus, beside its ids."""
+SHORTEST_REPORT = 0.1
+"""ms between reports; a bus of 1 Mbit/s has no room for more."""
 
 
 def simulate(ids: Iterable[int], model: str = "", /, **options: object) -> KstBus:
-    """A simulated bus with these ids, at rest; an id that comes twice is two servos.
+    """A simulated bus with these ids, at rest; a repeated id is two servos.
 
-    `model` is the name of a profile ("" is what the option `profile` says, usually kst); the other options are the
-    fields of `Switches`, also as text. Raises RequestError for an unknown profile or option, an impossible value, or
-    no ids.
+    `model` is a profile ("": the option `profile`, by default kst); the other options are the fields of `Quirks`,
+    also as text. Raises RequestError for an unknown profile or option, an invalid value, or no ids.
     """
     named = str(options.pop("profile", "") or "")
     if model and named and model != named:
         raise RequestError(
             f"model {model} and profile {named} contradict each other", advice="give one of them"
         )
-    if options.get("id_format") == "auto":  # of a host, which asks either way
-        options["id_format"] = "asked"
-    switches = switched(Switches, "kst", options)
-    twins = [_number(word) for word in switches.duplicate.split("+") if word]
-    _check_text("firmware", switches.firmware)
-    _check_text("software", switches.software)
-    if 0 < switches.reports_ms < SHORTEST:
+    quirks = switched(Quirks, "kst", options)
+    twins = [_number(word) for word in quirks.duplicate.split("+") if word]
+    if not (quirks.firmware.isascii() and quirks.firmware.isprintable() and quirks.firmware):
         raise RequestError(
-            f"option reports_ms: {switches.reports_ms:g} is not possible",
-            expected=f"0, or {SHORTEST:g} and more",
+            f"option firmware: {quirks.firmware!r} is not possible", expected="one or more ASCII characters"
         )
-    return KstBus(ids, _profile(model or named or "kst"), switches, twins)
+    if 0 < quirks.reports_ms < SHORTEST_REPORT:
+        raise RequestError(
+            f"option reports_ms: {quirks.reports_ms:g} is not possible",
+            expected=f"0, or {SHORTEST_REPORT:g} and more",
+        )
+    return KstBus(ids, _profile(model or named or "kst"), quirks, twins)
 
 
 def _profile(name: str) -> Profile:
@@ -75,11 +71,4 @@ def _number(word: str) -> int:
         ) from None
 
 
-def _check_text(name: str, text: str) -> None:
-    if not (text.isascii() and text.isprintable() and text):
-        raise RequestError(
-            f"option {name}: {text!r} is not possible", expected="one or more ASCII characters"
-        )
-
-
-__all__ = ["OPTIONS", "KstBus", "Servo", "Switches", "simulate"]
+__all__ = ["OPTIONS", "KstBus", "Quirks", "Servo", "simulate"]

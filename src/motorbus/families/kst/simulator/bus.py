@@ -1,14 +1,14 @@
-"""Several simulated servos on one CAN bus: who hears which frame, who speaks first, and what breaks.
+"""Simulated servos on one CAN bus: who receives which frame, who sends first, and what breaks.
 
-A bus at one rate is a polite place: arbitration lets the lower identifier go first and nothing is lost. Two things
-break it, and both are told to the host as an adapter tells them, by frames with `ERROR_FLAG`: a sender at another
-rate than a listener, and two senders with one identifier and unequal data. What a controller does then is ISO 11898,
-simplified: each broken frame counts as one error, and after 16 a servo turns error passive and disturbs no more.
+At one bit rate arbitration lets the lower identifier go first and nothing is lost. Two things break frames, and an
+adapter reports both by frames with `ERROR_FLAG`: a sender at another rate than a listener, and two senders with one
+identifier and unequal data. Simplified from ISO 11898: each broken frame counts as one error, and after 16 a servo is
+error passive.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from heapq import heappop, heappush
 from itertools import count
 from typing import Final, NamedTuple
@@ -19,23 +19,22 @@ from motorbus.core.request import Data
 from motorbus.errors import RequestError
 from motorbus.families.kst import notifications, sdo
 from motorbus.families.kst.profiles import Profile
-from motorbus.families.kst.simulator import sight as seen
+from motorbus.families.kst.simulator.quirks import Quirks
+from motorbus.families.kst.simulator.server import SdoServer
 from motorbus.families.kst.simulator.servo import Servo
-from motorbus.families.kst.simulator.switches import Switches
 
 ERROR: Final = CanFrame(ERROR_FLAG | 0x88, bytes(8))
-"""What an adapter tells of a broken frame: protocol violation and bus error, the classes of SocketCAN."""
+"""An adapter's report of a broken frame: protocol violation and bus error, the classes of SocketCAN."""
 PASSIVE: Final = 16
-"""Errors (of 8 points each) after which a transmitter is error passive at 128 points: ISO 11898."""
+"""Errors (of 8 points each) after which a transmitter is error passive, at 128 points (ISO 11898)."""
 TWIN: Final = 1000
-"""Added to its unit number, the key of a servo whose id another one has already."""
-_BEFORE_ALL_CLOCKS: Final = -1.0
-_ATTEMPT_BITS: Final = 100
-"""Bits from the beginning of a frame that breaks to the next attempt; about, for it depends on the bit that differs."""
+"""The key of a servo whose id another one has is its unit number plus this."""
+RETRY_BITS: Final = 100
+"""Bits from the start of a broken frame to the next attempt; it depends on the bit that differs. # assumption"""
 
 
-class Voice(NamedTuple):
-    """A frame that a servo begins to send at `when`, unless it has lost its supply since; of nobody: an error."""
+class _Sent(NamedTuple):
+    """A frame that a servo starts to send at `when`, unless it loses its supply; without a servo an error."""
 
     when: float
     order: int
@@ -44,158 +43,142 @@ class Voice(NamedTuple):
     life: int
 
 
-class Roster(NamedTuple):
-    """Who hears the host, in order and by id, who is there but set to another rate, and whether none hears it.
+class _Roster(NamedTuple):
+    """Servos at the rate of the host, in order and by id, and connected servos at another rate.
 
-    It is made anew when anybody changes, not for each frame: on a full bus of 127 that is all there would be time for.
+    It is made again after a change, not for each frame: on a full bus of 127 servos that would take too long.
     """
 
     hearing: list[Servo]
     by_node: dict[int, list[Servo]]
     mistuned: list[Servo]
-    alone: bool
 
 
 class KstBus:
-    """A `motorbus.core.family.Simulator` of KST CAN servos.
-
-    `servos` are all of them, in the order in which they were made; `now` is the latest moment it was told.
-    """
+    """A `core.family.Simulator` of KST CAN servos: `servos` by unit number; `now` is the latest time (s)."""
 
     def __init__(
-        self, ids: Iterable[int], profile: Profile, switches: Switches, twins: Iterable[int] = ()
+        self, ids: Iterable[int], profile: Profile, quirks: Quirks, twins: Iterable[int] = ()
     ) -> None:
-        self.switches = switches
+        self.quirks = quirks
         self.now = 0.0
         self.rate: int | None = None
-        self._voices: list[Voice] = []
+        self.servos: tuple[Servo, ...] = ()
+        self._servers: dict[int, SdoServer] = {}
+        self._frames: list[_Sent] = []
         self._order = count()
-        ids, twins = tuple(ids), tuple(twins)
-        self.servos = tuple(
-            Servo(unit, _checked(node), profile, switches, lambda: self.now, self._say)
-            for unit, node in enumerate((*ids, *twins), start=1)
-        )
+        self._begun = not quirks.reports_ms
+        self._asked = False
+        self._known: _Roster | None = None
+        self._report_at: float | None = None
+        for node in ids:
+            self._add(node, profile)
+        for node in twins:
+            self._add(node, profile).delay = quirks.duplicate_delay
         if not self.servos:
             raise RequestError("a simulated bus needs at least one servo", advice="give ids, such as 0x25")
-        for servo in self.servos[len(ids) :]:
-            servo.delay = switches.duplicate_delay
-        self._awake = not switches.reports_ms
-        self._asked = False
-        self._known: Roster | None = None
-        self._report_at: float | None = None
-        for servo in self.servos:
-            servo.changed = self._forget
+
+    def _add(self, node: int, profile: Profile) -> Servo:
+        if node not in sdo.NODES:
+            raise RequestError(f"node id {node} is not possible", expected="1 to 127")
+        unit = len(self.servos) + 1
+        servo = Servo(unit, node, profile, self.quirks, lambda: self.now, self._send)
+        self.servos = (*self.servos, servo)
+        self._servers[unit] = SdoServer(servo)
+        servo.changed = self._forget_roster
+        self._forget_roster()
+        return servo
 
     @property
     def nodes(self) -> Mapping[int, Servo]:
-        """The servos by the id they have now; a second one with an id has the key 1000 + its unit number."""
+        """The servos by present id; a second one with an id has the key 1000 + its unit number."""
         found: dict[int, Servo] = {}
         for servo in self.servos:
             found[TWIN + servo.unit if servo.node in found else servo.node] = servo
         return found
 
     def duplicate(self, node: int) -> None:
-        """A second servo with this id is there from now on, like the first and as it ships but for id and rate.
-
-        Raises RequestError when there is none.
-        """
+        """Add a servo with this id and the rate of the first one. Raises RequestError when there is none."""
         if node not in self.nodes:
             raise RequestError(f"no servo has the id {node}")
         first = self.nodes[node]
-        twin = Servo(len(self.servos) + 1, node, first.profile, self.switches, lambda: self.now, self._say)
-        twin.delay = self.switches.duplicate_delay
-        twin.bit_rate = first.bit_rate
-        self.servos = (*self.servos, twin)
-        twin.changed = self._forget
-        self._forget()
+        twin = self._add(node, first.profile)
+        twin.delay, twin.bit_rate = self.quirks.duplicate_delay, first.bit_rate
 
     def tune(self, rate: int) -> None:
-        """The host's rate in bit/s; servos set to another one neither hear nor are heard. 0: whichever they have."""
+        """Set the rate (bit/s) of the host; 0: that of each servo."""
         self.rate = rate or None
-        self._forget()
+        self._forget_roster()
 
     def receive(self, data: Data, at: float) -> None:
-        """A frame of the host; what is no CAN frame is ignored."""
-        self._wake(at)
+        """Take a frame of the host."""
+        self._begin(at)
         self.now = max(self.now, at)
         if not isinstance(data, CanFrame) or data.id & ERROR_FLAG:
             return
         self._disturb(self.now)
         if data.id & REMOTE_FLAG:
             return
-        if (order := notifications.decode_start(data)) is not None:
-            for servo in self._addressed(order.node, data.extended):
-                servo.obey_start(order, self.now)
+        if (start := notifications.decode_start(data)) is not None:
+            for servo in self._addressed(start.node, data.extended):
+                servo.receive_start(start, self.now)
         elif (request := sdo.decode_request(data)) is not None:
             for servo in self._addressed(request.node, data.extended):
-                servo.obey(request, self.now)
+                self._servers[servo.unit].receive(request, self.now)
 
     def advance(self, to: float) -> list[tuple[float, Data]]:
-        """Every frame that begins up to this moment, with its own, in order."""
-        self._wake(to)
+        """All frames that start up to this time, each with its time, in order."""
+        self._begin(to)
         sent: list[tuple[float, Data]] = []
         while (moment := self.due()) is not None and moment <= to:
             self.now = max(self.now, moment)
-            sent += [(moment, frame) for frame in self._spoken(moment)]
+            sent += [(moment, frame) for frame in self._frames_at(moment)]
         self.now = max(self.now, to)
         return sent
 
     def due(self) -> float | None:
-        """When the next frame begins, or None."""
-        if not self._awake:
-            return None if self._asked else _BEFORE_ALL_CLOCKS
-        due = self._voices[0].when if self._voices else None
-        if self._known is None:
-            self._roster()
+        """Time (s) of the next frame, or None."""
+        if not self._begun:
+            return None if self._asked else -1.0
+        due = self._frames[0].when if self._frames else None
+        self._roster()
         report = self._report_at
         return due if report is None or (due is not None and due <= report) else report
 
     def audience(self, data: Data) -> Audience:
-        """Whom a frame is for. What no host sends, as replies of other devices, is for none of these."""
+        """The receivers of a frame; none for a frame that no host sends."""
         node = notifications.addressee(data) if isinstance(data, CanFrame) else None
         if node is None or not isinstance(data, CanFrame):
             return Audience.NONE
-        heeding = [servo for servo in self.servos if servo.takes(data.extended)]
-        if not any(node in (sdo.BROADCAST, servo.node) for servo in heeding):
+        taking = [servo for servo in self.servos if servo.takes(data.extended)]
+        if not any(node in (sdo.BROADCAST, servo.node) for servo in taking):
             return Audience.NONE
         return Audience.EVERYONE if node == sdo.BROADCAST else Audience.OURS
 
-    obeys_at_once = False
+    def _begin(self, at: float) -> None:
+        """Start the reports that run from power-up on, at the first time of a clock that may start anywhere.
 
-    def sight(self, at: float) -> Iterable[tuple[int, tuple[Hashable, ...]]]:
-        """What each servo holds at this moment."""
-        return seen.sight(self.servos, at)
-
-    def shown(self, picture: tuple[Hashable, ...], name: str) -> int:
-        """What a picture of a servo has in this row."""
-        return seen.shown(picture, name)
-
-    def _wake(self, at: float) -> None:
-        """What reports from power-up on does so from the first moment it is told, for a clock may begin anywhere.
-
-        Until then `due` asks for that once, by a moment before all clocks: whoever then says the present moment gets
-        every report from there on, and whoever only repeats it is not made to walk through the age of his machine.
+        Until then `due` asks once for that time, by a time before all clocks.
         """
-        if self._awake:
+        if self._begun:
             return
         self._asked = True
         if at >= 0:
-            self._awake = True
+            self._begun = True
             for servo in self.servos:
-                servo.wake(at)
+                servo.begin(at)
 
-    def _forget(self) -> None:
+    def _forget_roster(self) -> None:
         self._known = None
 
-    def _roster(self) -> Roster:
+    def _roster(self) -> _Roster:
         if self._known is None:
-            there = [servo for servo in self.servos if servo.plugged]
-            hearing = [servo for servo in there if servo.hears(self.rate)]
-            mistuned = [servo for servo in there if not servo.hears(self.rate)]
+            hearing = [servo for servo in self.servos if servo.hears(self.rate)]
+            mistuned = [servo for servo in self.servos if servo.plugged and not servo.hears(self.rate)]
             by_node: dict[int, list[Servo]] = {}
             for servo in hearing:
                 by_node.setdefault(servo.node, []).append(servo)
-            self._known = Roster(hearing, by_node, mistuned, len(mistuned) == len(there))
+            self._known = _Roster(hearing, by_node, mistuned)
             self._find_report()
         return self._known
 
@@ -204,85 +187,74 @@ class KstBus:
         self._report_at = min((moment for moment in moments if moment is not None), default=None)
 
     def _addressed(self, node: int, extended: bool) -> list[Servo]:
-        """Whoever hears and heeds a frame to this id."""
         roster = self._roster()
         named = roster.hearing if node == sdo.BROADCAST else roster.by_node.get(node, [])
         return [servo for servo in named if servo.takes(extended)]
 
-    def _say(self, servo: Servo | None, when: float, frame: CanFrame) -> None:
-        heappush(self._voices, Voice(when, next(self._order), frame, servo, servo.lives if servo else 0))
+    def _send(self, servo: Servo | None, when: float, frame: CanFrame) -> None:
+        heappush(self._frames, _Sent(when, next(self._order), frame, servo, servo.lives if servo else 0))
 
-    # -- who speaks at one moment -----------------------------------------------------------------------------------
+    # -- frames that start at one time ---------------------------------------------------------------------------
 
-    def _spoken(self, moment: float) -> Iterable[CanFrame]:
-        """What the host gets of all that begins at this moment, in the order of arbitration."""
+    def _frames_at(self, moment: float) -> list[CanFrame]:
+        """What the host receives of all that starts at this time, in the order of arbitration."""
         broken: list[CanFrame] = []
-        speaking: list[tuple[Servo, CanFrame]] = []
-        for servo, frame in self._begun(moment):
+        sending: list[tuple[Servo, CanFrame]] = []
+        for servo, frame in self._started(moment):
             if servo is None:
                 broken.append(frame)
             elif not servo.hears(self.rate):
-                broken.append(ERROR)  # to a host at another rate any frame is a broken one
+                broken.append(ERROR)
             else:
-                speaking.append((servo, frame))
-        return [*broken, *self._arbitrated(speaking, moment)]
+                sending.append((servo, frame))
+        return [*broken, *self._arbitrate(sending, moment)]
 
-    def _begun(self, moment: float) -> list[tuple[Servo | None, CanFrame]]:
-        begun: list[tuple[Servo | None, CanFrame]] = []
-        while self._voices and self._voices[0].when <= moment:
-            voice = heappop(self._voices)
-            if voice.servo is None or voice.servo.lives == voice.life:
-                begun.append((voice.servo, voice.frame))
+    def _started(self, moment: float) -> list[tuple[Servo | None, CanFrame]]:
+        started: list[tuple[Servo | None, CanFrame]] = []
+        while self._frames and self._frames[0].when <= moment:
+            one = heappop(self._frames)
+            if one.servo is None or one.servo.lives == one.life:
+                started.append((one.servo, one.frame))
         if self._report_at == moment:
-            for servo in self.servos:
-                if servo.report_due() == moment:
-                    begun += [(servo, frame) for frame in servo.report(moment)]
+            started += [
+                (servo, servo.report(moment)) for servo in self.servos if servo.report_due() == moment
+            ]
             self._find_report()
-        return begun
+        return started
 
-    def _arbitrated(self, speaking: list[tuple[Servo, CanFrame]], moment: float) -> list[CanFrame]:
-        """Lower identifiers first. With one identifier equal frames become one and unequal ones break."""
-        heard: list[CanFrame] = []
-        if len(speaking) < 2:
-            return [frame for _, frame in speaking]
+    def _arbitrate(self, sending: list[tuple[Servo, CanFrame]], moment: float) -> list[CanFrame]:
+        """Lower identifiers first. With one identifier equal frames become one and unequal ones break each other."""
+        if len(sending) < 2:
+            return [frame for _, frame in sending]
         rounds: dict[tuple[tuple[int, ...], int], list[tuple[Servo, CanFrame]]] = {}
-        seen: dict[tuple[int, int, bool], int] = {}
-        for servo, frame in speaking:
+        numbers: dict[tuple[int, int, bool], int] = {}
+        for servo, frame in sending:
             place = (servo.unit, frame.id, frame.extended)
-            seen[place] = seen.get(place, -1) + 1  # one servo sends its own frames one after the other
-            rounds.setdefault((precedence(frame), seen[place]), []).append((servo, frame))
+            numbers[place] = numbers.get(place, -1) + 1  # one servo sends its own frames one after the other
+            rounds.setdefault((precedence(frame), numbers[place]), []).append((servo, frame))
+        heard: list[CanFrame] = []
         for key in sorted(rounds):
-            frames = sorted({frame for _, frame in rounds[key]})
+            frames = {frame for _, frame in rounds[key]}
             if len(frames) == 1:
                 heard += frames
             else:
-                self._collide([servo for servo, _ in rounds[key]], frames, moment)
+                self._collide([servo for servo, _ in rounds[key]], moment)
         return heard
 
-    def _collide(self, servos: list[Servo], frames: list[CanFrame], moment: float) -> None:
-        """All see a bit that they did not send, break off and try again, until they are error passive."""
-        attempt = _ATTEMPT_BITS / servos[0].bit_rate
+    def _collide(self, servos: list[Servo], moment: float) -> None:
+        """All abort and try again until they are error passive; then the frames are given up. # assumption"""
         for servo in servos:
             servo.errors += PASSIVE
         for number in range(1, PASSIVE + 1):
-            self._say(None, moment + number * attempt, ERROR)
-        if self.switches.collision == "passive":  # the flags of an error passive one break nobody's frame
-            for number, frame in enumerate(frames, start=PASSIVE + 1):
-                self._say(None, moment + number * attempt, frame)
+            self._send(None, moment + number * RETRY_BITS / servos[0].bit_rate, ERROR)
 
     def _disturb(self, at: float) -> None:
-        """The host speaks: to a servo at another rate that is a broken frame, which it breaks for all to see."""
+        """A frame of the host is broken for a servo at another rate, which breaks it for all."""
         if self.rate is None:
             return
-        _, _, mistuned, alone = self._roster()  # alone: then nobody acknowledges the frame either
+        hearing, _, mistuned = self._roster()
         active = [servo for servo in mistuned if servo.errors < PASSIVE]
         for servo in mistuned:
             servo.errors += 1
-        if active or (mistuned and alone):
-            self._say(None, at, ERROR)
-
-
-def _checked(node: int) -> int:
-    if node not in sdo.NODES:
-        raise RequestError(f"node id {node} is not possible", expected="1 to 127")
-    return node
+        if active or (mistuned and not hearing):  # without a listener no servo acknowledges the frame
+            self._send(None, at, ERROR)

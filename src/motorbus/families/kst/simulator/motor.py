@@ -1,30 +1,71 @@
-"""The shaft of one servo and its warmth, as functions of time.
-
-Three ways of counting meet here. The *shaft* is where the output really is, in raw counts, and only motion changes
-it. *Zero* is the place of the shaft that reads 0; setting the mid point moves it. The *reading* is what 0x6002
-tells: shaft minus zero, with its sign turned in the reversed state.
-
-Speed, acceleration, current and warmth of a real one are told by no source. What is here is an assumption: a
-trapezoid; a current that a free motor draws while it turns and that a load adds to; a temperature that rises with
-the square of the load and needs a minute for two thirds of the way.
-"""
+"""Flash and shaft of one simulated servo, as functions of time."""
 
 from __future__ import annotations
 
-from math import exp
+from collections.abc import Mapping
+from math import inf
+from typing import Final
 
-from motorbus.core.plant import Drive, Motion, move, rest
+from motorbus.core.plant import Motion, move, rest
 
-DRIVE = Drive(top_speed=1.0, idle_current=0.2, stall_current=2.5)
-"""Currents in A, an assumption; the speed is `Shaft`'s own affair."""
-RISE = 60.0
-"""°C above the surroundings that a steady full load ends at, an assumption."""
-SLOWNESS = 60.0
-"""s for 63 % of that way, an assumption."""
+STORED: Final = (
+    "node_id",
+    "bit_rate_code",
+    "mid_point",
+    "negative_limit",
+    "positive_limit",
+    "function_enable",
+    "zero",
+)
+"""What a save keeps: "node id, bit rate, etc." (manual, command 3); travel limits and function byte by a public
+flight-controller driver, the mid point by a public demo of a newer protocol; never the target position. `zero` is the
+place of the shaft that a mid point sets."""
+
+
+class Flash:
+    """Stored raw values by name. A save takes time; a restart loads the last save that was complete."""
+
+    def __init__(self, factory: Mapping[str, int]) -> None:
+        self._stored = {name: raw for name, raw in factory.items() if name in STORED}
+        self._saving: dict[str, int] | None = None
+        self._begun = self._done = 0.0
+
+    def save(self, values: Mapping[str, int], at: float, duration: float) -> None:
+        """Start to store these values."""
+        self._complete(at)
+        self._saving = {name: values[name] for name in self._stored}
+        self._begun, self._done = at, at + duration
+        self._complete(at)
+
+    def saving(self, at: float) -> bool:
+        """A save is running."""
+        self._complete(at)
+        return self._saving is not None
+
+    def midway(self, at: float) -> float:
+        """Time (s) at which half of the save is done; inf without one."""
+        return (self._begun + self._done) / 2 if self.saving(at) else inf
+
+    def load(self, at: float, *, cut: str) -> dict[str, int]:
+        """The stored values; an incomplete save has stored nothing (`cut` "old") or everything ("new")."""
+        self._complete(at)
+        if self._saving is not None and cut == "new":
+            self._stored = self._saving
+        self._saving = None
+        return dict(self._stored)
+
+    def stored(self, at: float) -> dict[str, int]:
+        """The values that a restart would load at this time."""
+        self._complete(at)
+        return dict(self._stored)
+
+    def _complete(self, at: float) -> None:
+        if self._saving is not None and at >= self._done:
+            self._stored, self._saving = self._saving, None
 
 
 class Shaft:
-    """A shaft in raw counts: `speed` in counts/s, `acceleration` in counts/s². `zero` reads 0."""
+    """A shaft in raw counts. `zero` is the place that reads 0; in the reversed state readings change their sign."""
 
     def __init__(self, at: float, position: int, *, speed: float, acceleration: float) -> None:
         self.motion: Motion = rest(at, position)
@@ -34,12 +75,12 @@ class Shaft:
         self._acceleration = acceleration
 
     def reading(self, at: float) -> int:
-        """The present position as the servo tells it: a whole number of counts that fits 16 bits."""
+        """Present position: a whole number of counts that fits 16 bits."""
         counts = round(self.motion.position(at)) - self.zero
         return max(-32768, min(32767, -counts if self.reversed else counts))
 
-    def go(self, raw: int, at: float) -> None:
-        """To where this is read, from whatever it is doing."""
+    def move(self, raw: int, at: float) -> None:
+        """Move to this reading, from the present motion."""
         self.motion = move(
             at,
             self.motion.position(at),
@@ -50,46 +91,17 @@ class Shaft:
         )
 
     def halt(self, at: float) -> None:
-        """Stand where it is: no supply, and the gear holds."""
+        """Stand still, as without supply."""
         self.motion = rest(at, self.motion.position(at))
 
     def turn_by_hand(self, raw: int, at: float) -> None:
-        """Stand where this is read."""
+        """Stand at this reading."""
         self.motion = rest(at, self._place(raw))
 
-    def make_middle(self, at: float) -> None:
-        """What it stands at reads 0 from now on, and there it stays."""
+    def set_zero(self, at: float) -> None:
+        """Read 0 here."""
         self.zero = round(self.motion.position(at))
         self.turn_by_hand(0, at)
 
     def _place(self, raw: int) -> int:
         return self.zero + (-raw if self.reversed else raw)
-
-
-class Warmth:
-    """A temperature in °C that follows a load, the share of the full torque; exact at every moment."""
-
-    def __init__(self, surroundings: float) -> None:
-        self._surroundings = surroundings
-        self._began = 0.0
-        self._first = surroundings
-        self._load = 0.0
-
-    @property
-    def load(self) -> float:
-        """The load that it follows just now."""
-        return self._load
-
-    def temperature(self, at: float) -> float:
-        """How warm it is."""
-        end = self._surroundings + RISE * self._load**2
-        return end + (self._first - end) * exp(-max(0.0, at - self._began) / SLOWNESS)
-
-    def follow(self, load: float, at: float) -> None:
-        """Another load from this moment on."""
-        self._first, self._began, self._load = self.temperature(at), at, load
-
-    def become(self, temperature: float, at: float) -> None:
-        """It is as warm as this now, and so are its surroundings."""
-        self._surroundings = self._first = temperature
-        self._began = at

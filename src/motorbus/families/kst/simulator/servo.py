@@ -1,8 +1,4 @@
-"""One simulated servo: what a test or a control socket does to it, and what a restart does.
-
-It keeps four things apart that the manual keeps apart: what is in force (`node`, `bit_rate`), what was written
-(`memory`), what a restart will bring back (flash), and where the shaft stands.
-"""
+"""One simulated servo: its objects, supply and reports."""
 
 from __future__ import annotations
 
@@ -11,34 +7,44 @@ from math import inf, pi
 from typing import Final
 
 from motorbus.core.can_frame import CanFrame
+from motorbus.core.plant import Drive
+from motorbus.core.register import Register
 from motorbus.errors import RequestError
-from motorbus.families.kst import notifications, sdo
-from motorbus.families.kst.profiles import BIT_RATES, Profile
-from motorbus.families.kst.simulator import objects
-from motorbus.families.kst.simulator.memory import REVERSE, Memory
-from motorbus.families.kst.simulator.motor import DRIVE, Shaft, Warmth
-from motorbus.families.kst.simulator.server import SdoServer
-from motorbus.families.kst.simulator.switches import Switches
+from motorbus.families.kst import notifications
+from motorbus.families.kst.profiles import BIT_RATES, REVERSED, SAVE, Profile
+from motorbus.families.kst.simulator.motor import Flash, Shaft
+from motorbus.families.kst.simulator.quirks import Quirks
 
-COUNTS_PER_RADIAN = 180 / pi
-"""Times the counts per degree of the profile."""
-MAILBOX: Final = 16
-"""Requests that may wait for a servo; an assumption, no source tells the size of its receive buffer."""
+OUT_OF_RANGE: Final = 0x0609_0030
+TOO_HIGH: Final = 0x0609_0031
+TOO_LOW: Final = 0x0609_0032
+NOT_STORED: Final = 0x0800_0020
+"""CiA 301, object 1010h: the reply to a wrong signature."""
+SOFTWARE: Final = "1.00"
+"""Version in 0x100B. # assumption"""
+INTERVAL: Final = 20
+"""ms between reports as shipped; the public drivers expect 50 a second. # assumption"""
+LOW_VOLTAGE: Final = 6.0
+"""V; below it the servo sends the alarm. # assumption"""
+ACCELERATION: Final = 100.0
+"""rad/s². # assumption"""
+DRIVE: Final = Drive(top_speed=1.0, idle_current=0.2, stall_current=2.5)
+"""Currents in A. # assumption"""
 
 
 class Servo:
-    """A servo as a test pokes it.
+    """A simulated servo.
 
-    `unit`      its number on this bus, from 1; it keeps that whatever its id becomes
-    `node`      the id it answers to, `bit_rate` the rate it is set to
-    `values`    what was written, live and stored, by name
-    `memory`    the raw value of every row, as a host would read it (or last wrote it, where it cannot be read)
-    `shaft`     its shaft, on the bus's clock
-    `errors`    bus errors it has counted since its restart
-    `started`   whether a start was heard, `plugged` whether its cable is in; `lives` counts its supply's comings
-    `delay`     s that it answers later than the others; `busy_until` is when its last answer began
-    `extended`  whether it was last asked with a 29-bit identifier: what it says unasked has the same form
-    `changed`   is called when it may be others who can reach it, or when its next report may be at another moment
+    `unit`      its number on this bus, from 1, whatever its id becomes
+    `node`      the id it answers to; `bit_rate` its rate (bit/s)
+    `values`    raw values by name, in force until the next restart
+    `memory`    the raw value of each row as a host reads it
+    `errors`    bus errors since its restart
+    `started`   a start was received; `lives` counts its restarts
+    `delay`     s added to its replies; `busy_until` is when its last reply began
+    `temperature` (°C) and `load` (-1 to 1, a share of full torque) may be set
+    `extended`  the last request had a 29-bit identifier: unsolicited frames then have one as well
+    `changed`   is called when its id, rate, plug or reports change
     """
 
     def __init__(
@@ -46,47 +52,52 @@ class Servo:
         unit: int,
         node: int,
         profile: Profile,
-        switches: Switches,
+        quirks: Quirks,
         now: Callable[[], float],
-        say: Callable[[Servo, float, CanFrame], None],
+        send: Callable[[Servo, float, CanFrame], None],
     ) -> None:
-        self.changed: Callable[[], None] = _nothing
+        self.changed: Callable[[], None] = lambda: None
         self.unit = unit
         self.profile = profile
-        self.switches = switches
+        self.quirks = quirks
         self.delay = 0.0
         self.busy_until = -inf
         self.errors = 0
         self.lives = 0
         self.started = False
-        self._plugged = True
-        self.extended = switches.id_format == "ext"
+        self.temperature = 25.0
+        self.load = 0.0
+        self.extended = quirks.id_format == "ext"
         self._now = now
-        self._say = say
-        self._voltage = switches.voltage
-        self._warmth = Warmth(switches.temperature)
-        self._server = SdoServer(self)
+        self._send = send
+        self._voltage = 7.4
+        self._plugged = True
         self._interval = 0.0
         self._reports_from = inf
         self._reported = 0
-        per_radian = COUNTS_PER_RADIAN * profile.counts_per_degree
-        speed, acceleration = switches.speed * per_radian, switches.acceleration * per_radian
-        self.shaft = Shaft(now(), switches.position, speed=speed, acceleration=acceleration)
-        self.values = Memory(_factory(node, profile, switches))
-        self._node, self._bit_rate = node, switches.bit_rate
+        per_radian = 180 / pi * profile.counts_per_degree
+        self.shaft = Shaft(
+            now(),
+            quirks.position,
+            speed=quirks.speed * per_radian,
+            acceleration=ACCELERATION * per_radian,
+        )
+        self._factory = _factory(node, profile, quirks)
+        self.flash = Flash(self._factory)
+        self.values: dict[str, int] = {}
+        self._node, self._bit_rate = node, quirks.bit_rate
         self._power_up(now())
-        self.values["goal_position"] = switches.position
+        self.values["goal_position"] = quirks.position
 
-    # -- what a test or a control socket does to it ------------------------------------------------------------
+    # -- for tests and the control socket ------------------------------------------------------------------------
 
     @property
     def memory(self) -> Mapping[str, int]:
-        """The raw value of every row at this moment."""
+        """The raw value of each row at this time."""
         return _Memory(self, self._now)
 
     @property
     def node(self) -> int:
-        """The id it answers to."""
         return self._node
 
     @node.setter
@@ -96,7 +107,6 @@ class Servo:
 
     @property
     def bit_rate(self) -> int:
-        """The rate it is set to, bit/s."""
         return self._bit_rate
 
     @bit_rate.setter
@@ -106,7 +116,7 @@ class Servo:
 
     @property
     def plugged(self) -> bool:
-        """Whether its cable is in."""
+        """Its cable is connected."""
         return self._plugged
 
     @plugged.setter
@@ -115,37 +125,37 @@ class Servo:
         self.changed()
 
     def unplug(self) -> None:
-        """Pull its cable, bus and supply in one. The shaft stays; an answer on its way is lost."""
-        self.shaft.halt(self._now())
-        self.values.lose_supply(self._now(), cut=self.switches.flash_cut)
+        """Disconnect bus and supply. The shaft stays."""
+        now = self._now()
+        self.shaft.halt(now)
+        self.flash.load(now, cut=self.quirks.flash_cut)
         self.lives += 1
         self._reports_from = inf
         self.plugged = False
 
     def plug(self) -> None:
-        """Put its cable back: it powers up. Does nothing when it is in."""
+        """Connect bus and supply; no effect if they are connected."""
         if not self.plugged:
             self.plugged = True
             self._power_up(self._now())
 
     def power_cycle(self) -> None:
-        """Take its supply away and give it back: what was not saved is lost, what was saved is in force."""
+        """Restart: what was saved takes effect, the rest is lost."""
         if self.plugged:
             self._power_up(self._now())
 
-    restart = power_cycle
-
     def midway(self) -> float:
-        """When its flash is written to the half; infinity while it is not."""
-        return self.values.midway(self._now())
+        """Time (s) at which half of a save is done; inf without one."""
+        return self.flash.midway(self._now())
 
     def alarm(self, data: bytes = notifications.LOW_VOLTAGE) -> None:
-        """Say an alarm of four bytes now; the usual one is low voltage (public demo of a newer protocol)."""
+        """Send an alarm of four bytes now."""
         if self.plugged:
-            self._say(self, self._now(), notifications.encode_alarm(self.node, data, extended=self.extended))
+            frame = notifications.encode_alarm(self.node, data, extended=self.extended)
+            self._send(self, self._now(), frame)
 
     def status(self) -> dict[str, object]:
-        """How it is, as plain data; positions in raw counts."""
+        """Its state as plain data; positions in raw counts."""
         now = self._now()
         return {
             "unit": self.unit,
@@ -155,8 +165,8 @@ class Servo:
             "plugged": self.plugged,
             "bit_rate": self.bit_rate,
             "pending_bit_rate": BIT_RATES[self.values["bit_rate_code"]],
-            "saving": self.values.saving(now),
-            "saved": self.values.saved(now),
+            "saving": self.flash.saving(now),
+            "saved": self.flash.stored(now).items() <= self.values.items(),
             "raw_position": self.raw_position,
             "raw_target": self.values["goal_position"],
             "moving": self.shaft.motion.moving(now),
@@ -170,7 +180,7 @@ class Servo:
 
     @property
     def raw_position(self) -> int:
-        """The present position in raw counts; set it to turn the shaft by hand, at rest afterwards."""
+        """Present position in raw counts; setting it turns the shaft by hand."""
         return self.shaft.reading(self._now())
 
     @raw_position.setter
@@ -179,35 +189,17 @@ class Servo:
 
     @property
     def voltage(self) -> float:
-        """The supply in V; falling below the limit of the switch `low_voltage` it says so once."""
+        """Supply in V; when it falls below `LOW_VOLTAGE` the servo sends an alarm."""
         return self._voltage
 
     @voltage.setter
     def voltage(self, volts: float) -> None:
-        was_low, self._voltage = self._is_low, volts
-        if self._is_low and not was_low:
+        was_low, self._voltage = self._voltage < LOW_VOLTAGE, volts
+        if volts < LOW_VOLTAGE and not was_low:
             self.alarm()
 
-    @property
-    def temperature(self) -> float:
-        """°C; set it and it is as warm, and so are its surroundings."""
-        return self._warmth.temperature(self._now())
-
-    @temperature.setter
-    def temperature(self, degrees: float) -> None:
-        self._warmth.become(degrees, self._now())
-
-    @property
-    def load(self) -> float:
-        """What the outside takes of its full torque, -1 to 1; it draws current for that and grows warm."""
-        return self._warmth.load
-
-    @load.setter
-    def load(self, share: float) -> None:
-        self._warmth.follow(share, self._now())
-
     def load_shaft(self, share: float) -> None:
-        """Let the outside take this share of the full torque, -1 to 1."""
+        """Load the shaft with this share of full torque, -1 to 1."""
         if not -1.0 <= share <= 1.0:
             raise RequestError(f"{share:.0%} is not possible", expected="-100% to 100%")
         self.load = share
@@ -217,140 +209,177 @@ class Servo:
         self.load = 0.0
 
     def current(self, at: float) -> float:
-        """The supply current in A, by the model that `motor` tells."""
+        """Supply current, A."""
         return DRIVE.current(self.shaft.motion.velocity(at), self.load) if self.plugged else 0.0
 
-    # -- what the bus brings -----------------------------------------------------------------------------------
+    # -- objects -------------------------------------------------------------------------------------------------
+
+    def read(self, name: str, at: float) -> int:
+        """The raw value of an object at this time."""
+        match name:
+            case "node_id" if self.quirks.pending_id == "active":
+                return self.node
+            case "present_position":
+                return self.shaft.reading(at)
+            case "status":  # current (16 bits), temperature (8 bits, signed), one unused byte
+                current = min(0xFFFF, round(abs(self.current(at)) / self.profile.current_scale))
+                return current | (max(-128, min(127, round(self.temperature))) & 0xFF) << 16
+            case "firmware_version":
+                return int.from_bytes(self.quirks.firmware.encode()[:4], "little")
+            case "software_version":
+                return int.from_bytes(SOFTWARE.encode()[:4], "little")
+            case _:
+                return self.values[name]
+
+    def write(self, row: Register, raw: int, at: float) -> int:
+        """Write a raw value; returns the abort code, 0 if it was accepted."""
+        values, name = self.values, row.name
+        match name:
+            case "store":  # the signature "save" (manual, command 3)
+                values[name] = raw
+                if raw != SAVE or self.quirks.save_reply == "abort":
+                    return NOT_STORED
+                self.flash.save(values, at, self.quirks.flash_time)
+            case "goal_position":
+                return self._write_goal(raw, at)
+            case "negative_limit" | "positive_limit":
+                raw, code = self._into_range(raw, row.low, row.high)
+                if code:
+                    return code
+                values[name] = raw
+                if self.shaft.reversed:  # a change of one limit changes the other (flight-controller driver)
+                    other = "positive_limit" if name == "negative_limit" else "negative_limit"
+                    values[other] = -raw  # as its mirror image # assumption
+            case "report_interval":  # XQPOWER raises a short interval; 0 means none # assumption
+                if raw or row.low > 1:
+                    raw = max(row.low, raw)
+                values[name] = raw
+                self.report_every(raw / 1000, at)
+            case "mid_point":  # one source writes 0 and one 1, so any value sets it
+                self.shaft.set_zero(at)
+                values[name], values["zero"] = raw, self.shaft.zero
+                values["goal_position"] = self.shaft.reading(at)  # the target stays here # assumption
+            case "function_enable":  # bit 5 reverses at once and the shaft stays # assumption
+                values[name] = raw
+                if bool(raw >> REVERSED & 1) != self.shaft.reversed:
+                    self.shaft.halt(at)
+                    self.shaft.reversed = not self.shaft.reversed
+                    values["goal_position"] = self.shaft.reading(at)
+            case _:
+                if not row.low <= raw <= row.high:
+                    return OUT_OF_RANGE
+                values[name] = raw
+        return 0
+
+    def _write_goal(self, raw: int, at: float) -> int:
+        """It takes effect at once (manual, command 5); before a start XQPOWER acknowledges and ignores it."""
+        limit = self.profile.limit
+        raw, code = self._into_range(raw, -limit, limit)
+        if code:
+            return code
+        if self.accepts_targets:
+            low, high = self.travel
+            self.values["goal_position"] = max(
+                low, min(high, raw)
+            )  # clamped to the travel limits # assumption
+            self.shaft.move(self.values["goal_position"], at)
+        return 0
+
+    def _into_range(self, raw: int, low: int, high: int) -> tuple[int, int]:
+        """The value to use and 0, or the value and the abort code."""
+        if low <= raw <= high:
+            return raw, 0
+        if self.quirks.out_of_range == "clamp":
+            return max(low, min(high, raw)), 0
+        return raw, TOO_HIGH if raw > high else TOO_LOW
+
+    # -- frames of the host --------------------------------------------------------------------------------------
 
     def hears(self, rate: int | None) -> bool:
-        """Whether it is there and set to this rate (None: whichever it is)."""
+        """It is connected and set to this rate (None: any rate)."""
         return self.plugged and (rate is None or rate == self.bit_rate)
 
     def takes(self, extended: bool) -> bool:
-        """Whether it heeds identifiers of this form."""
-        return self.switches.id_format in ("asked", "ext" if extended else "std")
+        """It accepts this identifier format."""
+        return self.quirks.id_format in ("asked", "ext" if extended else "std")
 
-    def obey(self, request: sdo.SdoRequest, at: float) -> None:
-        """Carry a request out and answer it, one after the other: a servo has one SDO server."""
-        if self.busy_until - at > MAILBOX * self.switches.turnaround:
-            return  # no controller holds more; a host that floods it loses frames, and the others are served again soon
-        self.extended = request.extended
-        reply = self._server.answer(request, at)
-        if reply is None:
-            return
-        if request.node == sdo.BROADCAST:
-            asked = (
-                self.switches.broadcast_ack if request.kind == "download" else self.switches.broadcast_read
-            )
-            if not asked:
-                return
-        self.busy_until = max(at, self.busy_until) + self.switches.turnaround
-        self._say(self, self.busy_until + self.delay, reply)
+    def send(self, frame: CanFrame, at: float) -> None:
+        """Send a frame that starts at this time."""
+        self._send(self, at, frame)
 
-    def obey_start(self, order: notifications.Start, at: float) -> None:
-        """Start or stop, when it is said in the form this one knows; nobody answers that.
+    def receive_start(self, order: notifications.Start, at: float) -> None:
+        """Start or stop in the form that this servo knows; lost during a save. # assumption"""
+        form = self.profile.nmt if self.quirks.nmt == "profile" else self.quirks.nmt
+        if form in order.forms and not self.flash.saving(at):
+            self.started = order.on
+            self._set_reporting(order.on, at)
 
-        During a write to flash it is lost like every other order, an assumption.
-        """
-        form = self.profile.nmt if self.switches.nmt == "profile" else self.switches.nmt
-        if form not in order.forms or self.values.saving(at):
-            return
-        self.started = order.on
-        self._report(order.on, at)
+    @property
+    def accepts_targets(self) -> bool:
+        """Whether a target moves it: XQPOWER must be started first (public XQPOWER module)."""
+        return self.started or self.profile.nmt != "standard"
 
-    # -- what it says unasked ----------------------------------------------------------------------------------
+    @property
+    def travel(self) -> tuple[int, int]:
+        """The travel limits in force, raw."""
+        limit = self.profile.limit
+        return self.values.get("negative_limit", -limit), self.values.get("positive_limit", limit)
+
+    # -- reports -------------------------------------------------------------------------------------------------
 
     def report_every(self, seconds: float, at: float) -> None:
-        """Another interval between reports from this moment on; 0: none."""
+        """Set the interval of reports; 0: none."""
         self._interval = seconds
         self.changed()
         if self._reports_from < inf:
-            self._report(True, at)
+            self._set_reporting(True, at)
 
     def report_due(self) -> float | None:
-        """When it next says by itself where it is, or None."""
+        """Time (s) of the next report, or None."""
         if self._reports_from == inf or not self._interval:
             return None
         return self._reports_from + self._interval * (self._reported + 1)
 
-    def wake(self, at: float) -> None:
-        """The clock begins here: so do the reports that were to come from power-up on."""
+    def begin(self, at: float) -> None:
+        """The clock begins: so do reports from power-up on."""
         if self._reports_from < inf:
-            self._report(True, at)
+            self._set_reporting(True, at)
 
-    def report(self, at: float) -> list[CanFrame]:
-        """The report that is due, in one form or both (newer KST: 0x580 + id; XQPOWER: 0x180 + id as well)."""
+    def report(self, at: float) -> CanFrame:
+        """The report that is due, under 0x580 + id; XQPOWER sends another one under 0x180 + id, which is left out."""
         self._reported += 1
-        wanted = self.switches.report_form
-        forms = ("sdo", "pdo") if wanted == "both" else (wanted,)
-        raw = self.shaft.reading(at)
-        return [
-            notifications.encode_report(self.node, raw, form=form, extended=self.extended) for form in forms
-        ]
+        return notifications.encode_report(self.node, self.shaft.reading(at), extended=self.extended)
 
-    def _report(self, on: bool, at: float) -> None:
+    def _set_reporting(self, on: bool, at: float) -> None:
         self._reports_from, self._reported = (at if on else inf), 0
         self.changed()
 
-    # -- what it is --------------------------------------------------------------------------------------------
-
-    @property
-    def travel(self) -> tuple[int, int]:
-        """The travel limits in force, as raw targets."""
-        limit = self.profile.limit
-        if "negative_limit" not in self.values:
-            return -limit, limit
-        return self.values["negative_limit"], self.values["positive_limit"]
-
-    @property
-    def heeds_positions(self) -> bool:
-        """Whether a target position moves it: XQPOWER wants to be started first."""
-        needs = self.switches.needs_start
-        wants_start = self.profile.nmt == "standard" if needs == "profile" else needs == "yes"
-        return self.started or not wants_start
-
-    @property
-    def _is_low(self) -> bool:
-        return self._voltage < self.switches.low_voltage
-
     def _power_up(self, at: float) -> None:
-        switches = self.switches
+        """Load the flash. The shaft stays; the target is the default, 0 (manual, command 5). # assumption"""
         self.lives += 1
-        self.values.restart(at, cut=switches.flash_cut)
+        self.values = self._factory | self.flash.load(at, cut=self.quirks.flash_cut)
         self.node = self.values["node_id"]
         self.bit_rate = BIT_RATES[self.values["bit_rate_code"]]
         self.errors, self.busy_until, self.started = 0, -inf, False
-        self._server.forget()
         self.shaft.halt(at)
         self.shaft.zero = self.values["zero"]
-        self.shaft.reversed = bool(self.values.get("function_enable", 0) & REVERSE)
-        if switches.after_restart == "move":
-            self.shaft.go(switches.default_position, at)
-        self._interval = (switches.reports_ms or self._interval_as_shipped) / 1000
-        self._report(bool(switches.reports_ms), at)
-        if switches.boot_notice and self.lives > 1:
-            self._say(self, at, notifications.encode_boot(self.node, extended=self.extended))
-        if self._is_low:
+        self.shaft.reversed = bool(self.values.get("function_enable", 0) >> REVERSED & 1)
+        interval = self.quirks.reports_ms or self.values.get("report_interval", INTERVAL)
+        self._interval = interval / 1000
+        self._set_reporting(bool(self.quirks.reports_ms), at)
+        if self.quirks.boot_notice and self.lives > 1:
+            self._send(self, at, notifications.encode_boot(self.node, extended=self.extended))
+        if self._voltage < LOW_VOLTAGE:
             self.alarm()
-
-    @property
-    def _interval_as_shipped(self) -> int:
-        return self.values.get("report_interval", objects.INTERVAL)
-
-
-def _nothing() -> None:
-    """Nobody goes by it."""
 
 
 class _Memory(Mapping[str, int]):
-    """Every row of a servo by name, worked out when asked."""
-
     def __init__(self, servo: Servo, now: Callable[[], float]) -> None:
         self._servo = servo
         self._now = now
 
     def __getitem__(self, name: str) -> int:
-        return objects.read(self._servo, self._servo.profile.table[name].name, self._now())
+        return self._servo.read(self._servo.profile.table[name].name, self._now())
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._servo.profile.table)
@@ -359,17 +388,14 @@ class _Memory(Mapping[str, int]):
         return len(self._servo.profile.table)
 
 
-def _factory(node: int, profile: Profile, switches: Switches) -> dict[str, int]:
-    """The values of all rows as it is shipped, with the id and the rate it is made with."""
+def _factory(node: int, profile: Profile, quirks: Quirks) -> dict[str, int]:
+    """Raw values of all rows as shipped, with this id and rate."""
     codes = {rate: code for code, rate in BIT_RATES.items()}
     special = {
         "node_id": node,
-        "bit_rate_code": codes[switches.bit_rate],
-        "goal_position": switches.default_position,
-        "report_interval": objects.INTERVAL,
+        "bit_rate_code": codes[quirks.bit_rate],
+        "report_interval": INTERVAL,
         "negative_limit": -profile.limit,
         "positive_limit": profile.limit,
-        "store": 0,
     }
-    rows = {row.name: special.get(row.name, row.default or 0) for row in profile.table.values()}
-    return rows | {"zero": 0}
+    return {row.name: special.get(row.name, row.default or 0) for row in profile.table.values()} | {"zero": 0}

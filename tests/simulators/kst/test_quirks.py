@@ -10,15 +10,15 @@ import pytest
 
 from motorbus.core.switches import options, switched
 from motorbus.errors import RequestError
-from motorbus.families.kst.simulator import Switches, simulate
+from motorbus.families.kst.simulator import Quirks
 
-chosen = partial(switched, Switches, "kst")
+chosen = partial(switched, Quirks, "kst")
 
 
 def test_text_and_values_mean_the_same() -> None:
     text = chosen({"accept_sized": "no", "flash_time": "0.05", "x1": "0x10", "pending_id": "active"})
     values = chosen({"accept_sized": False, "flash_time": 0.05, "x1": 16, "pending_id": "active"})
-    assert text == values == Switches(accept_sized=False, flash_time=0.05, x1=16, pending_id="active")
+    assert text == values == Quirks(accept_sized=False, flash_time=0.05, x1=16, pending_id="active")
 
 
 @pytest.mark.parametrize(
@@ -45,30 +45,23 @@ def test_nonsense_is_refused_by_name(name: str, value: str, says: str, expected:
     assert expected in caught.value.expected
 
 
-def test_the_words_of_the_host_s_own_settings_are_understood() -> None:
-    """A bus string says `id_format` and `nmt` to both ends; a host that tries both forms is asked for either."""
-    assert simulate((0x25,), id_format="auto").switches.id_format == "asked"
-    for word in ("profile", "none", "vendor", "standard"):
-        assert chosen({"nmt": word}).nmt == word
-
-
-@pytest.mark.parametrize("one", fields(Switches), ids=lambda one: one.name)
+@pytest.mark.parametrize("one", fields(Quirks), ids=lambda one: one.name)
 def test_each_has_a_help_text_a_source_and_a_default_among_its_choices(one: Any) -> None:
     assert one.metadata["help"]
     assert one.metadata["source"]
     assert not one.metadata["choices"] or one.default in one.metadata["choices"]
-    assert chosen({one.name: one.default}) == Switches()
+    assert chosen({one.name: one.default}) == Quirks()
 
 
 def test_every_choice_can_be_chosen() -> None:
-    for one in fields(Switches):
+    for one in fields(Quirks):
         for choice in one.metadata["choices"]:
             assert getattr(chosen({one.name: str(choice)}), one.name) == choice
 
 
 def test_every_switch_is_an_option_with_its_choices_and_its_source() -> None:
-    found = {option.name: option for option in options(Switches)}
-    assert set(found) == {one.name for one in fields(Switches)}
-    assert found["abort_mux"].choices == ("echo", "index-only", "zero")
+    found = {option.name: option for option in options(Quirks)}
+    assert set(found) == {one.name for one in fields(Quirks)}
+    assert found["id_format"].choices == ("asked", "std", "ext")
     assert all(option.source for option in found.values())
     assert (found["flash_time"].kind, found["x1"].kind, found["accept_sized"].kind) == (float, int, bool)
