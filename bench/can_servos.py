@@ -18,7 +18,7 @@ from motorbus.core.request import Data
 from motorbus.families.kst.profiles import PROFILES
 from motorbus.families.kst.sdo import decode_request
 from motorbus.families.kst.simulator import KstBus
-from motorbus.families.kst.simulator.switches import Switches
+from motorbus.families.kst.simulator.quirks import Quirks
 from motorbus.simulation.clients import CanClient
 from motorbus.simulation.mount import Mount
 from motorbus.simulation.pty import PtyMaster
@@ -29,7 +29,7 @@ class Turning(KstBus):
     """Servos that somebody turns a little whenever they are asked where they are; `reads` by node."""
 
     def __init__(self, nodes: range) -> None:
-        super().__init__(nodes, PROFILES["kst"], Switches())
+        super().__init__(nodes, PROFILES["kst"], Quirks())
         self.reads = dict.fromkeys(nodes, 0)
         self._turned = {servo.node: servo for servo in self.servos}
 

@@ -18,13 +18,18 @@ FORBIDDEN = {
     "asynccontextmanager": "its clean-up is lost when `enter` is interrupted; write a Guard",
     "contextvars": "a procedure runs in no context of its own",
     "current_task": "a procedure is no task of asyncio",
+    "asyncio": "time belongs to the link",
 }
+INTERRUPTIONS = {"BaseException", "GeneratorExit", "KeyboardInterrupt", "SystemExit", "CancelledError"}
+AWAITS = (ast.Await, ast.AsyncWith, ast.AsyncFor)
 
 
 def awaits_where_cleanup_is_lost(node: ast.AST, place: str = "") -> Iterator[tuple[int, str]]:
-    """Line and place of each `await` in a bare `finally` or `except BaseException`, outside a class."""
-    if isinstance(node, ast.Await) and place:
+    """Line and place of each `await` in a bare `finally`, or where an interruption is caught."""
+    if isinstance(node, AWAITS) and place:
         yield node.lineno, place
+    if isinstance(node, ast.comprehension) and node.is_async and place:
+        yield node.target.lineno, place
     if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
         place = ""
     for field, value in ast.iter_fields(node):
@@ -36,7 +41,8 @@ def awaits_where_cleanup_is_lost(node: ast.AST, place: str = "") -> Iterator[tup
                 inside = "finally"
             elif isinstance(child, ast.ExceptHandler):
                 caught = "BaseException" if child.type is None else ast.unparse(child.type)
-                inside = "except BaseException" if "BaseException" in caught else place
+                names = {name.strip("() ").split(".")[-1] for name in caught.split(",")}
+                inside = f"except {caught}" if names & INTERRUPTIONS else place
             yield from awaits_where_cleanup_is_lost(child, inside)
 
 

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import gc
+from threading import Thread
 from typing import Any
 
 import pytest
 
+import motorbus
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.steps import (
     Emit,
@@ -22,7 +25,7 @@ from motorbus.core.steps import (
 )
 from motorbus.errors import LinkError, NoReply, RequestError
 from tests.bus.adapter import Cancelled, Effect, Engine
-from tests.bus.frames import Servos, can_move, can_read, read, write, write_frame
+from tests.bus.frames import Servos, can_move, can_read, read, read_frame, write, write_frame
 
 LOCK = 55
 
@@ -248,3 +251,49 @@ def test_a_step_awaited_outside_of_a_procedure_names_run() -> None:
     with pytest.raises(RequestError, match="Sleep was awaited outside of a procedure") as caught:
         asyncio.run(awaits_a_step())
     assert "await bus.run(...)" in caught.value.advice
+
+
+def test_a_bus_called_inside_of_a_procedure_sends_nothing_and_names_the_driver_function(
+    engine: Engine,
+) -> None:
+    async def nested() -> Any:
+        return await read(2) + engine.bus.run(guarded(1, read(1)))
+
+    with pytest.raises(RequestError, match="inside of a procedure") as caught:
+        engine.run(nested())
+    assert "Servo.position.function(servo)" in caught.value.expected
+    assert engine.sent() == [read_frame(2)]
+
+
+@pytest.mark.parametrize("wrong", [0.5, None, print, [1]])
+def test_what_is_neither_procedure_nor_step_is_refused(engine: Engine, wrong: Any) -> None:
+    with pytest.raises(RequestError, match="neither a procedure nor a step"):
+        engine.bus.run(wrong)
+    with pytest.raises(RequestError, match="neither a procedure nor a step"):
+        engine.bus.run(gather(read(1), wrong))
+    assert engine.run(read(1)) == 100
+
+
+def test_what_a_bus_refuses_is_closed() -> None:
+    """A coroutine that never starts would be reported as a warning, which is an error here."""
+
+    async def never() -> None:
+        raise AssertionError
+
+    with motorbus.simulate("feetech", ids="1") as sim, motorbus.open(sim.url) as bus:
+        assert motorbus.feetech.Servo(bus, 1).ping()
+        with pytest.raises(RequestError):
+            bus.exchange([never()])  # type: ignore[list-item]
+        errors: list[BaseException] = []
+
+        def use() -> None:
+            try:
+                bus.run(never())
+            except RequestError as error:
+                errors.append(error)
+
+        thread = Thread(target=use)
+        thread.start()
+        thread.join()
+        assert len(errors) == 1
+    gc.collect()

@@ -85,6 +85,16 @@ def test_a_class_shows_the_methods_of_its_face() -> None:
         assert not inspect.iscoroutinefunction(Servo.scaled)
 
 
+def test_an_override_may_call_the_method_of_its_base_class() -> None:
+    class Doubled(Servo):
+        def scaled(self, by: int, *, plus: int = 0) -> int:
+            unbound: Any = Servo.scaled
+            value: int = unbound(self, by, plus=plus)
+            return 2 * value
+
+    assert Doubled(BlockingBus()).scaled(3) == 42
+
+
 def test_a_copy_has_methods_of_its_own() -> None:
     first = Servo(BlockingBus())
     assert first.scaled(3) == 21

@@ -112,7 +112,7 @@ CASES = [(error, number) for error in ERRORS for number in (0, 1, 2, 9)]
 CASES.remove((ERRORS[1], 9))  # a bus raises it when the guard has ended
 
 
-@pytest.mark.parametrize("kind", ["guard", "afterwards"])
+@pytest.mark.parametrize("kind", ["guard", "with_cleanup"])
 @pytest.mark.parametrize(("error", "fails_at"), CASES)
 def test_the_end_of_a_guard_follows_its_beginning(kind: str, error: BaseException, fails_at: int) -> None:
     log: list[int] = []
@@ -126,10 +126,26 @@ def test_the_end_of_a_guard_follows_its_beginning(kind: str, error: BaseExceptio
     assert log == [*opened, *([2] if fails_at != 1 or not opened else []), 9]
 
 
-def test_a_procedure_that_is_dropped_leaves_no_guard() -> None:
-    operation = changed([])
-    operation.send(None)
-    operation.close()  # raises RuntimeError where it awaits another step
+@pytest.mark.parametrize("steps", [1, 2], ids=["in enter", "in the block"])
+def test_a_procedure_that_is_dropped_leaves_no_guard(steps: int) -> None:
+    procedure = changed([])
+    for _ in range(steps):
+        procedure.send(None)
+    procedure.close()  # raises RuntimeError where it awaits another step
+
+
+def test_a_clean_up_that_fails_is_a_note_of_the_interruption() -> None:
+    class Failing(Guard):
+        async def leave(self, error: BaseException | None) -> None:
+            raise NoReply("the lock is silent")
+
+    async def interrupted() -> None:
+        async with Failing():
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as caught:
+        carried_out(interrupted(), [], fails_at=0, error=ValueError())
+    assert caught.value.__notes__ == ["clean-up failed: the lock is silent"]
 
 
 def test_what_is_never_started_is_closed_with_all_that_it_was_given() -> None:

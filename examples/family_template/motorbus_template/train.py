@@ -1,4 +1,4 @@
-"""TRAIN: servos that are led in a loop, as `core.family.Train` says; a part of the driver in a file of its own.
+"""A `core.family.PositionStream`: servos in a loop.
 
 Whoever has this has devices that several families' loops, moves and teaching can lead. All that a cycle needs is asked
 beforehand, once: a cycle then asks for positions and orders goals, and nothing else.

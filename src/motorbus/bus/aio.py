@@ -14,7 +14,7 @@ from motorbus.bus.base import IDLE, BaseBus, check_clocks
 from motorbus.bus.interrupts import DEFAULTS, SIGNALS
 from motorbus.bus.jobs import RequestJob
 from motorbus.bus.prepared import Prepared
-from motorbus.bus.tasks import Notify, TaskTree
+from motorbus.bus.tasks import Notify, TaskTree, starting
 from motorbus.core.request import Request
 from motorbus.core.steps import Runnable, discard
 from motorbus.errors import LinkError, LinkLost
@@ -45,16 +45,18 @@ class AsyncBus(BaseBus):
         # Virtual time passes in `_wait` only, and a request with an effect needs `since`, which a call has not.
         if isinstance(procedure, Request) and not procedure.effect and not self.link.virtual:
             return self._transact(procedure)
-        return self._run(_Owned(procedure), report)
+        return self._run(Owned(procedure), report)
 
-    async def _run(self, owned: _Owned, report: Notify | None) -> Any:
-        part: _Part[Any] = _Part(self, owned.procedure, report, asyncio.Event())
+    async def _run(self, owned: Owned, report: Notify | None) -> Any:
+        with starting(owned.procedure):
+            part: _Part[Any] = _Part(self, owned.procedure, report, asyncio.Event())
         await _run_parts([part])
         return part.tree.result()
 
     async def _transact(self, request: Request[Any]) -> Any:
         """Carry out one request that changes nothing."""
-        call = _Call(request)
+        with starting():
+            call = _Call(request)
         with self.turn:
             try:
                 prepared = self.find_prepared(request)
@@ -191,10 +193,10 @@ def call_in(loop: asyncio.AbstractEventLoop, function: Callable[[], object]) -> 
         loop.call_soon_threadsafe(function)
 
 
-class _Owned:
-    """A procedure that is closed if the task that was to run it is cancelled before it begins."""
+class Owned:
+    """A procedure, or a tuple of them, that is closed if the task that was to run it is cancelled before it begins."""
 
-    def __init__(self, procedure: Runnable[Any]) -> None:
+    def __init__(self, procedure: Any) -> None:
         self.procedure = procedure
 
     def __del__(self) -> None:
@@ -230,9 +232,10 @@ async def run_on(procedures: Mapping[AsyncBus, Runnable[Any]]) -> dict[AsyncBus,
 
     Any other error of one of them, and a cancellation, cancels all; it is raised when all have cleaned up.
     """
-    check_clocks(procedures)
-    news = asyncio.Event()
-    parts = [_Part(bus, procedure, None, news) for bus, procedure in procedures.items()]
+    with starting(*procedures.values()):
+        check_clocks(procedures)
+        news = asyncio.Event()
+        parts = [_Part(bus, procedure, None, news) for bus, procedure in procedures.items()]
     await _run_parts(parts)
     return {part.bus: part.tree.outcome() for part in parts}
 

@@ -16,7 +16,7 @@ from motorbus.bus.running import TURN_TIMEOUT, run_here, run_on
 from motorbus.bus.tasks import Notify
 from motorbus.core.register import shown
 from motorbus.core.request import Priority, Request
-from motorbus.core.steps import Runnable, gather
+from motorbus.core.steps import Runnable, discard, gather
 from motorbus.errors import LinkError, MotorbusError, RequestError
 
 T = TypeVar("T")
@@ -150,10 +150,13 @@ class Bus(BaseBus):
         interlock = self.engine.interlock
         if order.expected != () or order.effect not in GATED or interlock is None:
             return order.expected == ()
-        return not interlock.required_reads(order)
+        return not self._needs_reads(order)
 
     def _needs_reads(self, request: Request[Any]) -> bool:
-        return request.effect in GATED and bool(self.required_reads(request))
+        reads = self.required_reads(request) if request.effect in GATED else ()
+        for read in reads:
+            discard(read)
+        return bool(reads)
 
     def defer_signals(self) -> None:
         """Raise signals at the end of a request only, until this bus is closed; see `motorbus.bus.interrupts`."""
@@ -270,6 +273,8 @@ def exchange_on(
 def _check_requests(requests: Sequence[Any]) -> None:
     for one in requests:
         if not isinstance(one, Request):
+            for other in requests:
+                discard(other)
             raise RequestError(
                 f"{shown(one)} is not a request",
                 expected="as bus.exchange([write(goals), sync_read_positions(servos)]): single requests, made before",

@@ -11,7 +11,7 @@ from typing import Any, Final, Generic, TypeVar
 from motorbus.bus.base import IDLE, BaseBus, check_clocks
 from motorbus.bus.interrupts import interrupts
 from motorbus.bus.jobs import Since
-from motorbus.bus.tasks import Notify, TaskTree
+from motorbus.bus.tasks import Notify, TaskTree, starting
 from motorbus.core.steps import Runnable
 from motorbus.link.stream import wait_any
 
@@ -33,7 +33,8 @@ def run_here(
     `since`: what had happened on the bus when the caller decided; None: as of now.
     """
     with interrupts():
-        part = _Part(bus, procedure, report, since)
+        with starting(procedure):
+            part = _Part(bus, procedure, report, since)
         _run_parts([part])
         return part.tree.result()
 
@@ -45,10 +46,11 @@ def run_on(
 
     An error that is not a MotorbusError, or a signal, cancels all; it is raised after all have cleaned up.
     """
-    check_clocks(procedures)
     with interrupts():
-        sinces = since or {}
-        parts = [_Part(bus, procedure, None, sinces.get(bus)) for bus, procedure in procedures.items()]
+        with starting(*procedures.values()):
+            check_clocks(procedures)
+            sinces = since or {}
+            parts = [_Part(bus, procedure, None, sinces.get(bus)) for bus, procedure in procedures.items()]
         _run_parts(parts)
         return {part.bus: part.tree.outcome() for part in parts}
 

@@ -1,8 +1,9 @@
 """Which nodes are in sync. Decision record 0039.
 
-A node is out of sync from the first byte of a request to it until its reply is accepted. Before it is asked again the
-bus is silent for a quiet time, then sends a probe: a request whose reply differs in key or length from every reply
-that the node owes. A link is first in, first out, so when the probe is answered no older reply can follow.
+A node is in flight from the first byte of a request until its reply is accepted, and out of sync if none is. Before
+the next request to it the bus is silent for a quiet time, then sends a probe: a request whose reply differs in key or
+length from every reply that the node owes. A link is first in, first out, so when the probe is answered no older
+reply can follow.
 """
 
 from __future__ import annotations

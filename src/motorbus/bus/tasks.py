@@ -1,10 +1,12 @@
-"""Running procedures: a tree of generators, and what each of them waits for. No I/O and no clock."""
+"""Running procedures: a tree of coroutines, and what each of them waits for. No I/O and no clock."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from math import inf
+from threading import local
+from types import CoroutineType
 from typing import Any, Final, Generic, TypeVar
 
 from motorbus.bus import failures
@@ -42,6 +44,32 @@ READS: Final = 2
 """Rounds of the reads that the interlock requires; the second where the first was doubtful."""
 
 
+class _Stepping(local):
+    """Whether this thread executes the code of a procedure."""
+
+    active = False
+
+
+_STEPPING: Final = _Stepping()
+
+
+@contextmanager
+def starting(*runnables: object) -> Iterator[None]:
+    """Close these procedures if they are refused. Raises RequestError inside of another procedure."""
+    try:
+        if _STEPPING.active:
+            raise RequestError(
+                "a bus or a device method was called inside of a procedure",
+                expected="a step, or the driver function: `await feetech.Servo.position.function(servo)`",
+                advice="nothing was sent",
+            )
+        yield
+    except BaseException:
+        for one in runnables:
+            discard(one)
+        raise
+
+
 class Timer(Job):
     """Waits for a moment, or for a notification."""
 
@@ -54,14 +82,20 @@ class Timer(Job):
 class Task:
     """One procedure, and the one thing that it waits for: a job, or its children.
 
-    `started`: nothing is left to begin, though it may wait for exclusive use. `entered`: its code has begun.
-    `joins_one`: the value of its only child is its value, not a list. `claims`: its end releases exclusive use.
+    `started`: nothing more to start; it may still wait for exclusive use. `entered`: its code has begun.
+    `joins_one`: the value of its only child is its value, not a tuple. `claims`: its end releases exclusive use.
     `checked`: the reads that the interlock requires precede its request. `exempt`: the cancellation was thrown into it,
     or must not be, as for the end of a guard and what that starts.
     """
 
     def __init__(self, procedure: Runnable[Any], parent: Task | None = None) -> None:
         self.procedure = procedure
+        if not isinstance(procedure, Step | CoroutineType):
+            raise RequestError(
+                f"{procedure!r} is neither a procedure nor a step",
+                expected="a coroutine of steps, or a step, as feetech.Servo.position.function(servo)",
+                advice="nothing was sent",
+            )
         self.coroutine = procedure.__await__() if isinstance(procedure, Step) else procedure
         self.owner: object = None if parent is None else parent.owner
         self.job: Job | None = None
@@ -190,13 +224,17 @@ class TaskTree(Generic[T]):
 
     def _resume(self, task: Task, value: Any = None, error: BaseException | None = None) -> None:
         task.entered = True
+        outer, _STEPPING.active = _STEPPING.active, True
         try:
             step = task.coroutine.send(value) if error is None else task.coroutine.throw(error)
         except StopIteration as end:
+            _STEPPING.active = outer
             self._finish(task, end.value)
         except BaseException as failure:
+            _STEPPING.active = outer
             self._finish(task, error=failure)
         else:
+            _STEPPING.active = outer
             self._begin(task, step)
 
     def _finish(self, task: Task, value: Any = None, error: BaseException | None = None) -> None:
@@ -235,7 +273,12 @@ class TaskTree(Generic[T]):
             self._begin_request(task, step)
         elif isinstance(step, Gather):
             task.joins_one = False
-            task.children = [Task(procedure, task) for procedure in step.runnables]
+            try:
+                task.children = [Task(procedure, task) for procedure in step.runnables]
+            except RequestError as error:
+                discard(step)
+                self._resume(task, error=error)
+                return
             if not task.children:
                 task.job = Job()
                 task.job.settle(())
@@ -381,10 +424,14 @@ class TaskTree(Generic[T]):
 
 async def _read_first(required: Callable[[Request[Any]], Any], reads: Any, request: Request[T]) -> T:
     """Carry out the reads that the interlock requires, again where they were doubtful, then the request."""
-    for _ in range(READS):
+    try:
+        for _ in range(READS):
+            for read in reads:
+                await catch(read)
+            reads = required(request)
+    finally:
         for read in reads:
-            await catch(read)
-        reads = required(request)
+            discard(read)  # those that never started
     return await request
 
 

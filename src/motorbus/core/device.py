@@ -101,10 +101,10 @@ class MethodDescriptor(Generic[P, T]):
     def of_class(self, owner: type) -> Any:
         """The method as an attribute of this class."""
         if owner not in self._of_class:
-            name = self.name
+            descriptor: Any = self
 
             def method(self: Any, *args: Any, **kwargs: Any) -> Any:
-                return getattr(self, name)(*args, **kwargs)
+                return descriptor.__get__(self, type(self))(*args, **kwargs)
 
             self._describe(method, owner, self.signature)
             method.function = self.function  # type: ignore[attr-defined]

@@ -79,7 +79,7 @@ class Sleep(Step[float]):
 
 @dataclass(slots=True, eq=False)
 class WaitFor(Step["Notification | None"]):
-    """Wait at most `until` seconds from this step on for a notice that `match` accepts; gives it, or None."""
+    """Wait at most `until` seconds for a notification that `match` accepts; gives it, or None."""
 
     match: Final[Callable[[Notification], bool]]
     until: Final[float]
@@ -108,15 +108,14 @@ class Progress(NamedTuple):
 class JournalEntry(NamedTuple):
     """An event for `Emit` that must be on disk before the next step: the state of a guarded change.
 
-    `change`  the verb that makes the change, as "set_id"
+    `change`  the driver function that makes the change, as "set_id"
     `state`   ASKED    requested, conditions not yet checked; not stored, but refused while another change on the bus
                        is unfinished
               INTENT   the next step may change something
               OUTCOME  the change has ended; `facts["outcome"]` says how
               Any other word is a step that was reached.
     `facts`   of INTENT: plain data that suffices to finish or revert the change, with the id of the device as "node".
-              For people, where the verb does not suffice: "what" is unfinished, its "cause", and "advice" ({bus} in
-              it is replaced)
+              Optional texts for the user: "what" is unfinished, its "cause", and "advice" ({bus} in it is replaced)
     """
 
     change: str
@@ -149,10 +148,11 @@ class Shielded(Step[T_co]):
 
 
 class Guard:
-    """A guarded sequence for `async with`: `leave` follows `enter`, also when `enter` fails, for its first request may
-    have arrived.
+    """A guarded sequence for `async with`: `leave` runs after the block, and also if `enter` raises: a device may have
+    received its first request.
 
-    Nothing is thrown into `leave`. A procedure that is dropped sends nothing: GeneratorExit never calls `leave`.
+    Nothing is thrown into `leave`. If the block was interrupted, an error of `leave` becomes a note of that.
+    A procedure that is dropped sends nothing: GeneratorExit never calls `leave`.
     """
 
     async def enter(self) -> None:
@@ -168,13 +168,21 @@ class Guard:
         except GeneratorExit:
             raise
         except BaseException as error:
-            await Shielded(self.leave(error))
+            await self._leave(error)
             raise
         return self
 
     async def __aexit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if not isinstance(error, GeneratorExit):
+            await self._leave(error)
+
+    async def _leave(self, error: BaseException | None) -> None:
+        try:
             await Shielded(self.leave(error))
+        except MotorbusError as failure:
+            if error is None or isinstance(error, Exception):
+                raise
+            error.add_note(f"clean-up failed: {failure.summary}")
 
 
 class _CleanUp(Guard):

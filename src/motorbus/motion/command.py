@@ -23,7 +23,7 @@ from motorbus.core.request import (
     Step,
     Stops,
 )
-from motorbus.core.steps import Exclusive, Gather, Runnable, catch, gather
+from motorbus.core.steps import Exclusive, Gather, Runnable, Shielded, catch, gather
 from motorbus.errors import Interrupted, MotorbusError
 
 if TYPE_CHECKING:
@@ -171,8 +171,9 @@ class Command:
         """The same operation, of which nothing that moves or gives torque leaves once the command is lost.
 
         It is for what takes several exchanges, as getting ready does: whoever lets an axis go in the middle of that
-        must find it limp afterwards. Each such exchange is `guarded`, also those that are said together or alone; what
-        stops or lets go (`Rank.STOP`) always leaves. Raises Interrupted in the place of an exchange that did not leave.
+        must find it limp afterwards. Each such exchange is `guarded`, also those that are said together or alone;
+        what stops or lets go (`Priority.STOP`) always leaves. Raises Interrupted in the place of an exchange that did
+        not leave.
         """
         if isinstance(operation, Step):
             only: T = await self._watching(operation)
@@ -203,6 +204,8 @@ class Command:
             return gather(*[self.watched(one) for one in step.runnables])
         if isinstance(step, Exclusive):
             return Exclusive(self.watched(step.runnable))
+        if isinstance(step, Shielded):
+            return Shielded(self.watched(step.runnable))
         return step
 
     async def stop(self, *, anew: bool = False) -> dict[str, MotorbusError]:

@@ -5,8 +5,8 @@ Work on one bus goes straight to it, for a control loop does so thousands of tim
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TypeVar
+from collections.abc import Coroutine, Mapping
+from typing import Any, TypeVar
 
 from motorbus.bus import aio, running
 from motorbus.bus.aio import AsyncBus
@@ -56,8 +56,11 @@ class LoopConductor:
     def __init__(self, buses: Mapping[str, AsyncBus]) -> None:
         self._buses = buses
 
-    async def run(self, work: Parallel[T]) -> T:
+    def run(self, work: Parallel[T]) -> Coroutine[Any, Any, T]:
         """As `Conductor.run`. A cancelled task first cleans up on every bus, then raises CancelledError."""
+        return self._run_owned(work, aio.Owned(tuple(work.operations.values())))
+
+    async def _run_owned(self, work: Parallel[T], owned: aio.Owned) -> T:
         try:
             return await self._run(work)
         except MotorbusError as error:

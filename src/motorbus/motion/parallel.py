@@ -1,6 +1,6 @@
 """Work on several buses at the same time, said once and run blocking or async.
 
-A driver function yields steps on one bus. What a machine does is one such operation on each bus that it needs, all
+A driver function awaits steps on one bus. What a machine does is one such operation on each bus that it needs, all
 begun together, and what becomes of their results. They know of each other only by what they share in memory, as a
 `Meeting`; who carries them out is `conductor`.
 """

@@ -61,6 +61,10 @@ class RobotVerbs(Leased):
     """What a robot can do, blocking or async. `names` are names of axes, groups and buses; None means every axis."""
 
     def __repr__(self) -> str:
+        if self._shut:
+            return f"<{type(self).__name__}: {self._shut}>"
+        if self._shut:
+            return f"<{type(self).__name__}: {self._shut}>"
         axes, buses = ", ".join(self.axes), ", ".join(self.buses)
         return f"<{type(self).__name__}: axes {axes} on {buses}>"
 

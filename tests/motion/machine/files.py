@@ -221,7 +221,7 @@ UNOPENABLE = (
     Broken("arm#2", "arm#254", "axis.elbow.device: 254 is not the id of a servo", "0 to 253"),
     Broken("arm#2", "arm#300", "axis.elbow.device: 300 is not the id of a servo", f"`motorbus scan {FEETECH}`"),
     Broken("#0x25", "#200", "axis.slide.device: 200 is not the id of a servo", "1 to 127"),
-    Broken("#0x25", "#0", "axis.slide.device: 0 is not the id of a servo", "0 addresses everyone"),
+    Broken("#0x25", "#0", "axis.slide.device: 0 is not the id of a servo", "0 addresses all servos"),
     Broken('low = "0 mm"', 'estop = "torque_off"\nlow = "0 mm"', "axis.slide.estop: an emergency", "take estop out"),
     Broken('low = "0 mm"', 'exit = "torque_off"\nlow = "0 mm"', "axis.slide.exit: gimbal#0x25 (kst)", 'exit = "hold"'),
 )  # fmt: skip

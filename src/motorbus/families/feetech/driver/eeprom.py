@@ -10,7 +10,7 @@ afterwards. So one that waits is replaced by one that moves nothing: torque off.
 
 An open lock makes every later write permanent without anybody noticing, so whatever happens in between (an error,
 Ctrl-C, a cancelled task) the last thing this sequence says is "lock". The lock decides whether a write survives,
-not whether it is taken; and flash takes time, so these exchanges may take Timeout.STORE.
+not whether it is taken; and flash takes time, so these exchanges may take TimeoutClass.STORE.
 
 Cells wear, so what they hold already is not written again (`store`).
 

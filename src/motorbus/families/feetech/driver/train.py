@@ -84,7 +84,7 @@ def raise_first(errors: Iterable[MotorbusError]) -> None:
 
 
 class Train:
-    """Servos in a loop; see `core.family.Train`. Made by `train`."""
+    """Servos in a loop; a `core.family.PositionStream`. Made by `train`."""
 
     def __init__(self, servos: Sequence[Node], positions: Sequence[Request[Positions]]) -> None:
         self.nodes: Final = tuple(node.node for node in servos)
