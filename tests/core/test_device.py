@@ -9,9 +9,13 @@ import pydoc
 import sys
 from typing import Any, TypeVar, assert_type
 
+import pytest
+
+import motorbus
 from motorbus.core.device import AsyncDevice, BlockingDevice, device_method
 from motorbus.core.request import Request
 from motorbus.core.steps import Runnable
+from motorbus.errors import RequestError
 
 T = TypeVar("T")
 
@@ -60,6 +64,17 @@ def test_an_async_device_returns_an_awaitable() -> None:
         return value
 
     assert asyncio.run(main()) == 22
+
+
+@pytest.mark.parametrize("device", [motorbus.feetech.Servo, motorbus.feetech.AsyncServo])
+def test_a_device_refuses_the_other_kind_of_bus(device: Any) -> None:
+    with motorbus.simulate("feetech", ids="1") as sim:
+        opened = motorbus.open if issubclass(device, AsyncDevice) else motorbus.open_async
+        bus: Any = opened(sim.url)
+        with pytest.raises(RequestError, match="needs an? (async|blocking) bus"):
+            device(bus, 1)
+        if issubclass(device, AsyncDevice):
+            bus.close()
 
 
 def test_a_method_is_found_once_and_shows_what_it_takes() -> None:

@@ -2,14 +2,32 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from types import ModuleType
 
 import pytest
 
-from scripts import feetech_registers, machine_file
+from motorbus.families.kst import Servo
+from scripts import feetech_registers, kst_reference, machine_file
 
 
-@pytest.mark.parametrize("script", [machine_file, feetech_registers], ids=lambda one: one.__name__)
+@pytest.mark.parametrize(
+    "script", [machine_file, feetech_registers, kst_reference], ids=lambda one: one.__name__
+)
 def test_page_is_current(script: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.argv", [script.__name__, "--check"])
     assert script.main() == 0, f"run python -m {script.__name__}"
+
+
+def test_kst_page_names_methods_and_tests_that_exist() -> None:
+    methods = {word for row in kst_reference.COMMANDS for word in re.findall(r"`([a-z_]+)`", row[3])}
+    assert len(methods) == 8
+    assert all(hasattr(Servo, name) for name in methods)
+    files = (kst_reference.MANUAL_TESTS, kst_reference.ERRATA_TESTS, kst_reference.DECODE_TESTS)
+    defined = {
+        name for file in files for name in re.findall(r"def (test_\w+)", Path(file).read_text("utf-8"))
+    }
+    named = set(re.findall(r"\btest_\w+(?=`)", kst_reference.page()))
+    assert len(named) > 30
+    assert named - defined == set()

@@ -38,7 +38,7 @@ TURNAROUND: Final = {TimeoutClass.REPLY: 0.005, TimeoutClass.SCAN: 0.002, Timeou
 """s that a servo may take to answer."""
 
 
-class _Verbs(driver.Node):
+class _Methods(driver.Node):
     ping = device_method(driver.ping)
     identify = device_method(driver.identify)
     read = device_method(driver.read)
@@ -52,7 +52,7 @@ class _Verbs(driver.Node):
     stop = device_method(driver.stop)
 
 
-class Servo(_Verbs, BlockingDevice):
+class Servo(_Methods, BlockingDevice):
     """A Metronome on a blocking bus."""
 
     def __init__(self, bus: BlockingRunner, node: int) -> None:
@@ -60,7 +60,7 @@ class Servo(_Verbs, BlockingDevice):
         BlockingDevice.__init__(self, bus)
 
 
-class AsyncServo(_Verbs, AsyncDevice):
+class AsyncServo(_Methods, AsyncDevice):
     """A Metronome on an async bus."""
 
     def __init__(self, bus: AsyncRunner, node: int) -> None:

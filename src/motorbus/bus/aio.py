@@ -30,6 +30,7 @@ LOOK: Final = 0.001
 class AsyncBus(BaseBus):
     """An open bus on the running event loop. Any number of its tasks may call `run`."""
 
+    is_async = True
     _loop: asyncio.AbstractEventLoop | None = None
     _descriptor: int | None = None
     _thread = 0
@@ -42,7 +43,8 @@ class AsyncBus(BaseBus):
 
         Ctrl-C is left to the event loop, which cancels the main task.
         """
-        # Virtual time passes in `_wait` only, and a request with an effect needs `since`, which a call has not.
+        # Without a TaskTree: one request without an effect, in real time. Virtual time passes in `_wait` only; the
+        # engine compares a request with an effect with the stops since its start, which a TaskTree records.
         if isinstance(procedure, Request) and not procedure.effect and not self.link.virtual:
             return self._transact(procedure)
         return self._run(Owned(procedure), report)

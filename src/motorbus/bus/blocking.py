@@ -25,6 +25,7 @@ T = TypeVar("T")
 class Bus(BaseBus):
     """An open bus. Any number of threads may call `run`; the holder of `turn` alone has requests in flight."""
 
+    is_async = False
     _defers_signals = False
 
     def run(self, procedure: Runnable[T], report: Notify | None = None) -> T:
@@ -32,7 +33,7 @@ class Bus(BaseBus):
 
         Raises what the procedure raises; a signal is raised when the procedure has cleaned up.
         """
-        if isinstance(procedure, Request) and not self._needs_reads(procedure):
+        if isinstance(procedure, Request) and not self._needs_reads(procedure):  # without a TaskTree
             return self.transact(procedure)  # type: ignore[no-any-return]
         return run_here(self, procedure, report)
 
@@ -153,6 +154,7 @@ class Bus(BaseBus):
         return not self._needs_reads(order)
 
     def _needs_reads(self, request: Request[Any]) -> bool:
+        """Whether the gate must read positions first; `run_here` makes these reads again."""
         reads = self.required_reads(request) if request.effect in GATED else ()
         for read in reads:
             discard(read)

@@ -11,7 +11,7 @@ from motorbus.errors import MotionError, MotorbusError
 
 PERIOD: Final = 0.02
 """s between two samples; one axis that is waited for takes a tenth of a bus at most."""
-PATIENCE: Final = 0.5
+STALL_TIME: Final = 0.5
 """s without progress after which a device counts as stalled."""
 PROGRESS: Final = 0.003
 """rad; a smaller change counts as noise."""
@@ -26,12 +26,12 @@ async def wait_in_position(
     timeout: Callable[[float], float],
     stalled: Callable[[State], Procedure[MotorbusError]],
     progress: float = PROGRESS,
-    patience: float = PATIENCE,
+    stall_time: float = STALL_TIME,
 ) -> None:
     """Return when the device is in position: within `tolerance` rad of `goal` and not moving.
 
     A device that does not report whether it moves must be within tolerance in two samples in a row. Raises the error
-    that `stalled` makes, when its position has not changed by `progress` rad for `patience` s; MotionError after the
+    that `stalled` makes, when its position has not changed by `progress` rad for `stall_time` s; MotionError after the
     time (s) that `timeout` gives for the distance (rad).
     """
     state = await sample()
@@ -46,7 +46,7 @@ async def wait_in_position(
             return
         if abs(here - mark) >= progress:
             mark, progressed = here, state.at
-        elif state.at - progressed > patience and not looks:
+        elif state.at - progressed > stall_time and not looks:
             raise await stalled(state)
         if state.at - begun > longest:
             raise MotionError(

@@ -1,8 +1,9 @@
 """Procedures and the steps that they await.
 
-A driver function is a coroutine (a procedure) that awaits *steps*; no event loop is involved. A step is a plain value:
-the bus that runs the procedure (`bus/tasks.py`) carries it out. A function with a single request returns the `Request`
-itself, which may be kept and run again. A procedure awaits nothing but steps and procedures.
+A driver function returns a `Runnable`: a procedure, which is a coroutine that awaits *steps*, or, if one request is
+enough, the `Request` itself, which may be kept and run again. Which one may depend on what is known of the device. A
+step is a plain value: the bus that runs the procedure (`bus/tasks.py`) carries it out; no event loop is involved. A
+procedure awaits nothing but steps and procedures.
 """
 
 from __future__ import annotations

@@ -240,7 +240,7 @@ def joining(there: Bench, *, restarts: bool) -> None:
 def test_another_servo_with_the_new_id_is_not_taken_for_the_one_that_has_not_restarted() -> None:
     with bench(ids=(5, 9)) as there:
         joining(there, restarts=False)
-        with pytest.raises(OutcomeUnknown, match="not seen to come back"):
+        with pytest.raises(OutcomeUnknown, match="did not come back"):
             there.servo().provision(new_id=9, patience=2.0)
 
 
@@ -298,7 +298,7 @@ def test_a_silence_without_a_restart_is_no_restart() -> None:
                 link.then, link.when = lambda: setattr(servo, "plugged", True), link.now() + 1.0
 
         there.on = on
-        with pytest.raises(OutcomeUnknown, match="not seen to come back"):
+        with pytest.raises(OutcomeUnknown, match="did not come back"):
             there.servo().provision(new_id=9, patience=3.0)
         servo.power_cycle()
         assert there.servo().provision(new_id=9).resumed is True

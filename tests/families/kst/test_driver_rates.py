@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motorbus.errors import LinkError, LinkLost, RequestError
-from motorbus.families.kst import Heard, Skipped, scan_bit_rates, settings_of
+from motorbus.families.kst import LineActivity, Skipped, scan_bit_rates, settings_of
 from motorbus.families.kst.profiles import RATES
 from motorbus.link.memory import MemoryLink
 from tests.families.kst.bench import Bench, bench
@@ -21,8 +21,8 @@ def test_traffic_tells_the_rate_and_nothing_is_sent(rate: int) -> None:
     with bench(bit_rate=rate, reports_ms=100, profile="kst-ext") as there:
         found = there.run(scan_bit_rates(settings_of(there.family)))
         assert found.rate == rate
-        assert found.heard[rate] is Heard.TRAFFIC
-        assert {found.heard[one] for one in RATES if one < rate} <= {Heard.ERRORS}
+        assert found.activity[rate] is LineActivity.TRAFFIC
+        assert {found.activity[one] for one in RATES if one < rate} <= {LineActivity.ERRORS}
         assert there.sent() == []
         assert there.sim().errors == 0
         assert there.bus.rate == 500_000
@@ -31,7 +31,7 @@ def test_traffic_tells_the_rate_and_nothing_is_sent(rate: int) -> None:
 def test_a_silent_bus_is_not_spoken_to_unless_it_is_isolated() -> None:
     with bench(bit_rate=125_000) as there:
         found = there.run(scan_bit_rates(settings_of(there.family)))
-        assert (found.rate, set(found.heard.values())) == (None, {Heard.SILENCE})
+        assert (found.rate, set(found.activity.values())) == (None, {LineActivity.SILENCE})
         assert there.sent() == []
         found = there.run(scan_bit_rates(settings_of(there.family), isolated=True))
         assert (found.rate, [one.node for one in found.found]) == (125_000, [5])
@@ -64,7 +64,7 @@ class Without800k(MemoryLink):
 def test_a_rate_that_the_adapter_lacks_is_left_out_and_told() -> None:
     with bench(bit_rate=1_000_000, reports_ms=10.0, link=Without800k) as there:
         found = there.run(scan_bit_rates(settings_of(there.family)))
-        assert (found.rate, 800_000 in found.heard) == (1_000_000, False)
+        assert (found.rate, 800_000 in found.activity) == (1_000_000, False)
         assert there.of(Skipped) == [Skipped(800_000, "this adapter has no such rate")]
 
 

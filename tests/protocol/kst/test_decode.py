@@ -54,6 +54,16 @@ def test_nothing_needs_no_words() -> None:
     assert decode(b"") == []
 
 
+@pytest.mark.parametrize("code", sdo.ABORTS, ids=hex)
+def test_each_abort_code_is_decoded_in_both_byte_orders(code: int) -> None:
+    words = sdo.ABORTS[code]
+    assert meanings(one(sdo.encode_abort_reply(5, 0x6003, 0, code)))["abort code"].endswith(words)
+    swapped = int.from_bytes(code.to_bytes(4, "little"), "big")
+    found = meanings(one(sdo.encode_abort_reply(5, 0x6003, 0, swapped)))["abort code"]
+    assert found.startswith("byte-swapped")
+    assert found.endswith(words)
+
+
 @pytest.mark.parametrize("vector", VALID, ids=name_of)
 def test_a_good_frame_has_no_fault_and_all_fields(vector: Vector) -> None:
     for frame in (vector.frame, vector.frame._replace(extended=True)):

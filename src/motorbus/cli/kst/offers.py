@@ -57,7 +57,7 @@ def bit_rate_heard(
         report(event)
 
     found = bus.run(kst.scan_bit_rates(kst.settings_of(bus.family), seconds=seconds), report=told)
-    heard |= {rate: one.value for rate, one in found.heard.items()}
+    heard |= {rate: one.value for rate, one in found.activity.items()}
     return found.rate, {rate: heard[rate] for rate in bus.family.link.rates if rate in heard}
 
 

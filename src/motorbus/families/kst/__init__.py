@@ -39,7 +39,7 @@ from motorbus.families.kst.driver.feedback import RawStatus, Status
 from motorbus.families.kst.driver.motion import Promise, Started
 from motorbus.families.kst.driver.node import DEFAULT, ID_FORMATS, NMT, SIZED, BusSettings, Node
 from motorbus.families.kst.driver.provisioning import PowerCycleNeeded, Provisioned
-from motorbus.families.kst.driver.scan import BitRates, Heard, Suspicion, scan, scan_bit_rates
+from motorbus.families.kst.driver.scan import BitRates, LineActivity, Suspicion, scan, scan_bit_rates
 from motorbus.families.kst.driver.servo import AsyncServo, Servo, settings_of
 from motorbus.families.kst.notifications import BusState, FrameReceiver
 from motorbus.families.kst.profiles import DEFAULT_RATE, PROFILES, RATES, TABLES
@@ -49,8 +49,8 @@ __all__ = [
     "AsyncServo",
     "BitRates",
     "BusSettings",
-    "Heard",
     "Kst",
+    "LineActivity",
     "Node",
     "PowerCycleNeeded",
     "Promise",
@@ -87,21 +87,19 @@ GUARANTEES: Final = Guarantees(
     estops={"hold": Guarantee(Level.PARTLY, Promise.HOLD_REQUESTED.value)},
     alone=Guarantee(
         Level.PARTLY,
-        "led, it goes on to the last small goal, one cycle ahead of its course, makes up what it lags behind, and "
-        "holds; moved by itself, it goes on to its goal",
+        "in a loop, it moves to its last goal, one cycle ahead, and holds; in a move of its own, it moves to its goal",
     ),
-    ends=Guarantee(Level.YES, "it knows nothing but positions to go to"),
-    torque=Guarantee(Level.NO, "none: it holds with all its force as long as it has its supply"),
+    ends=Guarantee(Level.YES, "every goal is a position"),
+    torque=Guarantee(Level.NO, "none: it holds with full force while it has its supply"),
     restart=Guarantee(
         Level.PARTLY,
-        "where it says so, by the boot notice of CANopen, it is a fault; no sheet promises that it does, and a frame "
-        "that is lost is not seen",
+        "a boot-up message of CANopen is a fault; no sheet promises that message, and a lost frame is not seen",
     ),
     strain=Guarantee(
         Level.PARTLY,
-        "current and temperature, where its make tells them; off its goal for too long counts as stalled in any case",
+        "current and temperature, where its make reports them; off its goal for too long counts as stalled in any case",
     ),
-    watchdog=Guarantee(Level.NO, "none: it goes on to the last position it was told, and holds"),
+    watchdog=Guarantee(Level.NO, "none: it moves to its last goal and holds"),
     led=True,
 )
 """Source: the CAN protocol sheets of the makers: a target position, and no stop, torque switch or heartbeat."""

@@ -363,7 +363,7 @@ _BUS_ERRORS: Final = (
     "trouble in the controller",
     "a protocol error",
     "trouble in the transceiver",
-    "nobody acknowledged",
+    "no acknowledgement",
     "bus off",
     "a bus error",
     "the controller was restarted",
@@ -390,6 +390,6 @@ _SHAPES: Final = {
     PDO: ("report", "a report is a position (2 bytes) and two zeros"),
     ALARM: ("alarm", "an alarm has 4 data bytes"),
     EMERGENCY: ("emergency", "an emergency has 8 data bytes"),
-    HEARTBEAT: ("heartbeat", "a heartbeat is one byte that tells a state: 0, 4, 5 or 127"),
+    HEARTBEAT: ("heartbeat", "a heartbeat is one byte with a state: 0, 4, 5 or 127"),
 }
 """Kind and form of the frames of a servo, by identifier without the node."""

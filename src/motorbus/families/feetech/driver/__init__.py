@@ -55,7 +55,7 @@ from motorbus.families.feetech.driver.renaming import set_id
 from motorbus.families.feetech.driver.restoring import factory_restore
 from motorbus.families.feetech.driver.scanning import GLANCE, Skipped, scan
 from motorbus.families.feetech.driver.second import second_id, set_second_id
-from motorbus.families.feetech.driver.servo import AsyncServo, Servo, ServoVerbs
+from motorbus.families.feetech.driver.servo import AsyncServo, Servo, ServoMethods
 from motorbus.families.feetech.driver.sharing import Suspicion, duplicates
 from motorbus.families.feetech.driver.states import States, sync_read_raw, sync_read_states
 from motorbus.families.feetech.driver.torque import (
@@ -93,7 +93,7 @@ __all__ = [
     "Recounted",
     "Recovery",
     "Servo",
-    "ServoVerbs",
+    "ServoMethods",
     "Settings",
     "Skipped",
     "States",

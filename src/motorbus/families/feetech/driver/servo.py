@@ -28,10 +28,11 @@ from motorbus.families.feetech.driver import (
 from motorbus.families.feetech.driver.node import Node
 
 
-class ServoVerbs(Node):
-    """What can be said to a servo. Values are in rad, rad/s, rad/s², A, V, °C and fractions.
+class ServoMethods(Node):
+    """The methods of a servo. Values are in rad, rad/s, rad/s², A, V, °C and fractions.
 
-    Making one costs nothing and sends nothing; the first verb that has to know the servo asks it.
+    A servo is the `Node` that driver functions take as first argument; the subclasses add the bus. Creating one sends
+    nothing; the first method that needs the register map reads it.
     """
 
     ping = device_method(identity.ping)
@@ -83,17 +84,17 @@ class ServoVerbs(Node):
     blockers = device_method(blocked.blockers)
 
 
-class Servo(ServoVerbs, BlockingDevice):
+class Servo(ServoMethods, BlockingDevice):
     """One servo on a blocking bus: `Servo(bus, 3).position()`."""
 
     def __init__(self, bus: BlockingRunner, node: int) -> None:
-        ServoVerbs.__init__(self, node)
+        ServoMethods.__init__(self, node)
         BlockingDevice.__init__(self, bus)
 
 
-class AsyncServo(ServoVerbs, AsyncDevice):
+class AsyncServo(ServoMethods, AsyncDevice):
     """One servo on an async bus: `await AsyncServo(bus, 3).position()`."""
 
     def __init__(self, bus: AsyncRunner, node: int) -> None:
-        ServoVerbs.__init__(self, node)
+        ServoMethods.__init__(self, node)
         AsyncDevice.__init__(self, bus)

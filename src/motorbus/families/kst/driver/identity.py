@@ -134,7 +134,7 @@ async def write_node_id(node: Node, new: int) -> None:
     found = await _read_if_allowed(node, row)
     if found not in (None, new, node.node):  # some servos read back the id in force
         raise VerificationFailed(
-            f"node {node.node} was told to be {new} and reads back {found}",
+            f"node {node.node} was set to {new} and reads back {found}",
             sent=bytes((new,)),
             expected=f"{new}, or {node.node} until the restart",
             cause="two servos with one id, or another program",

@@ -1,7 +1,7 @@
 """Give a servo its id and its bit rate, from the first read to the check after the restart.
 
 A new id or rate takes effect after a save and a restart; the save has no reply; no command restarts a servo, so the
-user does; two servos with one id cannot be told apart afterwards; power may fail at any moment. So the state is
+user does; two servos with one id cannot be distinguished afterwards; power may fail at any moment. So the state is
 always found by reading: a call after an interrupt continues from the present state. "Saved" is reported only when the
 servo has come back with the new values. Source: KST CAN protocol manual, commands 1 to 4.
 """
@@ -274,15 +274,15 @@ class _Change:
         return VerificationFailed(
             f"{hexadecimal(place.node.node)} came back as it was, at {place.rate} bit/s: the change was not saved",
             expected=f"{hexadecimal(self.new.node)} at {self.new_rate} bit/s",
-            cause="its supply went before its flash was written, or it did not hear the save, which it never answers",
+            cause="its supply went before its flash was written, or it did not receive the save, which has no reply",
             advice="call provision again, and keep its supply on until the power cycle is asked for",
             node=place.node.node,
         )
 
     def _not_back(self, patience: float) -> MotorbusError:
         return OutcomeUnknown(
-            f"{hexadecimal(self.old.node)} was told to become {hexadecimal(self.new.node)} at {self.new_rate} bit/s "
-            f"and to save; it was not seen to come back within {patience:g} s",
+            f"{hexadecimal(self.old.node)} was set to {hexadecimal(self.new.node)} at {self.new_rate} bit/s "
+            f"and saved; it did not come back within {patience:g} s",
             cause="its supply has not been taken away and given back yet, and there is no other way to restart it",
             advice="power-cycle it, then call provision again with the same arguments: it finds out where things stand",
             node=self.old.node,

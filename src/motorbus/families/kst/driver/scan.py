@@ -45,11 +45,9 @@ SHORT_LISTEN: Final = 0.25
 LISTEN: Final = 1.0
 """s to listen at each rate of `scan_bit_rates`."""
 WRONG_RATE: Final = (
-    "the first frame was broken and nobody answered it, so no more were sent: this bus uses another rate"
+    "the first frame caused a bus error and had no reply, so no more were sent: this bus uses another rate"
 )
-OTHER_FORMAT: Final = (
-    "nobody answers; servos with 29-bit identifiers need id_format=ext, others id_format=std"
-)
+OTHER_FORMAT: Final = "no reply; servos with 29-bit identifiers need id_format=ext, others id_format=std"
 TWICE: Final = (
     "two answers to one request: two servos with one id; connect them one at a time, and provision one"
 )
@@ -64,19 +62,19 @@ class Suspicion(NamedTuple):
     what: str
 
 
-class Heard(Enum):
+class LineActivity(Enum):
     """What an adapter received at one rate."""
 
     TRAFFIC = "frames came whole: this is the rate of the bus"
     ERRORS = "errors only: the bus is in use at another rate"
-    SILENCE = "silence: nobody spoke, or this adapter reports no errors"
+    SILENCE = "silence: no frames, or this adapter reports no errors"
 
 
 class BitRates(NamedTuple):
     """Result of a search: the rate (bit/s; None: not known), what was received at each rate, servos that answered."""
 
     rate: int | None
-    heard: dict[int, Heard]
+    activity: dict[int, LineActivity]
     found: tuple[Found, ...] = ()
 
 
@@ -106,7 +104,7 @@ async def scan(
             usable = []
             for rate in rates:
                 if rate != present and await _is_in_use(settings, rate):
-                    await Emit(Skipped(rate, Heard.ERRORS.value))
+                    await Emit(Skipped(rate, LineActivity.ERRORS.value))
                 else:
                     usable.append(rate)
             return await scan_rates(usable, scan_one)
@@ -141,7 +139,7 @@ async def scan_bit_rates(
 # -- listen ----------------------------------------------------------------------------------------------------
 
 
-async def listen(settings: BusSettings, rate: int, seconds: float) -> Heard:
+async def listen(settings: BusSettings, rate: int, seconds: float) -> LineActivity:
     """Listen at this rate without sending. Raises LinkError when the adapter cannot. The rate stays set."""
     await SetBitrate(rate, listen_only=True)
     state = settings.state
@@ -149,8 +147,8 @@ async def listen(settings: BusSettings, rate: int, seconds: float) -> Heard:
     frame, error = await gather(WaitFor(_is_frame, seconds), WaitFor(is_bus_error, seconds))
     after = (state.frames, state.errors) if state else (0, 0)
     if frame is not None or after[0] > before[0]:
-        return Heard.TRAFFIC
-    return Heard.ERRORS if error is not None or after[1] > before[1] else Heard.SILENCE
+        return LineActivity.TRAFFIC
+    return LineActivity.ERRORS if error is not None or after[1] > before[1] else LineActivity.SILENCE
 
 
 def _is_frame(notification: Notification) -> bool:
@@ -164,7 +162,7 @@ async def set_named_rate(settings: BusSettings, rate: int) -> None:
     """
     if await _is_in_use(settings, rate):
         raise RequestError(
-            f"nothing is sent at {rate} bit/s: {Heard.ERRORS.value}",
+            f"nothing is sent at {rate} bit/s: {LineActivity.ERRORS.value}",
             cause="other devices speak on this bus, and a frame at a wrong rate breaks theirs",
             advice="connect this servo alone, and call again; nothing was written",
         )
@@ -174,7 +172,7 @@ async def set_named_rate(settings: BusSettings, rate: int) -> None:
 async def _is_in_use(settings: BusSettings, rate: int) -> bool:
     """Whether errors show that the bus is in use at another rate; False with an adapter that cannot listen."""
     try:
-        return await listen(settings, rate, SHORT_LISTEN) is Heard.ERRORS
+        return await listen(settings, rate, SHORT_LISTEN) is LineActivity.ERRORS
     except LinkLost:
         raise
     except LinkError:
@@ -182,21 +180,21 @@ async def _is_in_use(settings: BusSettings, rate: int) -> bool:
 
 
 async def _search(settings: BusSettings, rates: Sequence[int], isolated: bool, seconds: float) -> BitRates:
-    heard: dict[int, Heard] = {}
+    activity: dict[int, LineActivity] = {}
     unable: LinkError | None = None
     for number, rate in enumerate(rates):
         try:
-            heard[rate] = await listen(settings, rate, seconds)
+            activity[rate] = await listen(settings, rate, seconds)
         except LinkLost:
             raise
         except LinkError as error:  # it cannot listen, or lacks this rate
             unable = error
             await Emit(Skipped(rate, error.summary))
             continue
-        if heard[rate] is Heard.TRAFFIC:
-            return BitRates(rate, heard)
-        await Emit(Progress(number + 1, len(rates), f"{rate} bit/s: {heard[rate].value}"))
-    if unable is not None and not heard:
+        if activity[rate] is LineActivity.TRAFFIC:
+            return BitRates(rate, activity)
+        await Emit(Progress(number + 1, len(rates), f"{rate} bit/s: {activity[rate].value}"))
+    if unable is not None and not activity:
         if not isolated:
             raise RequestError(
                 "this adapter cannot listen without taking part, so its bit rate is not searched for",
@@ -204,12 +202,12 @@ async def _search(settings: BusSettings, rates: Sequence[int], isolated: bool, s
                 expected="an adapter with a listen-only mode, or a bus on which nothing depends",
                 advice="if nothing depends on this bus, say isolated=True; nothing was sent",
             ) from unable
-        heard = dict.fromkeys(rates, Heard.SILENCE)
-    for rate in [rate for rate, what in heard.items() if what is Heard.SILENCE] if isolated else ():
+        activity = dict.fromkeys(rates, LineActivity.SILENCE)
+    for rate in [rate for rate, what in activity.items() if what is LineActivity.SILENCE] if isolated else ():
         scan_one = partial(_scan_all, settings)
         if found := await scan_rates([rate], scan_one):
-            return BitRates(rate, heard, tuple(found))
-    return BitRates(None, heard)
+            return BitRates(rate, activity, tuple(found))
+    return BitRates(None, activity)
 
 
 async def _scan_all(settings: BusSettings, rate: int) -> list[Found]:
@@ -230,7 +228,7 @@ async def _scan_at(
 ) -> list[Found]:
     """The servos that answer at the present rate, `rate`. `share`: number of this rate and of all rates.
 
-    With `careful` nothing follows a broadcast that nobody answers and that causes bus errors.
+    With `careful` nothing follows a broadcast without a reply that causes bus errors.
     """
     state = settings.state
     errors = state.errors if state else 0

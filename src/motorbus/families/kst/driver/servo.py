@@ -21,7 +21,8 @@ from motorbus.families.kst.driver.node import DEFAULT, BusSettings, Node
 class ServoMethods(Node):
     """The methods of a servo. Values are in rad, A, °C, s and bit/s.
 
-    Creating one sends nothing. It has the settings of its bus; `profile` is for a bus with servos of several makers.
+    A servo is the `Node` that driver functions take as first argument; the subclasses add the bus. Creating one sends
+    nothing. It has the settings of its bus; `profile` is for a bus with servos of several makers.
     """
 
     ping = device_method(identity.ping)

@@ -49,7 +49,7 @@ class _Roster(NamedTuple):
     It is made again after a change, not for each frame: on a full bus of 127 servos that would take too long.
     """
 
-    hearing: list[Servo]
+    tuned: list[Servo]
     by_node: dict[int, list[Servo]]
     mistuned: list[Servo]
 
@@ -173,12 +173,12 @@ class KstBus:
 
     def _roster(self) -> _Roster:
         if self._known is None:
-            hearing = [servo for servo in self.servos if servo.hears(self.rate)]
-            mistuned = [servo for servo in self.servos if servo.plugged and not servo.hears(self.rate)]
+            tuned = [servo for servo in self.servos if servo.receives_at(self.rate)]
+            mistuned = [servo for servo in self.servos if servo.plugged and not servo.receives_at(self.rate)]
             by_node: dict[int, list[Servo]] = {}
-            for servo in hearing:
+            for servo in tuned:
                 by_node.setdefault(servo.node, []).append(servo)
-            self._known = _Roster(hearing, by_node, mistuned)
+            self._known = _Roster(tuned, by_node, mistuned)
             self._find_report()
         return self._known
 
@@ -188,7 +188,7 @@ class KstBus:
 
     def _addressed(self, node: int, extended: bool) -> list[Servo]:
         roster = self._roster()
-        named = roster.hearing if node == sdo.BROADCAST else roster.by_node.get(node, [])
+        named = roster.tuned if node == sdo.BROADCAST else roster.by_node.get(node, [])
         return [servo for servo in named if servo.takes(extended)]
 
     def _send(self, servo: Servo | None, when: float, frame: CanFrame) -> None:
@@ -203,7 +203,7 @@ class KstBus:
         for servo, frame in self._started(moment):
             if servo is None:
                 broken.append(frame)
-            elif not servo.hears(self.rate):
+            elif not servo.receives_at(self.rate):
                 broken.append(ERROR)
             else:
                 sending.append((servo, frame))
@@ -232,14 +232,14 @@ class KstBus:
             place = (servo.unit, frame.id, frame.extended)
             numbers[place] = numbers.get(place, -1) + 1  # one servo sends its own frames one after the other
             rounds.setdefault((precedence(frame), numbers[place]), []).append((servo, frame))
-        heard: list[CanFrame] = []
+        received: list[CanFrame] = []
         for key in sorted(rounds):
             frames = {frame for _, frame in rounds[key]}
             if len(frames) == 1:
-                heard += frames
+                received += frames
             else:
                 self._collide([servo for servo, _ in rounds[key]], moment)
-        return heard
+        return received
 
     def _collide(self, servos: list[Servo], moment: float) -> None:
         """All abort and try again until they are error passive; then the frames are given up. # assumption"""
@@ -252,9 +252,9 @@ class KstBus:
         """A frame of the host is broken for a servo at another rate, which breaks it for all."""
         if self.rate is None:
             return
-        hearing, _, mistuned = self._roster()
+        tuned, _, mistuned = self._roster()
         active = [servo for servo in mistuned if servo.errors < PASSIVE]
         for servo in mistuned:
             servo.errors += 1
-        if active or (mistuned and not hearing):  # without a listener no servo acknowledges the frame
+        if active or (mistuned and not tuned):  # without a listener no servo acknowledges the frame
             self._send(None, at, ERROR)

@@ -295,7 +295,7 @@ class Servo:
 
     # -- frames of the host --------------------------------------------------------------------------------------
 
-    def hears(self, rate: int | None) -> bool:
+    def receives_at(self, rate: int | None) -> bool:
         """It is connected and set to this rate (None: any rate)."""
         return self.plugged and (rate is None or rate == self.bit_rate)
 

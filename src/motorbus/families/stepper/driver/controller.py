@@ -30,7 +30,7 @@ from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.table import Order
 
 
-class ControllerVerbs(Node):
+class ControllerMethods(Node):
     """What can be said to a controller. Values are in rad, rad/s and s, lengths in the user units of the project.
 
     Making one costs nothing and sends nothing.
@@ -92,19 +92,19 @@ class ControllerVerbs(Node):
         return outputs.last_commanded(self)
 
 
-class Controller(ControllerVerbs, BlockingDevice):
+class Controller(ControllerMethods, BlockingDevice):
     """The controller of a blocking bus: `Controller(bus).read_project(1)`."""
 
     def __init__(self, bus: BlockingRunner, node: int = wire.ONLY) -> None:
-        ControllerVerbs.__init__(self, node, *_spoken(bus))
+        ControllerMethods.__init__(self, node, *_spoken(bus))
         BlockingDevice.__init__(self, bus)
 
 
-class AsyncController(ControllerVerbs, AsyncDevice):
+class AsyncController(ControllerMethods, AsyncDevice):
     """The controller of an async bus: `await AsyncController(bus).read_project(1)`."""
 
     def __init__(self, bus: AsyncRunner, node: int = wire.ONLY) -> None:
-        ControllerVerbs.__init__(self, node, *_spoken(bus))
+        ControllerMethods.__init__(self, node, *_spoken(bus))
         AsyncDevice.__init__(self, bus)
 
 
