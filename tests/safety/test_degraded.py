@@ -10,7 +10,6 @@ import os
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from threading import Event, Thread
@@ -123,8 +122,8 @@ def test_15_whoever_was_told_of_everything_has_gone_away() -> None:
     os.close(writer)
 
 
-def _told() -> Iterator[Emit]:
-    yield Emit("something")
+async def _told() -> None:
+    await Emit("something")
 
 
 def test_15_whoever_asked_for_a_stop_has_gone_away(tmp_path: Path) -> None:
