@@ -160,7 +160,7 @@ AXES = [
     "init arm=feetech:sim,ids=1-3#1-3 kst:sim#1 --force",
 ]
 """By the names of a machine file."""
-LACKS = {"kst": ("torque ", "--velocity")}
+LACKS = {"kst": ("torque ", "--velocity"), "template": ("--velocity",)}
 """What devices of a family cannot: no torque switch, no speed."""
 HERE = {"feetech": "3.0", "kst": "0.2", "template": "0.2"}
 """rad; inside the limits, and near to where a simulated device stands."""
@@ -281,10 +281,10 @@ def test_frames_are_explained(family: str, run: Run) -> None:
 
 
 def test_a_frame_on_can_is_withheld_and_shown(run: Run) -> None:
-    ran = run("write", "template:sim#1", "goal_position=0.2", "--dry-run", "--json")
+    ran = run("write", "kst:sim#1", "goal_position=0.2", "--dry-run", "--json")
     (frame,) = ran.document["withheld"]
-    assert frame["data"].startswith("00 00 02 01 08 02 20 01")
-    assert frame["frame"].startswith("201#022001")
+    assert frame["data"].startswith("00 00 06 01 08 22 03 60")
+    assert frame["frame"].startswith("601#220360")
     assert "request to node 1" in frame["meaning"]
 
 

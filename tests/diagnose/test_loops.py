@@ -78,7 +78,9 @@ def test_on_can_it_lies_within_what_is_counted_to_the_bit() -> None:
     found = count(Wanted("kst:can://slcan/dev/x", {node: str(node) for node in nodes}))
     assert found is not None
     frames = [
-        Transfer(node, one) for node in nodes for one in budget_frames(families.load("kst"), node).values()
+        Transfer(node, one)
+        for node in nodes
+        for one in budget_frames(families.load("kst").open(), node).values()
     ]
     exact = budget(frames, found.budget.bit_rate)
     assert exact.time.least < found.budget.wire < exact.time.most

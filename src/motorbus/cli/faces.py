@@ -6,15 +6,15 @@ A family's face is the module (or package) of its name in this folder. Apart fro
                                                                family can; when one device is lost the others stop
     disable_torque_everyone()                                  the request that does it on a whole bus in one broadcast
     ping_everyone(bus)                                         the nodes that answer one broadcast
-    budget_frames(family, node)                                what a loop says to a node ("read", "write"): for each
+    budget_frames(driver, node)                                what a loop says to a node ("read", "write"): for each
                                                                frame of that exchange all that it may be
-    report_frames(family, node)                                all that a report of a node may be
+    report_frames(driver, node)                                all that a report of a node may be
     say(event)                                                 what an event of its operations says, "" if nothing
     sample(one)                                                what there is to watch of a device without telemetry:
                                                                words by name
     demo(bus, seconds, picture, output)                        shows what these devices do in so many s, draws a picture
                                                                of it, and prints what came of it
-    as_written(family, read, withheld, request)                the reply to a request after frames that a dry run has
+    as_written(driver, read, withheld, request)                the reply to a request after frames that a dry run has
                                                                withheld, b"" if they make no difference; None: unknown
     meaning(row, raw)                                          what a raw value says in words, where the row cannot tell
     KEPT                                                       where registers are that survive power-off: "EEPROM" if

@@ -83,7 +83,7 @@ def scan(
     found: list[Found] | None = None
     notes: list[str] = []
     with opened(wanted.bus, options, output) as opening:
-        operation = opening.family.scan(asked, tried or (opening.rate,))
+        operation = opening.driver.scan(asked, tried or (opening.rate,))
         tell = output.note if len(tried) > 1 else None  # it takes a while: who answers is told at once
         try:
             with output.progress("scanning") as bar:

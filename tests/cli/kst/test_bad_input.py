@@ -25,7 +25,7 @@ WRITES = 0x20
 
 
 def objects(servos: Simulation) -> dict[str, int]:
-    return {name: servos[37].memory[name] for name in servos.family.tables["kst"]}
+    return {name: servos[37].memory[name] for name in servos.family.registers["kst"]}
 
 
 def listening(servos: Simulation, monkeypatch: pytest.MonkeyPatch) -> list[CanFrame]:

@@ -18,7 +18,7 @@ def test_everyone_answers_a_broadcast(servos: Simulation) -> None:
 
 
 def test_a_loop_sends_every_position_there_is() -> None:
-    family = families.load("kst").configured(profile="kst-ext")
+    family = families.load("kst").open(profile="kst-ext")
     frames = offers.budget_frames(family, 0x25)
     goals, acknowledgements = frames["write"]
     requests, replies = frames["read"]
@@ -31,14 +31,14 @@ def test_a_loop_sends_every_position_there_is() -> None:
 
 
 def test_the_settings_of_the_bus_count() -> None:
-    family = families.load("kst").configured(id_format="ext", sized="yes")
+    family = families.load("kst").open(id_format="ext", sized="yes")
     goals, _ = offers.budget_frames(family, 1)["write"]
     assert str(goals[0]) == "00000601#2B0360007CFC0000"
-    assert bits(goals[0]) > bits(offers.budget_frames(families.load("kst"), 1)["write"][0][0])
+    assert bits(goals[0]) > bits(offers.budget_frames(families.load("kst").open(), 1)["write"][0][0])
 
 
 def test_a_report_is_short() -> None:
-    frames = offers.report_frames(families.load("kst").configured(profile="kst-ext"), 0x25)
+    frames = offers.report_frames(families.load("kst").open(profile="kst-ext"), 0x25)
     assert {len(one.data) for one in frames} == {4}
     assert {one.id for one in frames} == {0x5A5}
 

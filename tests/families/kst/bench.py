@@ -16,7 +16,8 @@ from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import ANY, EVERY_LANE, Effect, Reply, Request, Response
 from motorbus.core.steps import Emit, Exclusive, Gather, Runnable, SetBitrate, Sleep, WaitFor
 from motorbus.errors import NoReply, OutcomeUnknown
-from motorbus.families.kst import FAMILY, Kst, Node, Servo, notifications, sdo
+from motorbus.families.kst import FAMILY, BusSettings, Node, Servo, notifications, sdo
+from motorbus.families.kst.notifications import BusState
 from motorbus.families.kst.simulator import KstBus
 from motorbus.families.kst.simulator import Servo as SimulatedServo
 from motorbus.link.base import Line
@@ -41,14 +42,14 @@ class Bench:
         line: Line | None = None,
         **options: Any,
     ) -> None:
-        self.family: Kst = FAMILY.configured(profile=profile, **(settings or {}))
+        self.driver = FAMILY.open(profile=profile, **(settings or {}))
         simulator = FAMILY.simulator(tuple(ids), profile=profile, **options)
         assert isinstance(simulator, KstBus)
         self.simulator = simulator
         self.link = link(simulator, rate=rate, line=line)
         self.events: list[Any] = []
         self.on: Callable[[Any], None] = lambda event: None
-        self.bus = Bus(self.link, self.family, interlock=Gate(), report=self._heard)
+        self.bus = Bus(self.link, self.driver, interlock=Gate(), report=self._heard)
         self._trace = self.bus.trace.subscribe(limit=1_000_000)
 
     def _heard(self, event: object) -> None:
@@ -95,7 +96,7 @@ def bench(ids: Sequence[int] = (5,), **how: Any) -> Iterator[Bench]:
 
 def node(profile: str = "kst", number: int = 5, **settings: object) -> Node:
     """A servo of which nothing is known."""
-    return Node(number, FAMILY.configured(profile=profile, **settings)._settings)
+    return Node(number, BusSettings(profile).replace(state=BusState(), **settings))
 
 
 class Played:

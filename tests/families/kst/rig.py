@@ -68,7 +68,7 @@ class Rig:
         assert isinstance(simulator, KstBus)
         self.servos = Turning(simulator)
         self.link = MemoryLink(self.servos, rate=RATE, line=line or PerfectLine(), pace=True)
-        self.bus = make_bus(self.link, FAMILY.configured())
+        self.bus = make_bus(self.link, FAMILY.open())
         self.devices = {node: Servo(self.bus, node) for node in ids}
         self.good = self.failed = self.wrong = 0
         self.errors: list[MotorbusError] = []

@@ -8,42 +8,9 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.family import Family
 from motorbus.errors import LimitExceeded, LinkLost, NoReply, RequestError
-from motorbus.families.kst import FAMILY, Servo
-from motorbus.families.kst.profiles import PROFILES
-from tests.conformance import test_notices, test_quiet, test_registers, test_stop
+from motorbus.families.kst import Servo
 from tests.families.kst.bench import bench
-
-JUDGES: tuple[Callable[[Family], None], ...] = (
-    test_registers.test_every_readable_row_reads_as_it_is,
-    test_registers.test_every_readable_row_reads_alone_as_among_others,
-    test_registers.test_every_kept_row_takes_values_up_to_both_ends_and_outlives_a_power_cut,
-    test_registers.test_writing_one_node_changes_no_other,
-    test_registers.test_what_can_only_be_read_refuses_to_be_written,
-    test_registers.test_d8_what_is_protected_refuses_to_be_written_by_name,
-    test_registers.test_what_is_out_of_range_refuses_to_be_written,
-    test_quiet.test_looking_has_no_effect,
-    test_quiet.test_ping_says_who_is_there,
-    test_quiet.test_a_scan_tells_early,
-    test_quiet.test_looking_is_the_same_blocking_and_async,
-    test_notices.test_notices_disturb_nothing,
-)
-
-
-@pytest.mark.parametrize("profile", [name for name in PROFILES if name != "kst"])
-@pytest.mark.parametrize("judge", JUDGES, ids=lambda judge: judge.__name__)
-def test_the_other_profiles_are_judged_as_the_first(judge: Callable[[Family], None], profile: str) -> None:
-    """The conformance suite sees the family as it is without settings, which is the manual's profile."""
-    judge(FAMILY.configured(profile=profile))
-
-
-@pytest.mark.parametrize("profile", ["kst-ext", "kingmax"])
-def test_an_emergency_stop_of_the_other_profiles(profile: str) -> None:
-    family = FAMILY.configured(profile=profile)
-    test_stop.test_when_everything_moves(family)
-    test_stop.test_at_any_moment_of_a_move(family)
-
 
 IMPOSSIBLE: dict[str, Callable[[Servo], object]] = {
     "id 0": lambda servo: servo.set_node_id(0),

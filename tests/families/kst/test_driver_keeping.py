@@ -35,7 +35,7 @@ def test_a_save_holds_its_lane_until_the_flash_is_written() -> None:
     request = save(node())
     assert (request.lane, request.expected, request.reply_within) == (5, ANY, TimeoutClass.STORE)
     assert (request.effect, request.repeatable) == (Effect.PERSISTENT, False)
-    assert FAMILY.turnaround(request) == pytest.approx(0.170)
+    assert FAMILY.open().turnaround(request) == pytest.approx(0.170)
     with bench(ids=(5, 6)) as there:
         begun = there.link.now()
         there.servo().save()

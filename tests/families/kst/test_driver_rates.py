@@ -13,13 +13,13 @@ from tests.families.kst.test_driver_scanning import Deaf
 
 
 def look(there: Bench, **how: object) -> object:
-    return there.run(scan_bit_rates(settings_of(there.family), **how))  # type: ignore[arg-type]
+    return there.run(scan_bit_rates(settings_of(there.bus), **how))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("rate", RATES)
 def test_traffic_tells_the_rate_and_nothing_is_sent(rate: int) -> None:
     with bench(bit_rate=rate, reports_ms=100, profile="kst-ext") as there:
-        found = there.run(scan_bit_rates(settings_of(there.family)))
+        found = there.run(scan_bit_rates(settings_of(there.bus)))
         assert found.rate == rate
         assert found.activity[rate] is LineActivity.TRAFFIC
         assert {found.activity[one] for one in RATES if one < rate} <= {LineActivity.ERRORS}
@@ -30,10 +30,10 @@ def test_traffic_tells_the_rate_and_nothing_is_sent(rate: int) -> None:
 
 def test_a_silent_bus_is_not_spoken_to_unless_it_is_isolated() -> None:
     with bench(bit_rate=125_000) as there:
-        found = there.run(scan_bit_rates(settings_of(there.family)))
+        found = there.run(scan_bit_rates(settings_of(there.bus)))
         assert (found.rate, set(found.activity.values())) == (None, {LineActivity.SILENCE})
         assert there.sent() == []
-        found = there.run(scan_bit_rates(settings_of(there.family), isolated=True))
+        found = there.run(scan_bit_rates(settings_of(there.bus), isolated=True))
         assert (found.rate, [one.node for one in found.found]) == (125_000, [5])
         assert there.servo().ping() is False, "the rate of the bus is as it was"
 
@@ -41,7 +41,7 @@ def test_a_silent_bus_is_not_spoken_to_unless_it_is_isolated() -> None:
 def test_nobody_is_there() -> None:
     with bench() as there:
         there.sim().unplug()
-        assert there.run(scan_bit_rates(settings_of(there.family), isolated=True)).rate is None
+        assert there.run(scan_bit_rates(settings_of(there.bus), isolated=True)).rate is None
 
 
 def test_an_adapter_that_cannot_listen_needs_an_isolated_bus() -> None:
@@ -49,7 +49,7 @@ def test_an_adapter_that_cannot_listen_needs_an_isolated_bus() -> None:
         with pytest.raises(RequestError, match="cannot listen"):
             look(there)
         assert there.sent() == []
-        assert there.run(scan_bit_rates(settings_of(there.family), isolated=True)).rate == 125_000
+        assert there.run(scan_bit_rates(settings_of(there.bus), isolated=True)).rate == 125_000
 
 
 class Without800k(MemoryLink):
@@ -63,7 +63,7 @@ class Without800k(MemoryLink):
 
 def test_a_rate_that_the_adapter_lacks_is_left_out_and_told() -> None:
     with bench(bit_rate=1_000_000, reports_ms=10.0, link=Without800k) as there:
-        found = there.run(scan_bit_rates(settings_of(there.family)))
+        found = there.run(scan_bit_rates(settings_of(there.bus)))
         assert (found.rate, 800_000 in found.activity) == (1_000_000, False)
         assert there.of(Skipped) == [Skipped(800_000, "this adapter has no such rate")]
 

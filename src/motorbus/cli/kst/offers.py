@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from motorbus.bus.blocking import Bus
     from motorbus.core.can_frame import CanFrame
-    from motorbus.core.family import Family
+    from motorbus.core.family import BusDriver
     from motorbus.core.register import Register
 
 COMMANDS: Final = {
@@ -39,7 +39,7 @@ VERSIONS: Final = ("firmware_version", "software_version")
 
 def ping_everyone(bus: Bus) -> list[int]:
     """The servos that answer one read by everyone; on CAN their answers do not collide."""
-    return sorted(bus.run(kst.broadcast_read("node_id", kst.settings_of(bus.family))))
+    return sorted(bus.run(kst.broadcast_read("node_id", kst.settings_of(bus))))
 
 
 def bit_rate_heard(
@@ -56,14 +56,15 @@ def bit_rate_heard(
             heard[event.rate] = f"not listened to: {event.why}"
         report(event)
 
-    found = bus.run(kst.scan_bit_rates(kst.settings_of(bus.family), seconds=seconds), report=told)
+    found = bus.run(kst.scan_bit_rates(kst.settings_of(bus), seconds=seconds), report=told)
     heard |= {rate: one.value for rate, one in found.activity.items()}
     return found.rate, {rate: heard[rate] for rate in bus.family.link.rates if rate in heard}
 
 
-def budget_frames(family: Family, node: int) -> Mapping[str, tuple[Sequence[CanFrame], ...]]:
+def budget_frames(driver: BusDriver, node: int) -> Mapping[str, tuple[Sequence[CanFrame], ...]]:
     """`write`: a goal and its acknowledgement; `read`: the position; for each frame all that it may be."""
-    settings = kst.settings_of(family)
+    assert isinstance(driver, kst.KstDriver)
+    settings = driver.settings
     table, limit = settings.profile.table, settings.profile.limit
     goal, present = table["goal_position"], table["present_position"]
     extended, sized = settings.extended, settings.sized
@@ -77,9 +78,10 @@ def budget_frames(family: Family, node: int) -> Mapping[str, tuple[Sequence[CanF
     }
 
 
-def report_frames(family: Family, node: int) -> list[CanFrame]:
+def report_frames(driver: BusDriver, node: int) -> list[CanFrame]:
     """A report of every position."""
-    settings = kst.settings_of(family)
+    assert isinstance(driver, kst.KstDriver)
+    settings = driver.settings
     profile, extended = settings.profile, settings.extended
     form = profile.report_forms[0] if profile.report_forms else "sdo"
     return [

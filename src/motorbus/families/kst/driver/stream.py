@@ -17,7 +17,8 @@ from motorbus.core.setpoint import Setpoint
 from motorbus.core.steps import gather
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.kst.driver.feedback import position
-from motorbus.families.kst.driver.motion import limits, start, stop, target
+from motorbus.families.kst.driver.motion import limits, stop, target
+from motorbus.families.kst.driver.motion import start as start_servo
 from motorbus.families.kst.driver.node import Node
 from motorbus.families.kst.driver.requests import ask_presence, write_register
 
@@ -59,7 +60,7 @@ class PositionStream:
         """
         return [self._request(id, value) for id, value in to.items()]
 
-    async def begin(self, speeds: Mapping[int, float]) -> None:
+    async def start(self, speeds: Mapping[int, float]) -> None:
         """Start each servo where the profile has that rule, and make its present position its target.
 
         The servos have no speed setting; `speeds` are only checked. Each servo is visited; then the first error is
@@ -75,12 +76,12 @@ class PositionStream:
                     node=node.node,
                 )
 
-        async def begin_one(node: Node) -> None:
+        async def start_one(node: Node) -> None:
             if node.settings.must_start:
-                await start(node)
+                await start_servo(node)
             await stop(node)
 
-        await gather(*[begin_one(node) for node, _ in self._servos.values()])
+        await gather(*[start_one(node) for node, _ in self._servos.values()])
 
     def _servo(self, id: int) -> tuple[Node, tuple[float, float]]:
         try:
