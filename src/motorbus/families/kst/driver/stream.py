@@ -11,14 +11,14 @@ from math import inf
 from typing import Final
 
 from motorbus.core.family import Positions
-from motorbus.core.register import is_number, shown
+from motorbus.core.register import shown
 from motorbus.core.request import Request, Stops
 from motorbus.core.setpoint import Setpoint
 from motorbus.core.steps import gather
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.kst.driver.feedback import position
 from motorbus.families.kst.driver.motion import limits, start, stop, target
-from motorbus.families.kst.driver.node import Node
+from motorbus.families.kst.driver.node import Node, check_above_zero
 from motorbus.families.kst.driver.requests import ask_presence, write_register
 
 
@@ -28,10 +28,7 @@ async def open_stream(servos: Sequence[Node], *, rate: int) -> PositionStream:
     Raises RequestError for no servo or a repeated one; else the first error of a servo, with a note for each other.
     """
     if len({node.node for node in servos}) != len(servos) or not servos:
-        raise RequestError(
-            "an id is named twice" if servos else "no servo is named",
-            advice="name each servo once; nothing was sent",
-        )
+        raise RequestError("an id is named twice" if servos else "no servo is named", expected="each id once")
 
     async def read_limits(node: Node) -> tuple[float, float]:
         found = await limits(node)
@@ -57,7 +54,7 @@ class PositionStream:
         Raises LimitExceeded for a value that is not finite or outside the profile, RequestError for a servo that is not
         in the stream, or whose limits may have changed.
         """
-        return [self._request(id, value) for id, value in to.items()]
+        return [self._goal(id, value) for id, value in to.items()]
 
     async def begin(self, speeds: Mapping[int, float]) -> None:
         """Start each servo where the profile has that rule, and make its present position its target.
@@ -66,14 +63,7 @@ class PositionStream:
         raised.
         """
         for id, speed in speeds.items():
-            node, _ = self._servo(id)
-            if not (is_number(speed) and speed > 0):
-                raise RequestError(
-                    f"node {node.node}: {shown(speed)} is no speed",
-                    expected="a finite number above 0, in rad/s",
-                    advice="leave it out; nothing was sent",
-                    node=node.node,
-                )
+            check_above_zero("speed", speed, "rad/s", node=self._servo(id)[0].node)
 
         async def begin_one(node: Node) -> None:
             if node.settings.must_start:
@@ -83,16 +73,13 @@ class PositionStream:
         await gather(*[begin_one(node) for node, _ in self._servos.values()])
 
     def _servo(self, id: int) -> tuple[Node, tuple[float, float]]:
-        try:
+        if id in self._servos:
             return self._servos[id]
-        except KeyError:
-            raise RequestError(
-                f"node {shown(id)} is none of those that are led here",
-                expected=f"one of {', '.join(map(str, self.nodes))}",
-                advice="nothing was sent",
-            ) from None
+        raise RequestError(
+            f"node {shown(id)} is not in this loop", expected=f"one of {', '.join(map(str, self.nodes))}"
+        )
 
-    def _request(self, id: int, to: float) -> Request[None]:
+    def _goal(self, id: int, to: float) -> Request[None]:
         node, known = self._servo(id)
         row = node.table["goal_position"]
 
@@ -100,9 +87,9 @@ class PositionStream:
             if node.limits is known or node.limits == known:
                 return None
             return RequestError(
-                f"the settings of node {node.node} were written since it was led, and goals may mean something else",
-                expected="the limits, the mid point and the sense of rotation that it was asked for",
-                advice="end the loop and begin another; nothing was sent",
+                f"the settings of node {node.node} were written since its limits were read",
+                cause="a target may mean another position after a change of limits, mid point or sense of rotation",
+                advice="end the loop and begin another",
                 node=node.node,
             )
 
