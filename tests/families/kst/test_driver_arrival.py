@@ -23,7 +23,7 @@ def test_in_position_is_two_looks_in_a_row() -> None:
 
 def test_who_does_not_move_has_stalled() -> None:
     looks = int(STALL_TIME / 0.02) + 1
-    with pytest.raises(Stalled, match="its goal is") as raised:
+    with pytest.raises(Stalled, match="off its goal") as raised:
         play(wait_arrival(node(), 1.0, 0.02, None), *[at(10 + n % 2) for n in range(looks)])
     assert "profile=xqpower" in raised.value.advice
 

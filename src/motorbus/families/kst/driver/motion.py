@@ -18,7 +18,7 @@ from motorbus.core.interrupted import Moving, stopped_if_interrupted
 from motorbus.core.register import Register, changed
 from motorbus.core.request import Effect, Priority, Request, Response
 from motorbus.core.setpoint import Setpoint, Stays, torque_on
-from motorbus.core.steps import Emit, catch
+from motorbus.core.steps import Emit
 from motorbus.errors import DeviceError, LimitExceeded, RequestError, Stalled
 from motorbus.families.kst import sdo
 from motorbus.families.kst.driver.feedback import position
@@ -89,9 +89,10 @@ async def wait_arrival(node: Node, goal: float, tolerance: float, timeout: float
         return State(position=await position(node), at=node.at)
 
     async def stalled(state: State) -> Stalled:
+        here = state.position or 0.0
         alarm = f"; alarms: {', '.join(node.alarm)}" if node.alarm else ""
         return Stalled(
-            f"node {node.node} stands at {state.position:.4g} rad, its goal is {goal:.4g} rad{alarm}",
+            f"node {node.node} stands at {here:.4g} rad, {abs(here - goal):.4g} rad off its goal{alarm}",
             expected=f"within {tolerance:.4g} rad",
             cause="something blocks it, its load is too heavy, its supply is weak, or its make must be started first",
             advice="clear the way, or give a wider tolerance; it still pushes: stop() ends that. A servo that never "
@@ -157,17 +158,19 @@ def start_request(node: Node, on: bool, goal: Setpoint | None = None) -> Request
 async def stop(node: Node) -> Promise:
     """Make the present position the target. Torque stays on: these servos have no switch for it."""
     here = await read_register(node, node.table["present_position"], int, reports_position=True)
-    first, *rest = hold(node, here)
-    await first
-    for request in rest:
-        await catch(request)
+    requests = hold(node, here)
+    try:
+        await requests[-1]
+    except DeviceError:
+        if len(requests) == 1:
+            raise
+        await requests[0]
     return Promise.HOLD_REQUESTED
 
 
 def hold(node: Node, here: int, priority: Priority = Priority.CONTROL) -> list[Request[Response]]:
-    """The requests that make this position (raw) the target.
-
-    A servo outside its range may refuse its own position, so there the end of the range is sent first.
+    """The requests that make this position (raw) the target; outside the range, where a servo may refuse it, the end
+    of the range comes first.
     """
     limit, row = node.profile.limit, node.table["goal_position"]
     unlimited = changed(row, low=-0x8000, high=0x7FFF)

@@ -78,9 +78,14 @@ def read_register(
 
 
 def value_bytes(node: Node, row: Register, reply: SdoReply) -> bytes:
-    """The bytes of this object in a reply. Raises UnexpectedReply where it states another size, or segments."""
-    if reply.kind == "upload" and reply.size in (None, row.size):
-        return reply.data[: row.size]
+    """The bytes of this object in a reply; further bytes may only repeat its sign, or be of no stated length.
+
+    Raises UnexpectedReply for a value of another size, or in segments.
+    """
+    own, more = reply.data[: row.size], reply.data[row.size :]
+    extended = more in (bytes(len(more)), b"\xff" * len(more) if own[-1:] > b"\x7f" else b"")
+    if reply.kind == "upload" and len(own) == row.size and (reply.size is None or extended):
+        return own
     raise UnexpectedReply(
         f"node {node.node} sends {row.name} in {reply.size} bytes, not in {row.size}",
         received=reply.data,
@@ -216,7 +221,7 @@ async def read_all_bytes(node: Node, row: Register) -> bytes:
             await Request(abort, (), lane=node.node)
         raise UnexpectedReply(
             f"node {node.node} announced {first.size} bytes of {row.name} and sent {len(data)}",
-            received=data,
+            received=data[:32],
             node=node.node,
         )
 
