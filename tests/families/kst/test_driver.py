@@ -65,7 +65,7 @@ def test_what_a_profile_lacks_names_those_that_have_it() -> None:
     with bench() as there, pytest.raises(RequestError, match="kst-ext or kingmax") as raised:
         there.servo().travel_limits()
     assert "profile=kst-ext" in raised.value.advice
-    with bench(profile="xqpower") as there, pytest.raises(RequestError, match="no source says"):
+    with bench(profile="xqpower") as there, pytest.raises(RequestError, match="no reverse bit"):
         there.servo().reversed()
 
 

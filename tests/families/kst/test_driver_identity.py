@@ -38,7 +38,7 @@ def test_the_version_is_where_the_profile_says() -> None:
     assert (
         play(driver.version(newer), (FIRMWARE, abort(0x100A, ABSENT)), (SOFTWARE, "430b100056310000")) == "V1"
     )
-    with pytest.raises(DeviceError, match="firmware_version"):
+    with pytest.raises(DeviceError, match="software_version"):
         play(driver.version(newer), (FIRMWARE, abort(0x100A, ABSENT)), (SOFTWARE, abort(0x100B, ABSENT)))
     with pytest.raises(DeviceError, match="hardware"):
         play(driver.version(newer), (FIRMWARE, abort(0x100A, 0x0606_0000)))

@@ -69,7 +69,7 @@ def test_a_simulator_is_of_the_make_the_family_is_configured_for() -> None:
 
 
 def test_from_a_bus_address() -> None:
-    with motorbus.open("kst:sim,ids=0x25,profile=xqpower,speed=20") as bus:
+    with motorbus.open("kst:sim,ids=0x25,profile=xqpower") as bus:
         servo = kst.Servo(bus, 0x25)
         assert servo.identify().table == "xqpower"
         servo.move(0.1)

@@ -295,7 +295,6 @@ def test_what_is_no_finite_angle_is_refused(profile: Profile, angle: float) -> N
 def test_what_is_far_out_is_refused_in_degrees(profile: Profile, angle: float) -> None:
     with pytest.raises(RequestError, match="out of range") as caught:
         to_raw(profile, radians(angle))
-    assert "nothing was sent" in str(caught.value)
     assert f"raw {-profile.limit} to {profile.limit}" in caught.value.expected
 
 

@@ -124,7 +124,7 @@ def test_a_second_servo_answers_too() -> None:
 
 def test_a_second_kst_servo_says_something_else() -> None:
     link, world, _, _ = host("exchange 1: duplicate-id 0x25", "kst", (0x25,), duplicate_delay=0.0)
-    world.nodes[0x25].shaft.turn_by_hand(300, 0.0)
+    world.nodes[0x25].raw_position = 300
     link.tune(500_000)
     link.write(CanFrame(0x625, bytes.fromhex("40 02 60 00 00 00 00 00")))
     frames = [piece for _ in range(30) for piece in link.read(link.now() + 0.1)]

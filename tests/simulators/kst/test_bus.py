@@ -259,20 +259,6 @@ def test_whoever_changes_is_reached_where_it_is_now() -> None:
     assert host.bus.servos[-1].values is not host[2].values
 
 
-def test_the_next_report_is_known_anew_when_somebody_begins_stops_or_changes_its_interval() -> None:
-    host = Host(1, 2, nmt="standard")
-    assert host.bus.due() is None
-    first, second = host.bus.servos
-    host.bus.receive(CanFrame(0, bytes((1, 0))), 10.0)
-    assert host.bus.due() == first.report_due() == pytest.approx(10.02)
-    second.report_every(0.003, 10.005)
-    assert host.bus.due() == pytest.approx(10.008)
-    second.unplug()
-    assert host.bus.due() == first.report_due()
-    first.unplug()
-    assert host.bus.due() is None
-
-
 @pytest.mark.parametrize(
     ("frame", "audience"),
     [

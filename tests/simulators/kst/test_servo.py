@@ -101,18 +101,6 @@ def test_it_says_of_itself_what_is_in_force_and_what_is_to_come() -> None:
     assert host[0x25].status()["saving"] is True
 
 
-def test_memory_holds_every_row_written_only_ones_too() -> None:
-    host = Host(profile="kst-ext", firmware="V1.2")
-    memory = host[0x25].memory
-    assert set(memory) == set(host[0x25].profile.table)
-    assert len(memory) == len(host[0x25].profile.table)
-    host.say("625#2200220064000000", "625#2201300007000000", "625#2209300001000000")
-    assert (memory["report_interval"], memory["bit_rate_code"], memory["mid_point"]) == (100, 7, 1)
-    assert memory["firmware_version"] == int.from_bytes(b"V1.2", "little")
-    host.say(f"625#{SAVE}")
-    assert memory["store"] == int.from_bytes(b"save", "little")
-
-
 # --- start, stop, reports ---------------------------------------------------------------------------------------
 
 

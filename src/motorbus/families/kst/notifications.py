@@ -27,8 +27,8 @@ from motorbus.families.kst.sdo import (
     NODES,
     REPLY,
     REQUEST,
-    TOGGLE,
     Key,
+    check_node,
     reply_kind,
 )
 
@@ -38,6 +38,15 @@ EMERGENCY: Final = 0x080
 HEARTBEAT: Final = 0x700
 REPORT_LENGTH: Final = 4
 """Data bytes of a report and of an alarm."""
+NOTIFICATIONS: Final = {
+    REPLY: ("report", REPORT_LENGTH),
+    PDO: ("report", REPORT_LENGTH),
+    ALARM: ("alarm", REPORT_LENGTH),
+    EMERGENCY: ("emergency", LENGTH),
+    HEARTBEAT: ("heartbeat", 1),
+}
+"""Identifier without the node -> kind and number of data bytes."""
+REPORT_FORMS: Final = {"sdo": REPLY, "pdo": PDO}
 LOW_VOLTAGE: Final = b"\x0a\x02\x00\x00"
 """The only alarm that a source names."""
 START_FORMS: Final = ("vendor", "standard")
@@ -57,12 +66,13 @@ class Start(NamedTuple):
 
 def encode_report(node: int, raw: int, *, form: str = "sdo", extended: bool = False) -> CanFrame:
     """A position (raw counts) under 0x580 + node, or with `form` "pdo" under 0x180 + node."""
-    base = {"sdo": REPLY, "pdo": PDO}.get(form)
-    if base is None:
-        raise RequestError(f"a report has no form {form!r}", expected="sdo or pdo")
-    if not -0x8000 <= raw <= 0x7FFF:
-        raise RequestError(f"position {raw} does not fit a report", expected="-32768 to 32767 counts")
-    return CanFrame(base + _node(node), raw.to_bytes(2, "little", signed=True) + b"\0\0", extended)
+    check_node(node)
+    if form not in REPORT_FORMS or not -0x8000 <= raw <= 0x7FFF:
+        raise RequestError(
+            f"no report of the form {form!r} has position {raw}",
+            expected="sdo or pdo, -32768 to 32767 counts",
+        )
+    return CanFrame(REPORT_FORMS[form] + node, raw.to_bytes(2, "little", signed=True) + b"\0\0", extended)
 
 
 def decode_report(data: bytes) -> int:
@@ -72,19 +82,16 @@ def decode_report(data: bytes) -> int:
 
 def encode_alarm(node: int, data: bytes = LOW_VOLTAGE, *, extended: bool = False) -> CanFrame:
     """An alarm of 4 bytes."""
+    check_node(node)
     if len(data) != REPORT_LENGTH:
-        raise RequestError(f"an alarm of {len(data)} bytes is impossible", expected="4 bytes")
-    return CanFrame(ALARM + _node(node), data, extended)
+        raise RequestError(f"an alarm has not {len(data)} bytes", expected="4 bytes")
+    return CanFrame(ALARM + node, data, extended)
 
 
 def encode_boot(node: int, *, extended: bool = False) -> CanFrame:
     """The heartbeat of a node that has just started."""
-    return CanFrame(HEARTBEAT + _node(node), b"\0", extended)
-
-
-def is_boot(data: bytes) -> bool:
-    """Whether a heartbeat with this data reports a start."""
-    return len(data) == 1 and data[0] & 0x7F == 0
+    check_node(node)
+    return CanFrame(HEARTBEAT + node, b"\0", extended)
 
 
 def encode_start(form: str, node: int, on: bool, *, extended: bool = False) -> CanFrame:
@@ -93,13 +100,13 @@ def encode_start(form: str, node: int, on: bool, *, extended: bool = False) -> C
     Form "vendor" has the node as identifier and `01 00` or `02 00`; "standard" is the NMT of CiA 301, identifier 0 and
     `01 node` or `02 node`, without which an XQPOWER servo ignores positions.
     """
+    check_node(node, lowest=BROADCAST)
     if form not in START_FORMS:
         raise RequestError(f"there is no start form {form!r}", expected="vendor or standard")
-    who = BROADCAST if node == BROADCAST else _node(node)
     command = 1 if on else 2
     if form == "vendor":
-        return CanFrame(who, bytes((command, 0)), extended)
-    return CanFrame(0, bytes((command, who)), extended)
+        return CanFrame(node, bytes((command, 0)), extended)
+    return CanFrame(0, bytes((command, node)), extended)
 
 
 def decode_start(frame: CanFrame) -> Start | None:
@@ -107,10 +114,12 @@ def decode_start(frame: CanFrame) -> Start | None:
     identifier, data, _ = frame
     if len(data) != 2 or data[0] not in (1, 2):
         return None
-    on = data[0] == 1
-    if identifier == 0 and (data[1] == BROADCAST or data[1] in NODES):
-        return Start(frozenset(START_FORMS if data[1] == BROADCAST else ("standard",)), data[1], on)
-    if identifier in NODES and data[1] == 0:
+    on, node = data[0] == 1, data[1]
+    if identifier == 0 and node == BROADCAST:
+        return Start(frozenset(START_FORMS), BROADCAST, on)
+    if identifier == 0 and node in NODES:
+        return Start(frozenset({"standard"}), node, on)
+    if identifier in NODES and node == 0:
         return Start(frozenset({"vendor"}), identifier, on)
     return None
 
@@ -124,36 +133,21 @@ def decode_notification(frame: CanFrame) -> Notification | None:
     if identifier & ERROR_FLAG:
         return Notification(BROADCAST, "bus error", data)
     node = identifier & 0x7F
-    kind = _kind(identifier - node, data) if node else ""
-    return Notification(node, kind, data) if kind else None
-
-
-def _kind(base: int, data: bytes) -> str:
-    if base in (REPLY, PDO):
-        return "report" if len(data) == REPORT_LENGTH and data[2:] == b"\0\0" else ""
-    if base == ALARM:
-        return "alarm" if len(data) == REPORT_LENGTH else ""
-    if base == EMERGENCY:
-        return "emergency" if len(data) == LENGTH else ""
-    if base == HEARTBEAT:
-        return "heartbeat" if len(data) == 1 and data[0] & 0x7F in STATES else ""
-    return ""
+    kind, length = NOTIFICATIONS.get(identifier - node, ("", 0))
+    if not kind or node == BROADCAST or len(data) != length:
+        return None
+    if (kind == "report" and data[2:] != b"\0\0") or (kind == "heartbeat" and data[0] & 0x7F not in STATES):
+        return None
+    return Notification(node, kind, data)
 
 
 def addressee(frame: CanFrame) -> int | None:
     """The node that a frame of a host addresses, 0 for all; None for a frame that no host sends."""
-    identifier = frame.id & ~REMOTE_FLAG
-    node = identifier - REQUEST
+    node = (frame.id & ~REMOTE_FLAG) - REQUEST
     if node == BROADCAST or node in NODES:
         return node
     start = decode_start(frame)
     return None if start is None else start.node
-
-
-def _node(node: int) -> int:
-    if node not in NODES:
-        raise RequestError(f"{node} is not a node id", expected="1 to 127", advice="nothing was sent")
-    return node
 
 
 # -- receiver --------------------------------------------------------------------------------------------------
@@ -170,13 +164,17 @@ class BusState:
 
     def note(self, event: Event) -> None:
         """Count one received frame."""
-        if isinstance(event, Notification) and event.kind == "bus error":
+        kind = event.kind if isinstance(event, Notification) else ""
+        if kind == "bus error":
             self.errors += 1
             return
         self.frames += 1
-        if isinstance(event, Notification) and event.kind == "alarm":
-            self._alarms[event.node] = (alarm_names(event.data), None)
-        if isinstance(event, Notification) and event.kind == "heartbeat" and is_boot(event.data):
+        if not isinstance(event, Notification):
+            return
+        if kind == "alarm":
+            name = "low voltage" if event.data == LOW_VOLTAGE else f"alarm {event.data.hex(' ').upper()}"
+            self._alarms[event.node] = (name,), None
+        elif kind == "heartbeat" and event.data[0] & 0x7F == 0:
             self.boots[event.node] += 1
 
     def alarm(self, node: int, at: float) -> tuple[str, ...]:
@@ -185,19 +183,10 @@ class BusState:
         A receiver has no clock, so the time of an alarm is that of the next reply of its node.
         """
         names, since = self._alarms.get(node, ((), None))
-        if at == -inf:
-            return names
-        if since is None and names:
-            self._alarms[node] = (names, at)
-        elif since is not None and at - since > ALARM_TIME:
-            del self._alarms[node]
-            return ()
-        return names
-
-
-def alarm_names(data: bytes) -> tuple[str, ...]:
-    """The name of an alarm; an unknown one as hex."""
-    return ("low voltage",) if data == LOW_VOLTAGE else (f"alarm {data.hex(' ').upper()}",)
+        if names and since is None and at > -inf:
+            since = at
+            self._alarms[node] = names, since
+        return names if since is None or at - since <= ALARM_TIME else ()
 
 
 _KEY_KINDS: Final = tuple(reply_kind(specifier).removesuffix("-start") for specifier in range(256))
@@ -213,16 +202,11 @@ class FrameReceiver:
     carries an abort code is noise.
     """
 
-    __slots__ = ("_extended", "_state")
+    held: Final = 0
 
     def __init__(self, extended: bool = False, state: BusState | None = None) -> None:
         self._extended = extended
         self._state = state
-
-    @property
-    def held(self) -> int:
-        """0: a frame is complete."""
-        return 0
 
     def feed(self, data: Data, /) -> list[Event]:
         """Decode one frame. Never raises."""
@@ -246,7 +230,7 @@ class FrameReceiver:
         if not kind or (kind == "download" and data[4:] in _ABORT_CODES):
             return Noise(data, "foreign", node)
         if kind == "segment":
-            return Reply(node, Key(kind, 0, 0, 1 if data[0] & TOGGLE else 0), data)
+            return Reply(node, Key(kind, toggle=data[0] >> 4 & 1), data)
         return Reply(node, Key(kind, data[1] | data[2] << 8, data[3]), data)
 
     def flush(self) -> list[Event]:

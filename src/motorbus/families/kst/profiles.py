@@ -36,6 +36,7 @@ DEFAULT_RATE: Final = 500_000
 """Bit/s as shipped; the manual adds "provisional"."""
 SAVE: Final = int.from_bytes(b"save", "little")
 """What is written to `store`: the letters "save", the first in the lowest byte (CiA 301, object 1010h)."""
+VERSIONS: Final = ("firmware_version", "software_version")
 REVERSED: Final = 5
 """The bit of `function_enable` that turns the sense of rotation round."""
 
@@ -180,47 +181,53 @@ XQPOWER: Final = KST_EXT.derive(
 class Profile:
     """How the servos of one maker, or of one generation, speak the protocol.
 
-    `counts_per_degree` is exact and `limit` the greatest raw position, either way. `status_row` is None where status
-    is the manual's command 7, the same frame as the position, which nothing decodes. `current_scale` is A per
-    count of the status. `nmt` says how reports (and at XQPOWER motion) are started: "none", "vendor" (CAN id = node,
-    `01 00`) or "standard" (CAN id 0, `01 node`). `version_rows` are asked in order. `flash_wait` is how long a node is
-    left alone after a save, `mid_point_wait` after a new mid point (s), which is set by writing `mid_point_value`.
-    `report_forms` are the ids on which reports come, of "sdo" (0x580 + node) and "pdo" (0x180 + node); `conflicts` is
-    where sources disagree.
+    `counts_per_degree` is exact. `current_scale` is A per count of the status. `nmt` says how reports (and at XQPOWER
+    motion) are started: "none", "vendor" (CAN id = node, `01 00`) or "standard" (CAN id 0, `01 node`). `flash_wait` is
+    how long a node is left alone after a save, `mid_point_wait` after a new mid point (s), which is set by writing
+    `mid_point_value`. `report_forms` are the ids on which reports come, of "sdo" (0x580 + node) and "pdo"
+    (0x180 + node); `conflicts` is where sources disagree.
     """
 
-    name: str
-    title: str
-    vendor: str
     table: RegisterMap
-    counts_per_degree: int
-    limit: int
-    status_row: Register | None
-    current_scale: float
+    vendor: str
+    counts_per_degree: int = 10
+    current_scale: float = 0.01
     nmt: str
-    version_rows: tuple[Register, ...]
-    flash_wait: float
-    mid_point_value: int
-    mid_point_wait: float
+    flash_wait: float = 0.15
+    mid_point_value: int = 0
+    mid_point_wait: float = 0.15
     report_forms: tuple[str, ...]
     source: str
     conflicts: str
 
+    @property
+    def name(self) -> str:
+        return self.table.name
+
+    @property
+    def title(self) -> str:
+        return self.table.title
+
+    @property
+    def limit(self) -> int:
+        """The greatest raw position, either way."""
+        return self.table["goal_position"].high
+
+    @property
+    def status_row(self) -> Register | None:
+        """None where status is the manual's command 7, the same frame as the position, which nothing decodes."""
+        return self.table.at(0x6005, 0)
+
+    @property
+    def version_rows(self) -> tuple[Register, ...]:
+        """The objects with a version, in the order in which they are read."""
+        return tuple(self.table[name] for name in VERSIONS if name in self.table)
+
 
 _KST = Profile(
-    name=KST.name,
-    title=KST.title,
-    vendor="KST",
     table=KST,
-    counts_per_degree=10,
-    limit=900,
-    status_row=None,
-    current_scale=0.01,
+    vendor="KST",
     nmt="none",
-    version_rows=(KST["firmware_version"],),
-    flash_wait=0.15,
-    mid_point_value=0,
-    mid_point_wait=0.15,
     report_forms=(),
     source=f"{MANUAL}; the wait after a save: {FLIGHT}",
     conflicts="commands 6 and 7 of the manual, position and status, are one and the same frame; it prints ids of four "
@@ -228,13 +235,8 @@ _KST = Profile(
 )
 _KST_EXT = replace(
     _KST,
-    name=KST_EXT.name,
-    title=KST_EXT.title,
     table=KST_EXT,
-    limit=1000,
-    status_row=KST_EXT["status"],
     nmt="vendor",
-    version_rows=(KST_EXT["firmware_version"], KST_EXT["software_version"]),
     report_forms=("sdo",),
     source=f"{FLIGHT}; {DEMO}; the rest: {MANUAL}",
     conflicts="range ±100° where the manual has ±90°; status at 0x6005 where the manual has 0x6002; version at 0x100B "
@@ -242,27 +244,18 @@ _KST_EXT = replace(
 )
 _KINGMAX = replace(
     _KST_EXT,
-    name=KINGMAX.name,
-    title=KINGMAX.title,
-    vendor="Kingmax",
     table=KINGMAX,
-    status_row=KINGMAX["status"],
-    version_rows=(KINGMAX["firmware_version"], KINGMAX["software_version"]),
+    vendor="Kingmax",
     source=f"{KINGMAX_DRIVER} for position, status and scale; the rest is taken over from kst-ext",
     conflicts="that range, start rule and configuration objects are those of kst-ext is an assumption",
 )
 _XQPOWER = replace(
     _KST_EXT,
-    name=XQPOWER.name,
-    title=XQPOWER.title,
-    vendor="XQPOWER",
     table=XQPOWER,
+    vendor="XQPOWER",
     counts_per_degree=18,
-    limit=800,
-    status_row=XQPOWER["status"],
     current_scale=0.001,
     nmt="standard",
-    version_rows=(XQPOWER["firmware_version"],),
     mid_point_value=1,
     mid_point_wait=0.5,
     report_forms=("sdo", "pdo"),
@@ -293,18 +286,16 @@ def to_raw(profile: Profile, radians: float, row: str = "goal_position") -> int:
     """
     register = profile.table[row]
     counts = profile.counts_per_degree * degrees(radians)
-    if not isfinite(counts):
-        what = "out of range" if isfinite(radians) else "not a finite angle"
-        raise RequestError(f"{row}: {radians} rad is {what}", advice="give a number; nothing was sent")
-    raw = int(Decimal(f"{counts:.6f}").to_integral_value(ROUND_HALF_UP))
-    if not register.low <= raw <= register.high:
-        low, high = (f"{end / profile.counts_per_degree:.6g}°" for end in (register.low, register.high))
-        raise RequestError(
-            f"{row}: {counts / profile.counts_per_degree:.6g}° is out of range {low} to {high}",
-            expected=f"{low} to {high} (raw {register.low} to {register.high}) by the profile {profile.name}",
-            advice="give an angle inside the range, or the profile of this servo; nothing was sent",
-        )
-    return raw
+    if isfinite(counts):
+        raw = int(Decimal(f"{counts:.6f}").to_integral_value(ROUND_HALF_UP))
+        if register.low <= raw <= register.high:
+            return raw
+    low, high = (f"{end / profile.counts_per_degree:.6g}°" for end in (register.low, register.high))
+    raise RequestError(
+        f"{row}: {degrees(radians):.6g}° is out of range {low} to {high}",
+        expected=f"raw {register.low} to {register.high} by the profile {profile.name}",
+        advice="give an angle inside the range, or the profile of this servo",
+    )
 
 
 def version_text(data: bytes) -> str:
@@ -334,5 +325,4 @@ def bit_rate_code(rate: int) -> int:
     raise RequestError(
         f"{rate!r} bit/s is no rate of these servos",
         expected=f"one of {', '.join(map(str, RATES))}",
-        advice="nothing was sent",
     )

@@ -14,6 +14,7 @@ device never raise an error here; arguments that no frame can carry raise Reques
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
@@ -39,7 +40,6 @@ DOWNLOAD_SIZED: Final = {1: 0x2F, 2: 0x2B, 3: 0x27, 4: 0x23}
 DOWNLOADED: Final = 0x60
 SEGMENT: Final = 0x60
 ABORT: Final = 0x80
-TOGGLE: Final = 0x10
 _KIND: Final = 0xE0
 _E: Final = 2
 _S: Final = 1
@@ -55,12 +55,12 @@ class SdoRequest(NamedTuple):
 
     node: int
     kind: str
-    index: int  # type: ignore[assignment]  # hides tuple.index
-    subindex: int
-    data: bytes
-    sized: bool
-    toggle: int
-    extended: bool
+    index: int = 0  # type: ignore[assignment]  # hides tuple.index
+    subindex: int = 0
+    data: bytes = b""
+    sized: bool = False
+    toggle: int = 0
+    extended: bool = False
 
 
 class SdoReply(NamedTuple):
@@ -87,7 +87,7 @@ class SdoReply(NamedTuple):
 
 def encode_upload(node: int, index: int, subindex: int = 0, *, extended: bool = False) -> CanFrame:
     """Read an object of one node or of all (0): `40 il ih sub 00 00 00 00`. `extended`: 29-bit identifier."""
-    return _frame(REQUEST, _addressee(node), bytes((UPLOAD,)) + _object(index, subindex), extended)
+    return _request(node, _head(UPLOAD, index, subindex), extended, lowest=BROADCAST)
 
 
 def encode_download(
@@ -98,41 +98,38 @@ def encode_download(
     The manual uses specifier 0x22, which does not state the length; `sized` states it as CiA 301 does.
     """
     if not 1 <= len(data) <= EXPEDITED:
-        raise _impossible(f"{len(data)} bytes cannot be written in one frame", "1 to 4 bytes")
+        raise RequestError(f"{len(data)} bytes cannot be written in one frame", expected="1 to 4 bytes")
     specifier = DOWNLOAD_SIZED[len(data)] if sized else DOWNLOAD_UNSIZED
-    return _frame(REQUEST, _addressee(node), bytes((specifier,)) + _object(index, subindex) + data, extended)
+    return _request(node, _head(specifier, index, subindex) + data, extended, lowest=BROADCAST)
 
 
 def encode_segment(node: int, toggle: int, *, extended: bool = False) -> CanFrame:
     """Request the next segment of an upload; `toggle` is 0 for the first segment, then alternates."""
-    return _frame(REQUEST, _one(node), bytes((SEGMENT | _toggle_bit(toggle),)), extended)
+    return _request(node, bytes((SEGMENT | _toggle_bit(toggle),)), extended)
 
 
 def encode_abort(node: int, index: int, subindex: int, code: int, *, extended: bool = False) -> CanFrame:
     """Abort a transfer as the client; it has no reply."""
-    return _frame(REQUEST, _one(node), _abort(index, subindex, code), extended)
+    return _request(node, _head(ABORT, index, subindex) + _four_bytes(code), extended)
 
 
 def decode_request(frame: CanFrame) -> SdoRequest | None:
     """A request with either identifier format; None for any other frame, also for a request without 8 bytes."""
-    node, data = frame.id - REQUEST, frame.data
+    node, data, extended = frame.id - REQUEST, frame.data, frame.extended
     if len(data) != LENGTH or (node != BROADCAST and node not in NODES):
         return None
     specifier, index, subindex, rest = data[0], data[1] | data[2] << 8, data[3], data[4:]
     match specifier & _KIND:
         case 0x40:
-            return SdoRequest(node, "upload", index, subindex, b"", False, 0, frame.extended)
+            return SdoRequest(node, "upload", index, subindex, extended=extended)
+        case 0x60:
+            return SdoRequest(node, "segment", toggle=specifier >> 4 & 1, extended=extended)
         case 0x20 if specifier & _E:
             sized = bool(specifier & _S)
             value = rest[: _size(specifier)] if sized else rest
-            return SdoRequest(node, "download", index, subindex, value, sized, 0, frame.extended)
-        case 0x60:
-            return SdoRequest(
-                node, "segment", 0, 0, b"", False, int(bool(specifier & TOGGLE)), frame.extended
-            )
-        case _:
-            kind = "abort" if specifier == ABORT else "unknown"
-            return SdoRequest(node, kind, index, subindex, rest, False, 0, frame.extended)
+            return SdoRequest(node, "download", index, subindex, value, sized, extended=extended)
+    kind = "abort" if specifier == ABORT else "unknown"
+    return SdoRequest(node, kind, index, subindex, rest, extended=extended)
 
 
 # -- replies ---------------------------------------------------------------------------------------------------
@@ -154,17 +151,17 @@ def decode_reply(data: bytes) -> SdoReply | None:
     if not kind:
         return None
     specifier, index, subindex, rest = data[0], data[1] | data[2] << 8, data[3], data[4:]
-    if kind == "segment":
-        count = SEGMENT_BYTES - (specifier >> 1 & 7)
-        toggle = int(bool(specifier & TOGGLE))
-        return SdoReply(kind, 0, 0, data[1 : 1 + count], size=count, toggle=toggle, last=bool(specifier & 1))
-    if kind == "upload":
-        size = _size(specifier) if specifier & _S else None
-        return SdoReply(kind, index, subindex, rest[:size], size=size)
-    if kind == "upload-start":
-        return SdoReply(
-            kind, index, subindex, size=int.from_bytes(rest, "little") if specifier & _S else None
-        )
+    stated = bool(specifier & _S)
+    match kind:
+        case "upload":
+            size = _size(specifier) if stated else None
+            return SdoReply(kind, index, subindex, rest[:size], size=size)
+        case "upload-start":
+            return SdoReply(kind, index, subindex, size=int.from_bytes(rest, "little") if stated else None)
+        case "segment":
+            size = SEGMENT_BYTES - (specifier >> 1 & 7)
+            toggle, last = specifier >> 4 & 1, bool(specifier & 1)
+            return SdoReply(kind, 0, 0, data[1 : 1 + size], size=size, toggle=toggle, last=last)
     return SdoReply(kind, index, subindex, code=int.from_bytes(rest, "little") if kind == "abort" else 0)
 
 
@@ -172,7 +169,7 @@ def upload_head(index: int, subindex: int, size: int) -> bytes:
     """The first four bytes of an upload of `size` bytes that states its length; b"" if one reply cannot carry it."""
     if not 1 <= size <= EXPEDITED:
         return b""
-    return bytes((0x40 | (EXPEDITED - size) << 2 | _E | _S,)) + _object(index, subindex)
+    return _head(0x40 | (EXPEDITED - size) << 2 | _E | _S, index, subindex)
 
 
 def encode_upload_reply(
@@ -180,18 +177,17 @@ def encode_upload_reply(
 ) -> CanFrame:
     """The value of an object, 1 to 4 bytes: specifier 4F, 4B, 47, 43."""
     if not 1 <= len(data) <= EXPEDITED:
-        raise _impossible(f"{len(data)} bytes do not fit one reply", "1 to 4 bytes")
-    return _frame(REPLY, _one(node), upload_head(index, subindex, len(data)) + data, extended)
+        raise RequestError(f"{len(data)} bytes do not fit one reply", expected="1 to 4 bytes")
+    return _reply(node, upload_head(index, subindex, len(data)) + data, extended)
 
 
 def encode_upload_start(
     node: int, index: int, subindex: int, size: int | None, *, extended: bool = False
 ) -> CanFrame:
     """Announce segments of `size` bytes in all: specifier 41; 40 without a stated size (None)."""
-    if size is not None and not 0 <= size <= 0xFFFF_FFFF:
-        raise _impossible(f"{size} bytes cannot be announced", "0 to 0xFFFFFFFF bytes")
-    specifier, stated = (0x40, b"") if size is None else (0x40 | _S, size.to_bytes(4, "little"))
-    return _frame(REPLY, _one(node), bytes((specifier,)) + _object(index, subindex) + stated, extended)
+    if size is None:
+        return _reply(node, _head(UPLOAD, index, subindex), extended)
+    return _reply(node, _head(UPLOAD | _S, index, subindex) + _four_bytes(size), extended)
 
 
 def encode_segment_reply(
@@ -199,74 +195,71 @@ def encode_segment_reply(
 ) -> CanFrame:
     """One segment of at most 7 bytes, with the toggle of its request."""
     if len(data) > SEGMENT_BYTES:
-        raise _impossible(f"{len(data)} bytes do not fit a segment", "0 to 7 bytes")
+        raise RequestError(f"{len(data)} bytes do not fit a segment", expected="0 to 7 bytes")
     specifier = _toggle_bit(toggle) | (SEGMENT_BYTES - len(data)) << 1 | int(last)
-    return _frame(REPLY, _one(node), bytes((specifier,)) + data, extended)
+    return _reply(node, bytes((specifier,)) + data, extended)
 
 
 def encode_download_reply(node: int, index: int, subindex: int, *, extended: bool = False) -> CanFrame:
     """Acknowledge a write: `60 il ih sub 00 00 00 00`."""
-    return _frame(REPLY, _one(node), bytes((DOWNLOADED,)) + _object(index, subindex), extended)
+    return _reply(node, _head(DOWNLOADED, index, subindex), extended)
 
 
 def encode_abort_reply(
     node: int, index: int, subindex: int, code: int, *, extended: bool = False
 ) -> CanFrame:
     """Refuse a request: `80 il ih sub` and the code. Source: KST CAN protocol manual, command 9."""
-    return _frame(REPLY, _one(node), _abort(index, subindex, code), extended)
+    return _reply(node, _head(ABORT, index, subindex) + _four_bytes(code), extended)
 
 
 # -- fields ----------------------------------------------------------------------------------------------------
 
 
-def _frame(base: int, node: int, data: bytes, extended: bool) -> CanFrame:
-    return CanFrame(base + node, data.ljust(LENGTH, b"\0"), extended)
+def check_node(node: int, *, lowest: int = 1) -> None:
+    """Raise RequestError for a node that no identifier has; with `lowest` 0, all nodes may be addressed."""
+    if not lowest <= node < NODES.stop:
+        raise RequestError(f"{node} is not a node id", expected=f"{lowest} to 127", node=node)
+
+
+def _request(node: int, data: bytes, extended: bool, *, lowest: int = 1) -> CanFrame:
+    check_node(node, lowest=lowest)
+    return CanFrame(REQUEST + node, data.ljust(LENGTH, b"\0"), extended)
+
+
+def _reply(node: int, data: bytes, extended: bool) -> CanFrame:
+    check_node(node)
+    return CanFrame(REPLY + node, data.ljust(LENGTH, b"\0"), extended)
+
+
+def _head(specifier: int, index: int, subindex: int) -> bytes:
+    if not (0 <= index <= 0xFFFF and 0 <= subindex <= 0xFF):
+        raise RequestError(
+            f"object 0x{index:X}:{subindex} is impossible",
+            expected="an index of 0 to 0xFFFF and a sub-index of 0 to 255",
+        )
+    return bytes((specifier, index & 0xFF, index >> 8, subindex))
+
+
+def _four_bytes(number: int) -> bytes:
+    if not 0 <= number <= 0xFFFF_FFFF:
+        raise RequestError(f"{number} does not fit 32 bits", expected="0 to 0xFFFFFFFF")
+    return number.to_bytes(4, "little")
 
 
 def _size(specifier: int) -> int:
     return EXPEDITED - (specifier >> 2 & 3)
 
 
-def _object(index: int, subindex: int) -> bytes:
-    if not (0 <= index <= 0xFFFF and 0 <= subindex <= 0xFF):
-        raise _impossible(
-            f"object 0x{index:X}:{subindex} is impossible",
-            "an index of 0 to 0xFFFF and a sub-index of 0 to 255",
-        )
-    return bytes((index & 0xFF, index >> 8, subindex))
-
-
-def _abort(index: int, subindex: int, code: int) -> bytes:
-    if not 0 <= code <= 0xFFFF_FFFF:
-        raise _impossible(f"abort code {code} does not fit 32 bits", "0 to 0xFFFFFFFF")
-    return bytes((ABORT,)) + _object(index, subindex) + code.to_bytes(4, "little")
-
-
 def _toggle_bit(toggle: int) -> int:
     if toggle not in (0, 1):
-        raise _impossible(f"toggle {toggle} is impossible", "0 or 1")
-    return TOGGLE if toggle else 0
-
-
-def _one(node: int) -> int:
-    if node not in NODES:
-        raise _impossible(f"{node} is not a node id", "1 to 127", node)
-    return node
-
-
-def _addressee(node: int) -> int:
-    if node != BROADCAST and node not in NODES:
-        raise _impossible(f"{node} is not a node id", "1 to 127, or 0 for all nodes", node)
-    return node
-
-
-def _impossible(summary: str, expected: str, node: int | None = None) -> RequestError:
-    return RequestError(summary, expected=expected, advice="nothing was sent", node=node)
+        raise RequestError(f"toggle {toggle} is impossible", expected="0 or 1")
+    return toggle << 4
 
 
 # -- keys ------------------------------------------------------------------------------------------------------
 
 
+@dataclass(slots=True, eq=False)
 class Key:
     """What a reply has in common with its request beside the node: kind, index and sub-index, or a toggle.
 
@@ -275,13 +268,10 @@ class Key:
     and every segment. Equality is symmetric but not transitive, so all keys have one hash.
     """
 
-    __slots__ = ("index", "kind", "subindex", "toggle")
-
-    def __init__(self, kind: str, index: int = 0, subindex: int = 0, toggle: int = 0) -> None:
-        self.kind: Final = kind
-        self.index: Final = index
-        self.subindex: Final = subindex
-        self.toggle: Final = toggle
+    kind: str
+    index: int = 0
+    subindex: int = 0
+    toggle: int = 0
 
     def __hash__(self) -> int:
         return REPLY
@@ -290,21 +280,14 @@ class Key:
         if not isinstance(other, Key):
             return NotImplemented
         if self.kind == other.kind:
-            return (
-                self.index == other.index and self.subindex == other.subindex and self.toggle == other.toggle
-            )
-        if self.kind == "abort":
-            return self._refuses(other)
-        return other.kind == "abort" and other._refuses(self)
-
-    def _refuses(self, request: Key) -> bool:
-        if request.kind == "segment" or (self.index, self.subindex) == (0, 0):
+            mine, theirs = (self.index, self.subindex), (other.index, other.subindex)
+            return mine == theirs and self.toggle == other.toggle
+        abort, request = (self, other) if self.kind == "abort" else (other, self)
+        if abort.kind != "abort":
+            return False
+        if request.kind == "segment" or (abort.index, abort.subindex) == (0, 0):
             return True
-        return self.index == request.index and self.subindex in (0, request.subindex)
-
-    def __repr__(self) -> str:
-        what = self.toggle if self.kind == "segment" else f"0x{self.index:04X}:{self.subindex}"
-        return f"<Key {self.kind} {what}>"
+        return abort.index == request.index and abort.subindex in (0, request.subindex)
 
 
 def upload_due(node: int, index: int, subindex: int = 0) -> Expected:
@@ -319,7 +302,7 @@ def download_due(node: int, index: int, subindex: int = 0) -> Expected:
 
 def segment_due(node: int, toggle: int) -> Expected:
     """The reply to `encode_segment`."""
-    return Expected(node, Key("segment", toggle=int(toggle)), LENGTH)
+    return Expected(node, Key("segment", toggle=toggle), LENGTH)
 
 
 # -- abort codes -----------------------------------------------------------------------------------------------
@@ -374,8 +357,6 @@ def abort_text(code: int) -> str:
     meant = meant_code(code)
     if meant not in ABORTS:
         return f"unknown abort code 0x{code:08X}"
-    return (
-        ABORTS[code]
-        if meant == code
-        else f"byte-swapped abort 0x{code:08X}, meaning 0x{meant:08X}: {ABORTS[meant]}"
-    )
+    if meant != code:
+        return f"byte-swapped abort 0x{code:08X}, meaning 0x{meant:08X}: {ABORTS[meant]}"
+    return ABORTS[code]

@@ -8,10 +8,10 @@ from typing import Final
 from motorbus.core.access import readable_rows, writable_values
 from motorbus.core.register import Register, Storage, Value
 from motorbus.core.request import Effect
-from motorbus.errors import DeviceError
+from motorbus.errors import DeviceError, UnexpectedReply
 from motorbus.families.kst.driver.motion import send_target, setpoint, target
 from motorbus.families.kst.driver.node import Node
-from motorbus.families.kst.driver.requests import OtherSize, is_absent, read_register, write_register
+from motorbus.families.kst.driver.requests import is_absent, read_register, write_register
 from motorbus.families.kst.driver.storage import store
 
 METHODS: Final[Mapping[str, str]] = {
@@ -38,12 +38,11 @@ async def read_raw(node: Node, /, *names: str) -> dict[str, int]:
     """Objects as raw values by name; all that this servo has without a name. Raises as `read`."""
     found: dict[str, int] = {}
     for row in readable_rows(node.table, names):
+        request = read_register(node, row, int, reports_position=row.name == "present_position")
         try:
-            found[row.name] = await read_register(
-                node, row, int, reports_position=row.name == "present_position"
-            )
-        except (DeviceError, OtherSize) as error:
-            if names or (isinstance(error, DeviceError) and not is_absent(error)):
+            found[row.name] = await request
+        except (DeviceError, UnexpectedReply) as error:
+            if names or not (is_absent(error) or isinstance(error, UnexpectedReply)):
                 raise
     return found
 

@@ -9,15 +9,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from motorbus.core.family import IdChanged
-from motorbus.core.register import Register, Value
+from motorbus.core.register import Value
 from motorbus.core.request import ANY, EVERY_LANE, Effect, Priority, Request, Response, TimeoutClass
 from motorbus.core.setpoint import Setpoint
 from motorbus.core.steps import Emit, Exclusive
-from motorbus.errors import RequestError
+from motorbus.errors import RequestError, UnexpectedReply
 from motorbus.families.kst import sdo
 from motorbus.families.kst.driver.motion import Started, target
 from motorbus.families.kst.driver.node import DEFAULT, BusSettings, Node, checked_id, checked_ids
-from motorbus.families.kst.driver.requests import OtherSize, value_bytes
+from motorbus.families.kst.driver.requests import value_bytes
 from motorbus.families.kst.notifications import encode_start
 from motorbus.families.kst.profiles import SAVE, bit_rate_code
 
@@ -30,17 +30,16 @@ async def broadcast_read(name: str, settings: BusSettings = DEFAULT) -> dict[int
     """
     row = settings.profile.table[name]
     if not row.readable:
-        raise RequestError(f"{name} can only be written", advice="nothing was sent")
-    frame = sdo.encode_upload(sdo.BROADCAST, row.address, row.subindex or 0, extended=settings.extended)
+        raise RequestError(f"{name} can only be written")
     # Reserve the bus: a reply to a broadcast looks like a reply to a request to that node.
-    answer = await Exclusive(Request[Response](frame, ANY, lane=EVERY_LANE))
+    request = Request[Response](settings.upload(sdo.BROADCAST, row), ANY, lane=EVERY_LANE)
     values: dict[int, set[bytes]] = {}
-    for reply in answer.replies:
+    for reply in (await Exclusive(request)).replies:
         one = sdo.decode_reply(reply.data)
-        if one is not None and one.kind == "upload" and _is_about(row, one):
+        if one and one.kind == "upload" and (one.index, one.subindex) == (row.address, row.subindex):
             try:
                 values.setdefault(reply.lane, set()).add(value_bytes(Node(reply.lane, settings), row, one))
-            except OtherSize:
+            except UnexpectedReply:
                 continue
     return {node: row.to_value(row.decode(min(found))) for node, found in values.items() if len(found) == 1}
 
@@ -58,12 +57,12 @@ async def broadcast_position(
         raise RequestError(
             "a broadcast moves all servos on the bus, and none is named",
             expected="the ids of all servos on it",
-            advice="scan() lists them; nothing was sent",
+            advice="scan() lists them",
         )
     row = settings.profile.table["goal_position"]
     raw = target(Node(checked[0], settings), to)
-    limits = float(row.to_value(row.low)), float(row.to_value(row.high))
-    setpoints = tuple(Setpoint(node, "position", float(row.to_value(raw)), *limits) for node in checked)
+    value, low, high = (float(row.to_value(one)) for one in (raw, row.low, row.high))
+    setpoints = tuple(Setpoint(node, "position", value, low, high) for node in checked)
 
     async def start_and_move() -> tuple[int, ...]:
         if settings.must_start:
@@ -77,20 +76,19 @@ async def broadcast_position(
                 setpoints=setpoints,
             )
             await Emit(Started(sdo.BROADCAST, frame))
-        return await _write(settings, row, raw, setpoints)
+        return await _write(settings, "goal_position", raw, setpoints)
 
     return await Exclusive(start_and_move())
 
 
 async def broadcast_save(settings: BusSettings = DEFAULT) -> tuple[int, ...]:
     """Let all servos save, and wait for their flash; return the nodes that acknowledged, by the manual none."""
-    row = settings.profile.table["store"]
-    return await Exclusive(_write(settings, row, SAVE, reply_within=TimeoutClass.STORE))
+    return await Exclusive(_write(settings, "store", SAVE))
 
 
 async def broadcast_bit_rate(rate: int, settings: BusSettings = DEFAULT) -> tuple[int, ...]:
     """Give all servos another bit rate (bit/s), see `set_bit_rate`; return the nodes that acknowledged."""
-    return await Exclusive(_write(settings, settings.profile.table["bit_rate_code"], bit_rate_code(rate)))
+    return await Exclusive(_write(settings, "bit_rate_code", bit_rate_code(rate)))
 
 
 async def broadcast_node_id(
@@ -101,49 +99,26 @@ async def broadcast_node_id(
     if not force:
         raise RequestError(
             f"a broadcast would give every servo on this bus the id {new}",
-            cause="servos with one id answer together, and cannot be given different ids any more but one at a time",
-            advice="connect one servo and use provision(); force=True does it all the same; nothing was sent",
+            cause="servos with one id answer together, and can be given different ids only one at a time",
+            advice="connect one servo and use provision(), or say force=True",
         )
-
-    async def write() -> tuple[int, ...]:
-        await Emit(IdChanged(None, new))
-        return await _write(settings, settings.profile.table["node_id"], new)
-
-    return await Exclusive(write())
+    await Emit(IdChanged(None, new))
+    return await Exclusive(_write(settings, "node_id", new))
 
 
 async def _write(
-    settings: BusSettings,
-    row: Register,
-    raw: int,
-    setpoints: tuple[Setpoint, ...] = (),
-    *,
-    reply_within: TimeoutClass = TimeoutClass.REPLY,
+    settings: BusSettings, name: str, raw: int, setpoints: tuple[Setpoint, ...] = ()
 ) -> tuple[int, ...]:
-    frame = sdo.encode_download(
-        sdo.BROADCAST,
-        row.address,
-        row.subindex or 0,
-        row.encode(raw),
-        sized=settings.sized,
-        extended=settings.extended,
-    )
+    """Write an object of all servos; return the nodes that acknowledged."""
+    row = settings.profile.table[name]
     answer = await Request[Response](
-        frame,
+        settings.download(sdo.BROADCAST, row, raw),
         ANY,
         lane=EVERY_LANE,
         priority=Priority.CONTROL if row.effect is Effect.MOTION else Priority.CONFIGURATION,
         effect=row.effect,
         setpoints=setpoints,
-        reply_within=reply_within,
+        reply_within=TimeoutClass.STORE if name == "store" else TimeoutClass.REPLY,
     )
-    acknowledged = []
-    for reply in answer.replies:
-        one = sdo.decode_reply(reply.data)
-        if one is not None and one.kind == "download" and _is_about(row, one):
-            acknowledged.append(reply.lane)
-    return tuple(dict.fromkeys(acknowledged))
-
-
-def _is_about(row: Register, reply: sdo.SdoReply) -> bool:
-    return (reply.index, reply.subindex) == (row.address, row.subindex or 0)
+    acknowledgement = sdo.encode_download_reply(1, row.address, row.subindex or 0).data
+    return tuple(dict.fromkeys(reply.lane for reply in answer.replies if reply.data == acknowledgement))

@@ -12,13 +12,14 @@ from typing import Any, Final
 from motorbus.core.can_bits import least
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import AxisDriver, Explanation, Family, Found, Identity, Receiver, Stop
-from motorbus.core.request import ANY, EVERY_LANE, Effect, Priority, Request, Response, TimeoutClass
+from motorbus.core.register import changed
+from motorbus.core.request import ANY, EVERY_LANE, Priority, Request, Response, TimeoutClass
 from motorbus.core.steps import Procedure, Runnable
 from motorbus.families.kst import sdo
 from motorbus.families.kst.driver import feedback, identity, motion
-from motorbus.families.kst.driver.motion import Promise
+from motorbus.families.kst.driver.motion import Promise, hold
 from motorbus.families.kst.driver.node import DEFAULT, Node
-from motorbus.families.kst.driver.requests import FIRMWARE, GOAL, NODE_ID, POSITION, refused
+from motorbus.families.kst.driver.requests import acknowledged, decoded, upload
 from motorbus.families.kst.driver.scan import scan
 from motorbus.families.kst.driver.storage import LISTEN
 from motorbus.families.kst.driver.stream import open_stream
@@ -100,31 +101,34 @@ class KstDriver:
 
         True if the reply names that object and, for the id, has a valid one (before a restart not that of the node).
         """
+        servo = Node(node, self.settings)
         turn, kind = divmod(attempt, 3)
-        index, subindex = ((NODE_ID, 0), (FIRMWARE, 0), (NODE_ID, 1 + turn % 254))[kind]
+        node_id = servo.table["node_id"]
+        rows = node_id, servo.table["firmware_version"], changed(node_id, subindex=1 + turn % 254)
+        row = rows[kind]
 
         def decode(answer: Response) -> bool:
-            reply = sdo.decode_reply(answer.replies[0].data) if answer.replies else None
-            if reply is None or (reply.index, reply.subindex) != (index, subindex):
-                return False
-            if reply.kind == "upload" and (index, subindex) == (NODE_ID, 0):
-                return reply.data[0] in sdo.NODES
-            return reply.kind in ("upload", "upload-start", "abort")
+            for reply in decoded(answer):
+                if (reply.index, reply.subindex) == (row.address, row.subindex) and reply.kind != "download":
+                    return kind != 0 or reply.kind != "upload" or reply.data[0] in sdo.NODES
+            return False
 
-        return Request(
-            sdo.encode_upload(node, index, subindex, extended=self.settings.extended),
-            (sdo.upload_due(node, index, subindex),),
-            decode,
-            lane=node,
-            repeatable=True,
-        )
+        return upload(servo, row, decode)
 
     def stop(self, nodes: Mapping[int, Response | None]) -> Stop:
         """Target := position for each node whose position is known; the others are asked for it."""
         requests: list[Request[Response]] = []
         for node in (Node(number, self.settings) for number in sorted(nodes)):
-            here = _position(nodes[node.node])
-            requests += (_ask_position(node),) if here is None else _hold_at(node, here)
+            row, answer = node.table["present_position"], nodes[node.node]
+            replies = decoded(answer) if answer is not None else []
+            here = [
+                reply.data[:2] for reply in replies if reply.kind == "upload" and reply.index == row.address
+            ]
+            if here:
+                requests += hold(node, row.decode(here[0]), Priority.STOP)
+            else:
+                decode = acknowledged(node, row)
+                requests.append(upload(node, row, decode, priority=Priority.STOP, reports_position=True))
         return Stop(tuple(requests), Promise.HOLD_REQUESTED.value)
 
     def identify(self, node: int) -> Runnable[Identity]:
@@ -145,55 +149,3 @@ class KstDriver:
         from motorbus.families.kst.decode import decode
 
         return decode(data, self.settings.profile)
-
-
-def _ask_position(node: Node) -> Request[Response]:
-    return Request(
-        sdo.encode_upload(node.node, POSITION, extended=node.settings.extended),
-        (sdo.upload_due(node.node, POSITION),),
-        _acknowledged(node, POSITION),
-        lane=node.node,
-        priority=Priority.STOP,
-        repeatable=True,
-        reports_position=True,
-    )
-
-
-def _hold_at(node: Node, here: bytes) -> tuple[Request[Response], ...]:
-    """Outside the range, where the servo may refuse the position, the end of the range is sent first."""
-    raw, limit = int.from_bytes(here, "little", signed=True), node.profile.limit
-    positions = dict.fromkeys((max(-limit, min(raw, limit)), raw))
-    return tuple(_hold(node, position) for position in positions)
-
-
-def _hold(node: Node, raw: int) -> Request[Response]:
-    data, settings = raw.to_bytes(2, "little", signed=True), node.settings
-    return Request(
-        sdo.encode_download(node.node, GOAL, 0, data, sized=settings.sized, extended=settings.extended),
-        (sdo.download_due(node.node, GOAL),),
-        _acknowledged(node, GOAL),
-        lane=node.node,
-        priority=Priority.STOP,
-        effect=Effect.MOTION,
-        repeatable=True,
-    )
-
-
-def _position(answer: Response | None) -> bytes | None:
-    """The two bytes of the position in a response, None without."""
-    reply = sdo.decode_reply(answer.replies[0].data) if answer is not None and answer.replies else None
-    if reply is None or reply.kind != "upload" or reply.index != POSITION or len(reply.data) < 2:
-        return None
-    return reply.data[:2]
-
-
-def _acknowledged(node: Node, index: int) -> Any:
-    """A decoder that gives the response and raises DeviceError for an abort."""
-
-    def decode(answer: Response) -> Response:
-        reply = sdo.decode_reply(answer.replies[0].data) if answer.replies else None
-        if reply is not None and reply.kind == "abort":
-            raise refused(node, reply, index, 0)
-        return answer
-
-    return decode

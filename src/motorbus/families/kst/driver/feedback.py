@@ -6,18 +6,13 @@ The manual reads the status by the same frame as the position (commands 6 and 7)
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Final, NamedTuple, TypeVar
+from typing import Final, NamedTuple
 
 from motorbus.core.family import Health, State
-from motorbus.core.register import Register
-from motorbus.core.request import Request
+from motorbus.core.request import Request, Response
 from motorbus.families.kst import profiles
-from motorbus.families.kst.driver.node import Node, lacking
-from motorbus.families.kst.driver.requests import read_object, read_register
-from motorbus.families.kst.sdo import SdoReply
-
-T = TypeVar("T")
+from motorbus.families.kst.driver.node import Node, feature_row
+from motorbus.families.kst.driver.requests import accepted, read_register, upload
 
 SAME_FRAME: Final = (
     "the manual's command 7 is the same frame as its command 6, read position: this device may be returning the "
@@ -42,58 +37,43 @@ class Status(NamedTuple):
 
 def position(node: Node) -> Request[float]:
     """Present position, rad."""
-    return _kept(node, "position", _position)
-
-
-def _kept(node: Node, name: str, make: Callable[[Node], Request[T]]) -> Request[T]:
-    if name not in node.kept:
-        node.kept[name] = make(node)
-    return node.kept[name]
-
-
-def _position(node: Node) -> Request[float]:
-    row = node.table["present_position"]
-    return read_register(node, row, lambda raw: float(row.to_value(raw)), reports_position=True)
+    if node.reading is None:
+        row = node.table["present_position"]
+        node.reading = read_register(node, row, lambda raw: float(row.to_value(raw)), reports_position=True)
+    return node.reading
 
 
 def status(node: Node) -> Request[RawStatus | Status]:
     """Current (A) and temperature (°C); by the profile `kst` the two raw bytes of command 7, with a warning."""
-    return raw_status(node) if node.profile.status_row is None else _decoded_status(node)
-
-
-def raw_status(node: Node) -> Request[RawStatus]:
-    """Command 7 of the manual with any profile: the bytes may be a position."""
+    if node.profile.status_row is not None:
+        return _status(node)
     row = node.table["present_position"]
 
-    def take(reply: SdoReply) -> RawStatus:
-        return RawStatus(*(reply.data + bytes(2))[:2])
+    def decode(answer: Response) -> RawStatus:
+        data = accepted(node, row, answer).data.ljust(2, b"\0")
+        return RawStatus(data[0], data[1])
 
-    return read_object(node, row.address, row.subindex or 0, take)
+    return upload(node, row, decode)
 
 
-def _decoded_status(node: Node) -> Request[Status]:
+def _status(node: Node) -> Request[Status]:
+    """Raises RequestError where the profile has no status object."""
+    row = feature_row(node, "status", "current and temperature")
+
     def take(raw: int) -> Status:
         return Status(profiles.current(node.profile, raw), float(profiles.temperature(raw)))
 
-    return _kept(node, "status", lambda same: read_register(same, _status_row(same), take))
+    return read_register(node, row, take)
 
 
-def current(node: Node) -> Request[float]:
+async def current(node: Node) -> float:
     """Supply current, A. Raises RequestError where the profile has no status object."""
-
-    def take(raw: int) -> float:
-        return profiles.current(node.profile, raw)
-
-    return _kept(node, "current", lambda same: read_register(same, _status_row(same), take))
+    return (await _status(node)).current
 
 
-def temperature(node: Node) -> Request[float]:
+async def temperature(node: Node) -> float:
     """Temperature, °C. Raises RequestError where the profile has no status object."""
-
-    def take(raw: int) -> float:
-        return float(profiles.temperature(raw))
-
-    return _kept(node, "temperature", lambda same: read_register(same, _status_row(same), take))
+    return (await _status(node)).temperature
 
 
 async def telemetry(node: Node) -> State:
@@ -102,7 +82,7 @@ async def telemetry(node: Node) -> State:
     at = node.at
     if node.profile.status_row is None:
         return State(at=at, position=here, alarm=node.alarm)
-    now = await _decoded_status(node)
+    now = await _status(node)
     return State(at=at, position=here, current=now.current, temperature=now.temperature, alarm=node.alarm)
 
 
@@ -112,25 +92,17 @@ def health(node: Node) -> Request[Health]:
     `restarts` counts the boot messages (CiA 301) received from the node. No source says that these servos send one: a
     servo that does not restarts unnoticed, or is silent for a while.
     """
-    row, state = node.profile.status_row, node.settings.state
+    profile, bus = node.profile, node.settings.state
+    has_status = profile.status_row is not None
+    row = profile.status_row or node.table["present_position"]
 
     def take(raw: int) -> Health:
-        restarts = None if state is None else state.boots[node.node]
-        if row is None:
-            here = float(node.table["present_position"].to_value(raw))
-            return Health(State(at=node.at, position=here, alarm=node.alarm), restarts=restarts)
-        sample = State(
-            at=node.at,
-            current=profiles.current(node.profile, raw),
-            temperature=float(profiles.temperature(raw)),
-            alarm=node.alarm,
-        )
-        return Health(sample, restarts=restarts)
+        state = State(at=node.at, alarm=node.alarm)
+        if has_status:
+            now = profiles.current(profile, raw), float(profiles.temperature(raw))
+            state = state._replace(current=now[0], temperature=now[1])
+        else:
+            state = state._replace(position=float(row.to_value(raw)))
+        return Health(state, restarts=None if bus is None else bus.boots[node.node])
 
-    return read_register(node, row or node.table["present_position"], take, reports_position=row is None)
-
-
-def _status_row(node: Node) -> Register:
-    if node.profile.status_row is None:
-        raise lacking(node, "current and temperature", "status")
-    return node.profile.status_row
+    return read_register(node, row, take, reports_position=not has_status)

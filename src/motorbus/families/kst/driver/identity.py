@@ -15,28 +15,22 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 from motorbus.core.family import IdChanged, Identity
-from motorbus.core.register import Register
-from motorbus.core.request import Notification, Priority, Request
+from motorbus.core.request import ANY, Notification, Priority, Request, Response
 from motorbus.core.steps import Emit, Exclusive, WaitFor, catch, gather
 from motorbus.errors import DeviceError, MotorbusError, NoReply, RequestError, VerificationFailed
-from motorbus.families.kst import sdo
 from motorbus.families.kst.driver.node import Node, checked_id, hexadecimal
 from motorbus.families.kst.driver.requests import (
-    FIRMWARE,
-    NODE_ID,
-    POSITION,
     ask_presence,
-    collect,
+    decoded,
     is_absent,
     read_all_bytes,
     read_register,
     write_register,
 )
 from motorbus.families.kst.profiles import BIT_RATES, bit_rate_code, version_text
-from motorbus.families.kst.sdo import SdoReply
 
 ROUNDS: Final = 3
-OBJECTS: Final = (NODE_ID, POSITION, FIRMWARE)
+OBJECTS: Final = ("node_id", "present_position", "firmware_version")
 """Two servos may agree on the id, and seldom on position and version."""
 ERROR_TIME: Final = 0.5
 """s in which bus errors count; about the time that all reads of a survey take."""
@@ -53,7 +47,7 @@ async def ping(node: Node) -> bool:
 
 async def identify(node: Node) -> Identity:
     """The profile as model, the version ("unknown" when the servo refuses it), and the id that it reads back."""
-    reads_back = await _read_if_allowed(node, node.table["node_id"])
+    reads_back = await _read_id(node)
     try:
         firmware = await version(node)
     except DeviceError:
@@ -71,26 +65,22 @@ async def version(node: Node) -> str:
 
     Raises DeviceError when the servo has none of these objects.
     """
-    first: DeviceError | None = None
-    for row in node.profile.version_rows:
+    *rows, last = node.profile.version_rows
+    for row in rows:
         try:
             return version_text(await read_all_bytes(node, row))
         except DeviceError as error:
             if not is_absent(error):
                 raise
-            first = first or error
-    assert first is not None
-    raise first
+    return version_text(await read_all_bytes(node, last))
 
 
-async def _read_if_allowed(node: Node, row: Register) -> int | None:
-    """The raw value, or None when the servo refuses it."""
-    found = await catch(read_register(node, row, int))
-    if isinstance(found, DeviceError):
+async def _read_id(node: Node) -> int | None:
+    """The id that it reads back, or None when the servo refuses it."""
+    try:
+        return await node_id(node)
+    except DeviceError:
         return None
-    if isinstance(found, MotorbusError):
-        raise found
-    return found
 
 
 # -- node id ---------------------------------------------------------------------------------------------------
@@ -111,7 +101,7 @@ async def set_node_id(node: Node, new: int) -> None:
     checked_id(new)
     if not await Exclusive(answers_alone(node)):
         await ask_presence(node)  # raises NoReply
-    if new != node.node and (await look(Node(new, node.settings))).answered:
+    if new != node.node and (await look(Node(new, node.settings))).replies:
         raise id_taken(node.node, new)
     await write_node_id(node, new)
 
@@ -121,21 +111,19 @@ def id_taken(old: int, new: int) -> RequestError:
     return RequestError(
         f"the id {hexadecimal(new)} is taken: a servo answers as it beside {hexadecimal(old)}",
         cause="after a restart both would answer to one id, and neither could be addressed alone",
-        advice="choose a free id, or take that servo off the bus; nothing was written",
+        advice="choose a free id, or take that servo off the bus",
         node=new,
     )
 
 
 async def write_node_id(node: Node, new: int) -> None:
     """As `set_node_id`, without the checks of both ids."""
-    row = node.table["node_id"]
     await Emit(IdChanged(node.node, new))
-    await write_register(node, row, new, priority=Priority.CONFIGURATION)
-    found = await _read_if_allowed(node, row)
+    await write_register(node, node.table["node_id"], new, priority=Priority.CONFIGURATION)
+    found = await _read_id(node)
     if found not in (None, new, node.node):  # some servos read back the id in force
         raise VerificationFailed(
             f"node {node.node} was set to {new} and reads back {found}",
-            sent=bytes((new,)),
             expected=f"{new}, or {node.node} until the restart",
             cause="two servos with one id, or another program",
             advice="do not save; restart it, and the old id is in force again",
@@ -148,14 +136,13 @@ async def write_node_id(node: Node, new: int) -> None:
 
 async def bit_rate(node: Node) -> int | None:
     """The rate (bit/s) after the next restart; None where the servo does not report it: the manual has no read."""
-    try:
-        code = await read_register(node, node.table["bit_rate_code"], int)
-    except NoReply:
+    code = await catch(read_register(node, node.table["bit_rate_code"], int))
+    if isinstance(code, NoReply):
         await ask_presence(node)  # raises NoReply when there is no servo
         return None
-    except DeviceError as error:
-        if not is_absent(error):
-            raise
+    if isinstance(code, MotorbusError):
+        if not is_absent(code):
+            raise code
         return None
     return BIT_RATES.get(code)
 
@@ -165,79 +152,71 @@ def set_bit_rate(node: Node, rate: int) -> Request[None]:
 
     Raises RequestError for a rate that these servos do not have.
     """
-    return write_register(
-        node, node.table["bit_rate_code"], bit_rate_code(rate), priority=Priority.CONFIGURATION
-    )
+    row = node.table["bit_rate_code"]
+    return write_register(node, row, bit_rate_code(rate), priority=Priority.CONFIGURATION)
 
 
 # -- one servo or two ------------------------------------------------------------------------------------------
 
 
-class Presence(NamedTuple):
-    """Result of reading an id: time (s), most replies to one request, the id read back, bus errors meanwhile.
+class Look(NamedTuple):
+    """Result of one read: the node, the number of replies, the id read back (None: not read), and the time (s)."""
 
-    `torn`: the id came every time and the position never, as when two unequal replies break each other.
-    """
-
+    node: int
+    replies: int
+    reads_back: int | None
     at: float
-    most: int
-    reads_back: int | None = None
-    errors: bool = False
-    torn: bool = False
-
-    @property
-    def answered(self) -> bool:
-        return self.most > 0
-
-    @property
-    def several(self) -> bool:
-        """More than one servo replied, or some replies broke. If all broke, the bit rate may be wrong."""
-        return self.most > 1 or self.torn or (self.errors and self.answered)
 
 
-def look(node: Node, index: int = NODE_ID) -> Request[Presence]:
+def look(node: Node, name: str = "node_id") -> Request[Look]:
     """Read an object once and count the replies; silence is a result."""
+    row = node.table[name]
 
-    def take(replies: list[SdoReply], at: float) -> Presence:
-        mine = [reply for reply in replies if reply.index in (index, 0)]
-        ids = [reply.data[0] for reply in mine if reply.kind == "upload" and index == NODE_ID]
-        return Presence(at, len(mine), ids[0] if ids else None)
+    def decode(answer: Response) -> Look:
+        replies = [reply for reply in decoded(answer) if reply.index in (row.address, 0)]
+        ids = [reply.data[0] for reply in replies if reply.kind == "upload" and name == "node_id"]
+        return Look(node.node, len(replies), ids[0] if ids else None, answer.at)
 
-    return collect(node, sdo.encode_upload(node.node, index, extended=node.settings.extended), take)
+    return Request(node.settings.upload(node.node, row), ANY, decode, lane=node.node)
 
 
-async def survey(node: Node) -> Presence:
+class Survey(NamedTuple):
+    """Whether a servo answers, and the evidence that a second one does ("": none)."""
+
+    answered: bool
+    second: str
+
+
+async def survey(node: Node) -> Survey:
     """Read several objects several times and watch for bus errors. Run it with the bus reserved."""
-    found, error = await gather(_look_often(node), WaitFor(is_bus_error, ERROR_TIME))
-    return found._replace(errors=error is not None)
 
+    async def read_often() -> dict[str, list[int]]:
+        counts: dict[str, list[int]] = {name: [] for name in OBJECTS}
+        for name in OBJECTS * ROUNDS:
+            counts[name].append((await look(node, name)).replies)
+        return counts
 
-async def _look_often(node: Node) -> Presence:
-    most, reads_back = 0, None
-    counts = dict.fromkeys(OBJECTS, 0)
-    for index in OBJECTS * ROUNDS:
-        found = await look(node, index)
-        most = max(most, found.most)
-        counts[index] += found.answered
-        reads_back = found.reads_back or reads_back
-    torn = counts[NODE_ID] == ROUNDS and not counts[POSITION]
-    return Presence(found.at, most, reads_back, torn=torn)
+    counts, error = await gather(read_often(), WaitFor(is_bus_error, ERROR_TIME))
+    most = max(map(max, counts.values()))
+    second = ""
+    if most > 1:
+        second = f"{most} answers to one request"
+    elif most and error is not None:
+        second = "bus errors whenever it is read"
+    elif all(counts["node_id"]) and not any(counts["present_position"]):
+        second = "its id comes every time, its position never"
+    return Survey(most > 0, second)
 
 
 async def answers_alone(node: Node) -> bool:
     """Whether a servo answers to this id. Raises RequestError when two do. Run it with the bus reserved."""
     found = await survey(node)
-    if not found.several:
+    if not found.second:
         return found.answered
-    signs = "its id comes every time, its position never"
-    if found.most > 1:
-        signs = f"{found.most} answers to one request"
-    elif found.errors:
-        signs = "bus errors whenever it is asked"
     raise RequestError(
-        f"two servos answer as {hexadecimal(node.node)}: {signs}",
+        f"two servos answer as {hexadecimal(node.node)}: {found.second}",
         cause="servos are shipped with one id, and both obey what is sent to it; or the bus is disturbed",
-        advice="connect one servo at a time, provision it, then the next; nothing was written",
+        advice="connect one servo at a time, provision it, then the next",
         node=node.node,
     )
 

@@ -16,22 +16,20 @@ from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import State
 from motorbus.core.interrupted import Moving, stopped_if_interrupted
 from motorbus.core.register import Register, changed
-from motorbus.core.request import Effect, Priority, Request
+from motorbus.core.request import Effect, Priority, Request, Response
 from motorbus.core.setpoint import Setpoint, Stays, torque_on
 from motorbus.core.steps import Emit
 from motorbus.errors import DeviceError, LimitExceeded, RequestError, Stalled
 from motorbus.families.kst import sdo
 from motorbus.families.kst.driver.feedback import position
 from motorbus.families.kst.driver.node import Node, check_above_zero
-from motorbus.families.kst.driver.requests import is_absent, read_register, write_register
+from motorbus.families.kst.driver.requests import acknowledged, is_absent, read_register, write_register
 from motorbus.families.kst.notifications import encode_start
 
 TOLERANCE: Final = 0.02
 """rad, about a degree. # assumption: no source gives the error under load."""
 SLOWEST: Final = 1.0
 """rad/s that each servo reaches; the default timeout of a move is computed with it. # assumption"""
-TOO_FAR: Final = frozenset((0x0609_0030, 0x0609_0031, 0x0609_0032))
-"""Abort codes of a position outside the range."""
 
 
 class Promise(Enum):
@@ -91,15 +89,14 @@ async def wait_arrival(node: Node, goal: float, tolerance: float, timeout: float
         return State(position=await position(node), at=node.at)
 
     async def stalled(state: State) -> Stalled:
-        assert state.position is not None
+        here = state.position or 0.0
         alarm = f"; alarms: {', '.join(node.alarm)}" if node.alarm else ""
         return Stalled(
-            f"node {node.node} stands at {state.position:.4g} rad, {abs(state.position - goal):.4g} rad off its goal "
-            f"{goal:.4g} rad{alarm}",
+            f"node {node.node} stands at {here:.4g} rad, {abs(here - goal):.4g} rad off its goal{alarm}",
             expected=f"within {tolerance:.4g} rad",
-            cause="something blocks it, the load is too heavy, its supply is weak, or its make must be started first",
-            advice="clear the way, or give a wider tolerance; it still pushes towards its goal: stop() ends that. "
-            "A servo that never moves may be of another make: profile=xqpower or nmt=standard starts it",
+            cause="something blocks it, its load is too heavy, its supply is weak, or its make must be started first",
+            advice="clear the way, or give a wider tolerance; it still pushes: stop() ends that. A servo that never "
+            "moves may need profile=xqpower or nmt=standard",
             node=node.node,
         )
 
@@ -116,8 +113,6 @@ def target(node: Node, to: float) -> int:
     try:
         return node.raw(node.table["goal_position"], to)
     except RequestError as error:
-        if isinstance(to, bool) or not isinstance(to, int | float):
-            raise
         raise LimitExceeded(
             f"node {node.node}: {error.summary}", expected=error.expected, advice=error.advice, node=node.node
         ) from None
@@ -125,8 +120,8 @@ def target(node: Node, to: float) -> int:
 
 async def setpoint(node: Node, raw: int) -> Setpoint:
     """This raw target as a setpoint, with the limits of the servo for the gate."""
-    known = await limits(node)
-    return Setpoint(node.node, "position", float(node.table["goal_position"].to_value(raw)), *known)
+    low, high = await limits(node)
+    return Setpoint(node.node, "position", float(node.table["goal_position"].to_value(raw)), low, high)
 
 
 async def send_target(node: Node, goal: Setpoint) -> None:
@@ -140,50 +135,60 @@ async def send_target(node: Node, goal: Setpoint) -> None:
 async def start(node: Node, goal: Setpoint | None = None) -> None:
     """Start this servo and report it. With a `goal` the gate checks the start like that goal."""
     request = start_request(node, True, goal)
-    assert isinstance(request.wire, CanFrame)
     await request
+    assert isinstance(request.wire, CanFrame)
     await Emit(Started(node.node, request.wire))
 
 
-def start_request(node: Node, on: bool, goal: Setpoint | None = None) -> Request[None]:
+def start_request(node: Node, on: bool, goal: Setpoint | None = None) -> Request[object]:
     """Start or stop, in the form of this bus; it has no reply.
 
     Where it lets a servo move it has the effect of torque on, with a `goal` that of motion.
     """
     form = node.settings.nmt
     frame = encode_start(form, node.node, on, extended=node.settings.extended)
-    effect = Effect.NONE if form != "standard" else Effect.MOTION if goal else Effect.TORQUE
-    setpoints = () if form != "standard" or not on else (goal or torque_on(node.node),)
-    return Request(
-        frame, (), _no_value, lane=node.node, priority=Priority.CONTROL, effect=effect, setpoints=setpoints
-    )
-
-
-def _no_value(_: object) -> None:
-    return None
+    effect = Effect.NONE
+    setpoints: tuple[Setpoint, ...] = ()
+    if node.settings.must_start:
+        effect = Effect.MOTION if goal else Effect.TORQUE
+        setpoints = (goal or torque_on(node.node),) if on else ()
+    return Request(frame, (), lane=node.node, priority=Priority.CONTROL, effect=effect, setpoints=setpoints)
 
 
 async def stop(node: Node) -> Promise:
     """Make the present position the target. Torque stays on: these servos have no switch for it."""
     here = await read_register(node, node.table["present_position"], int, reports_position=True)
+    requests = hold(node, here)
     try:
-        await _hold(node, here)
-    except DeviceError as error:
-        if sdo.meant_code(error.code) not in TOO_FAR or abs(here) <= node.profile.limit:
+        await requests[-1]
+    except DeviceError:
+        if len(requests) == 1:
             raise
-        await _hold(node, max(-node.profile.limit, min(here, node.profile.limit)))
+        await requests[0]
     return Promise.HOLD_REQUESTED
 
 
-def _hold(node: Node, raw: int) -> Request[None]:
-    """Target := this position, also outside the range of the row, because the servo is there."""
-    row = node.table["goal_position"]
-    value = float(row.to_value(raw))
-    reach = 1 << 8 * row.size - 1
-    unlimited = changed(row, low=-reach, high=reach - 1)
-    return write_register(
-        node, unlimited, raw, (Setpoint(node.node, "position", value, value, value, Stays.STILL),)
-    )
+def hold(node: Node, here: int, priority: Priority = Priority.CONTROL) -> list[Request[Response]]:
+    """The requests that make this position (raw) the target; outside the range, where a servo may refuse it, the end
+    of the range comes first.
+    """
+    limit, row = node.profile.limit, node.table["goal_position"]
+    unlimited = changed(row, low=-0x8000, high=0x7FFF)
+    requests = []
+    for raw in dict.fromkeys((max(-limit, min(here, limit)), here)):
+        value = float(row.to_value(raw))
+        request = Request(
+            node.settings.download(node.node, unlimited, raw),
+            (sdo.download_due(node.node, row.address),),
+            acknowledged(node, row),
+            lane=node.node,
+            priority=priority,
+            effect=Effect.MOTION,
+            setpoints=(Setpoint(node.node, "position", value, value, value, Stays.STILL),),
+            repeatable=True,
+        )
+        requests.append(request)
+    return requests
 
 
 async def limits(node: Node) -> tuple[float, float]:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from math import inf
 from typing import Any, Final
 
-from motorbus.core.register import Register, RegisterMap, Value
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.register import Register, RegisterMap, Value, is_number, shown
 from motorbus.core.request import Request
 from motorbus.errors import RequestError
+from motorbus.families.kst import sdo
 from motorbus.families.kst.notifications import BusState
 from motorbus.families.kst.profiles import PROFILES, Profile, to_raw
-from motorbus.families.kst.sdo import NODES
 
 ID_FORMATS: Final = ("std", "ext")
 SIZED: Final = ("no", "yes")
@@ -30,10 +31,10 @@ class BusSettings:
 
     def __init__(
         self,
-        profile: object = "kst",
-        id_format: object = "std",
-        sized: object = "no",
-        nmt: object = "profile",
+        profile: str = "kst",
+        id_format: str = "std",
+        sized: str | bool = "no",
+        nmt: str = "profile",
         state: BusState | None = None,
     ) -> None:
         if isinstance(sized, bool):
@@ -41,36 +42,37 @@ class BusSettings:
         self.profile: Final[Profile] = PROFILES[_choice("profile", profile, PROFILES)]
         self.extended: Final = _choice("id_format", id_format, ID_FORMATS) == "ext"
         self.sized: Final = _choice("sized", sized, SIZED) == "yes"
-        self.nmt_setting: Final = _choice("nmt", nmt, NMT)
-        self.nmt: Final = self.profile.nmt if self.nmt_setting == "profile" else self.nmt_setting
+        form = _choice("nmt", nmt, NMT)
+        self.nmt: Final = self.profile.nmt if form == "profile" else form
         self.state: Final = state
+        self._given: Final = {"profile": profile, "id_format": id_format, "sized": sized, "nmt": nmt}
 
-    def replace(self, **changed: object) -> BusSettings:
+    def replace(self, **changed: Any) -> BusSettings:
         """These settings with some replaced; the state is shared unless it is replaced."""
-        own: dict[str, Any] = {
-            "profile": self.profile.name,
-            "id_format": "ext" if self.extended else "std",
-            "sized": self.sized,
-            "nmt": self.nmt_setting,
-            "state": self.state,
-        }
-        return BusSettings(**own | changed)
+        return BusSettings(**{**self._given, "state": self.state, **changed})
 
     @property
     def must_start(self) -> bool:
         """Servos ignore positions until they are started."""
         return self.nmt == "standard"
 
+    def upload(self, node: int, row: Register) -> CanFrame:
+        """The request that reads this object of one servo or of all (0)."""
+        return sdo.encode_upload(node, row.address, row.subindex or 0, extended=self.extended)
 
-def _choice(name: str, value: object, choices: tuple[str, ...] | Mapping[str, object]) -> str:
+    def download(self, node: int, row: Register, raw: int) -> CanFrame:
+        """The request that writes this object of one servo or of all (0). Raises RequestError outside its range."""
+        data, subindex = row.encode(raw), row.subindex or 0
+        return sdo.encode_download(
+            node, row.address, subindex, data, sized=self.sized, extended=self.extended
+        )
+
+
+def _choice(name: str, value: object, choices: Iterable[str]) -> str:
     word = str(value).lower()
     if word in choices:
         return word
-    raise RequestError(
-        f"{name}={value}: there is no such {name.replace('_', ' ')}",
-        expected=f"one of {', '.join(choices)}",
-        advice="nothing was sent",
-    )
+    raise RequestError(f"{name}={value} is not possible", expected=f"one of {', '.join(choices)}")
 
 
 DEFAULT: Final = BusSettings()
@@ -84,7 +86,7 @@ class Node:
     `limits`     travel limits (rad) as last read; None: not read yet
     `unsaved`    names of rows that were written here and may not be saved
     `last_move`  identifies its latest move
-    `kept`       requests that are made once and run again, by name
+    `reading`    the request of its position, which is made once
     """
 
     def __init__(self, node: int, settings: BusSettings = DEFAULT) -> None:
@@ -94,7 +96,7 @@ class Node:
         self.at = -inf
         self.unsaved: set[str] = set()
         self.last_move: object = None
-        self.kept: Final[dict[str, Request[Any]]] = {}
+        self.reading: Request[float] | None = None
 
     @property
     def profile(self) -> Profile:
@@ -121,30 +123,35 @@ class Node:
 
         Raises RequestError for a value that is not finite, or an angle outside the range of the row.
         """
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise RequestError(
-                f"{row.name}: {value!r} is not a number",
-                advice="give a number; nothing was sent",
-                node=self.node,
-            )
-        try:
-            return to_raw(self.profile, value, row.name) if row.unit == "rad" else row.to_raw(value)
-        except OverflowError:
-            raise RequestError(
-                f"{row.name}: this number is far out of range",
-                advice="give an angle inside the range; nothing was sent",
-                node=self.node,
-            ) from None
+        if row.unit == "rad" and is_number(value):
+            return to_raw(self.profile, value, row.name)
+        return row.to_raw(value)
+
+
+def feature_row(node: Node, name: str, feature: str) -> Register:
+    """The object that this feature needs.
+
+    Raises RequestError, with the profiles that have it, where the profile of this servo has not.
+    """
+    if name in node.table:
+        return node.table[name]
+    having = [profile.name for profile in PROFILES.values() if name in profile.table]
+    raise RequestError(
+        f"node {node.node}: the profile {node.profile.name} has no {feature}",
+        expected=f"a servo of the profile {' or '.join(having)}",
+        advice=f"if this servo has it, choose its profile, as in kst:PORT,profile={having[0]}",
+        node=node.node,
+    )
 
 
 def checked_id(node: int) -> int:
     """The id of one servo. Raises RequestError for anything else, also for 0 (all servos)."""
-    if isinstance(node, int) and not isinstance(node, bool) and node in NODES:
+    if isinstance(node, int) and not isinstance(node, bool) and node in sdo.NODES:
         return node
     raise RequestError(
-        f"{node!r} is not the id of a servo" + (": 0 addresses all servos" if node == 0 else ""),
-        expected="1 to 127",
-        advice="name one servo; `motorbus scan BUS` lists them; nothing was sent",
+        f"{shown(node)} is not the id of a servo",
+        expected="1 to 127 (0 addresses all servos)",
+        advice="`motorbus scan BUS` lists the servos",
     )
 
 
@@ -158,24 +165,9 @@ def hexadecimal(node: int) -> str:
     return f"0x{node:02X} ({node})"
 
 
-def lacking(node: Node, what: str, row: str) -> RequestError:
-    """The error for a feature that the profile of this node lacks; `row` is the object that it needs."""
-    having = [profile.name for profile in PROFILES.values() if row in profile.table]
-    manual = "the KST CAN protocol manual does not have it; newer firmware and other makers do"
-    return RequestError(
-        f"node {node.node}: the profile {node.profile.name} has no {what}",
-        expected=f"a servo of the profile {' or '.join(having)}",
-        cause=manual if node.profile.name == "kst" else "no source says that these servos have it",
-        advice=f"if this servo has it, choose its profile, as in kst:PORT,profile={having[0]}; nothing was sent",
-        node=node.node,
-    )
-
-
 def check_above_zero(name: str, value: object, unit: str, *, node: int | None = None) -> None:
     """Raise RequestError unless this is a finite number above 0."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < inf:
+    if not (is_number(value) and value > 0):
         raise RequestError(
-            f"{name} {value!r} is not a finite number above 0",
-            advice=f"give it in {unit}; nothing was sent",
-            node=node,
+            f"{name} {shown(value)} is not a finite number above 0", expected=f"a number in {unit}", node=node
         )

@@ -14,14 +14,12 @@ from typing import Final
 
 from motorbus.core import verify
 from motorbus.core.register import Register
-from motorbus.core.request import Effect, Priority, Request, TimeoutClass
-from motorbus.core.steps import Exclusive, Sleep
+from motorbus.core.request import ANY, Effect, Priority, Request, Response, TimeoutClass
+from motorbus.core.steps import Exclusive
 from motorbus.errors import VerificationFailed
-from motorbus.families.kst import sdo
 from motorbus.families.kst.driver.node import Node
-from motorbus.families.kst.driver.requests import STORE, collect, read_register, refused, write_register
+from motorbus.families.kst.driver.requests import decoded, read_register, refused, write_register
 from motorbus.families.kst.profiles import SAVE
-from motorbus.families.kst.sdo import SdoReply
 
 LISTEN: Final = 0.020
 """s after a save in which an acknowledgement or an abort is accepted; the manual says that neither comes."""
@@ -34,29 +32,21 @@ def save(node: Node) -> Request[None]:
     DeviceError. Whether the values are stored shows after a restart only.
     """
     row = node.table["store"]
-    index, subindex = row.address, row.subindex or 0
 
-    def take(replies: list[SdoReply], at: float) -> None:
-        node.at = at
-        for reply in replies:
-            if reply.kind == "abort" and reply.index in (STORE, 0):
-                raise refused(node, reply, index, subindex)
+    def decode(answer: Response) -> None:
+        node.at = answer.at
+        for reply in decoded(answer):
+            if reply.kind == "abort" and reply.index in (row.address, 0):
+                raise refused(node, row, reply)
 
-    frame = sdo.encode_download(
-        node.node,
-        index,
-        subindex,
-        row.encode(SAVE),
-        sized=node.settings.sized,
-        extended=node.settings.extended,
-    )
-    return collect(
-        node,
-        frame,
-        take,
-        reply_within=TimeoutClass.STORE,
-        effect=Effect.PERSISTENT,
+    return Request(
+        node.settings.download(node.node, row, SAVE),
+        ANY,
+        decode,
+        lane=node.node,
         priority=Priority.CONFIGURATION,
+        effect=Effect.PERSISTENT,
+        reply_within=TimeoutClass.STORE,
     )
 
 
@@ -66,61 +56,46 @@ async def store(node: Node, values: Sequence[tuple[Register, int]]) -> None:
     If all rows read as wanted and this node has written none of them since its last save, nothing is written, because
     flash wears. Raises VerificationFailed when a row reads back different after three tries, or after the save.
     """
-    node.limits = None
-    try:
-        await Exclusive(_store(node, values))
-    finally:
-        node.limits = None
-
-
-async def _store(node: Node, values: Sequence[tuple[Register, int]]) -> None:
     names = {row.name for row, _ in values}
-    if names.isdisjoint(node.unsaved) and await _reads_as(node, values):
-        return
-    node.unsaved |= names
-    for row, raw in values:
-        await _write_verified(node, row, raw)
-    await _check(node, values)  # together: one may have changed another
-    await save(node)
-    await wait_after_save(node)
-    await _check(node, values)
-    node.unsaved -= names
+
+    async def check(row: Register, raw: int) -> None:
+        await verify.check(
+            partial(read_register, node, row, int),
+            raw,
+            node=node.node,
+            what=row.name,
+            differs=partial(_differs, node, row, raw),
+        )
+
+    async def write_and_save() -> None:
+        node.limits = None
+        if names.isdisjoint(node.unsaved) and await _reads_as(node, values):
+            return
+        node.unsaved |= names
+        for row, raw in values:
+            await verify.write_verified(
+                partial(write_register, node, row, raw, priority=Priority.CONFIGURATION),
+                partial(read_register, node, row, int),
+                raw,
+                node=node.node,
+                what=row.name,
+                differs=partial(_differs, node, row, raw),
+            )
+        for row, raw in values:  # one may have changed another
+            await check(row, raw)
+        await save(node)
+        for row, raw in values:
+            await check(row, raw)
+        node.unsaved -= names
+
+    await Exclusive(write_and_save())
 
 
 async def _reads_as(node: Node, values: Sequence[tuple[Register, int]]) -> bool:
     for row, raw in values:
-        if not row.readable or await read_register(node, row, int) != raw:
+        if await read_register(node, row, int) != raw:
             return False
     return True
-
-
-async def wait_after_save(node: Node) -> None:
-    """Wait for the rest of the time that this maker's servos need beyond the time-out of a save."""
-    rest = node.profile.mid_point_wait - node.profile.flash_wait
-    if rest > 0:
-        await Sleep(rest)
-
-
-async def _write_verified(node: Node, row: Register, raw: int) -> None:
-    write = partial(write_register, node, row, raw, priority=Priority.CONFIGURATION)
-    if not row.readable:
-        await write()
-        return
-    await verify.write_verified(
-        write,
-        partial(read_register, node, row, int),
-        raw,
-        node=node.node,
-        what=row.name,
-        differs=partial(_differs, node, row, raw),
-    )
-
-
-async def _check(node: Node, values: Sequence[tuple[Register, int]]) -> None:
-    for row, raw in values:
-        if row.readable:
-            read, differs = partial(read_register, node, row, int), partial(_differs, node, row, raw)
-            await verify.check(read, raw, node=node.node, what=row.name, differs=differs)
 
 
 def _differs(node: Node, row: Register, raw: int, found: int) -> VerificationFailed:
@@ -132,8 +107,6 @@ def _differs(node: Node, row: Register, raw: int, found: int) -> VerificationFai
         )
     return VerificationFailed(
         f"node {node.node}: {row.name} reads back {found}, not {raw}",
-        sent=row.encode(raw),
-        received=row.encode(found) if row.low <= found <= row.high else b"",
         expected=f"raw {raw}",
         cause=cause,
         advice="read it again, then write it again; until it reads back right do not rely on it",

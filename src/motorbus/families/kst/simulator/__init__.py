@@ -14,10 +14,12 @@ from motorbus.core.family import Option
 from motorbus.core.switches import options as quirk_options
 from motorbus.core.switches import switched
 from motorbus.errors import RequestError
-from motorbus.families.kst.profiles import PROFILES, Profile
+from motorbus.families.kst.profiles import PROFILES
 from motorbus.families.kst.simulator.bus import KstBus
 from motorbus.families.kst.simulator.quirks import Quirks
 from motorbus.families.kst.simulator.servo import Servo
+
+__all__ = ["OPTIONS", "KstBus", "Quirks", "Servo", "simulate"]
 
 OPTIONS = (
     Option("profile", str, "kst", "which relative of the protocol they speak", tuple(PROFILES)),
@@ -36,39 +38,23 @@ def simulate(ids: Iterable[int], model: str = "", /, **options: object) -> KstBu
     """
     named = str(options.pop("profile", "") or "")
     if model and named and model != named:
-        raise RequestError(
-            f"model {model} and profile {named} contradict each other", advice="give one of them"
-        )
-    quirks = switched(Quirks, "kst", options)
-    twins = [_number(word) for word in quirks.duplicate.split("+") if word]
-    if not (quirks.firmware.isascii() and quirks.firmware.isprintable() and quirks.firmware):
-        raise RequestError(
-            f"option firmware: {quirks.firmware!r} is not possible", expected="one or more ASCII characters"
-        )
-    if 0 < quirks.reports_ms < SHORTEST_REPORT:
-        raise RequestError(
-            f"option reports_ms: {quirks.reports_ms:g} is not possible",
-            expected=f"0, or {SHORTEST_REPORT:g} and more",
-        )
-    return KstBus(ids, _profile(model or named or "kst"), quirks, twins)
-
-
-def _profile(name: str) -> Profile:
-    try:
-        return PROFILES[name.lower()]
-    except KeyError:
+        raise RequestError(f"model {model} and profile {named} contradict each other", expected="one of them")
+    name = (model or named or "kst").lower()
+    if name not in PROFILES:
         raise RequestError(
             f"there is no simulated KST profile {name!r}", expected=f"one of {', '.join(PROFILES)}"
-        ) from None
-
-
-def _number(word: str) -> int:
+        )
+    quirks = switched(Quirks, "kst", options)
+    if not (quirks.firmware.isascii() and quirks.firmware.isprintable() and quirks.firmware):
+        raise _impossible("firmware", quirks.firmware, "one or more ASCII characters")
+    if 0 < quirks.reports_ms < SHORTEST_REPORT:
+        raise _impossible("reports_ms", quirks.reports_ms, f"0, or {SHORTEST_REPORT:g} and more")
     try:
-        return units.whole(word)
+        duplicates = [units.whole(word) for word in quirks.duplicate.split("+") if word]
     except ValueError:
-        raise RequestError(
-            f"option duplicate: {word!r} is not a node id", expected="ids as 0x25 or 0x25+0x26"
-        ) from None
+        raise _impossible("duplicate", quirks.duplicate, "ids as 0x25 or 0x25+0x26") from None
+    return KstBus(ids, PROFILES[name], quirks, duplicates)
 
 
-__all__ = ["OPTIONS", "KstBus", "Quirks", "Servo", "simulate"]
+def _impossible(option: str, value: object, expected: str) -> RequestError:
+    return RequestError(f"option {option}: {value!r} is not possible", expected=expected)

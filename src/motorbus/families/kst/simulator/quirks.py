@@ -126,9 +126,3 @@ class Quirks:
     position: int = switch(
         0, "where they stand at first, in raw counts", source="an assumption, no source", span=_COUNTS
     )
-    speed: float = switch(
-        7.0,
-        "top speed in rad/s",
-        source="an assumption, no source; 0.15 s for 60 degrees is usual",
-        span=(1e-6, 1e9),
-    )

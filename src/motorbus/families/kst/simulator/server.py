@@ -6,12 +6,14 @@ CANopen servers. # assumption
 
 from __future__ import annotations
 
+from math import inf
 from typing import Final
 
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.register import Register
 from motorbus.families.kst import sdo
-from motorbus.families.kst.simulator.servo import SOFTWARE, Servo
+from motorbus.families.kst.profiles import VERSIONS
+from motorbus.families.kst.simulator.servo import Servo
 
 TOGGLE: Final = 0x0503_0000
 UNKNOWN_COMMAND: Final = 0x0504_0001
@@ -33,78 +35,75 @@ class SdoServer:
 
     def __init__(self, servo: Servo) -> None:
         self._servo = servo
-        self._transfer: tuple[sdo.SdoRequest, bytes, int, int] | None = None
-        """Upload in segments: its request, the bytes left, the next toggle, the `lives` of the servo when it began."""
+        self._life = 0
+        self._busy_until = -inf
+        self._transfer: tuple[sdo.SdoRequest, bytes, int] | None = None
+        """Upload in segments: its request, the bytes left, the next toggle."""
 
     def receive(self, request: sdo.SdoRequest, at: float) -> None:
         """Carry out a request and reply, one after the other. More requests than `MAILBOX` are lost."""
         servo = self._servo
-        if servo.busy_until - at > MAILBOX * TURNAROUND:
+        if self._life != servo.lives:
+            self._life, self._busy_until, self._transfer = servo.lives, -inf, None
+        if self._busy_until - at > MAILBOX * TURNAROUND:
             return
         servo.extended = request.extended
-        reply = self.answer(request, at)
+        reply = (
+            None if servo.flash.saving(at) else self._answer(request, at)
+        )  # lost (flight-controller driver)
         is_read = request.kind != "download"
         if reply is None or (request.node == sdo.BROADCAST and is_read and not servo.quirks.broadcast_read):
             return
-        servo.busy_until = max(at, servo.busy_until) + TURNAROUND
-        servo.send(reply, servo.busy_until + servo.delay)
+        self._busy_until = max(at, self._busy_until) + TURNAROUND
+        servo.send(reply, self._busy_until + servo.delay)
 
-    def answer(self, request: sdo.SdoRequest, at: float) -> CanFrame | None:
-        """The reply to this request, None for no reply. Requests during a save are lost (flight-controller driver)."""
-        if self._servo.flash.saving(at):
-            return None
+    def _answer(self, request: sdo.SdoRequest, at: float) -> CanFrame | None:
+        """The reply to this request, None for no reply."""
         if request.kind == "segment":
             return self._segment(request)
         self._transfer = None  # a request ends a transfer (CiA 301)
         if request.kind == "abort":
             return None
         reply: CanFrame | int | None = UNKNOWN_COMMAND
-        if request.kind in ("upload", "download"):
-            row = self._row(request)
-            if isinstance(row, int):
-                reply = row
-            elif request.kind == "upload":
-                reply = self._upload(request, row, at)
-            else:
-                reply = self._download(request, row, at)
-        return self._abort(request, reply) if isinstance(reply, int) else reply
-
-    def _row(self, request: sdo.SdoRequest) -> Register | int:
         table = self._servo.profile.table
         row = table.at(request.index, request.subindex)
-        if row is not None:
-            return row
-        return NO_SUBINDEX if any(one.address == request.index for one in table.values()) else NO_OBJECT
+        if request.kind == "unknown":
+            reply = UNKNOWN_COMMAND
+        elif row is None:
+            known = any(one.address == request.index for one in table.values())
+            reply = NO_SUBINDEX if known else NO_OBJECT
+        elif request.kind == "upload":
+            reply = self._upload(request, row, at)
+        else:
+            reply = self._download(request, row, at)
+        return self._abort(request, reply) if isinstance(reply, int) else reply
 
     def _upload(self, request: sdo.SdoRequest, row: Register, at: float) -> CanFrame | int:
         """The value; the data bytes of the request are ignored (manual, command 4; reserved in CiA 301)."""
         if not row.readable:
             return WRITE_ONLY
-        node, extended = self._servo.node, request.extended
-        data = self._value(row, at)
+        servo, quirks = self._servo, self._servo.quirks
+        if row.name in VERSIONS:
+            data = servo.version(row.name)
+        elif row.name == "present_position" and quirks.status_6002 == "x1x2":
+            data = bytes((quirks.x1, quirks.x2))
+        else:
+            data = (servo.read(row.name, at) & (1 << 8 * row.size) - 1).to_bytes(row.size, "little")
+        node, index, subindex, extended = servo.node, request.index, request.subindex, request.extended
         if len(data) <= sdo.EXPEDITED:
-            return sdo.encode_upload_reply(node, request.index, request.subindex, data, extended=extended)
-        self._transfer = (request, data, 0, self._servo.lives)
-        return sdo.encode_upload_start(node, request.index, request.subindex, len(data), extended=extended)
-
-    def _value(self, row: Register, at: float) -> bytes:
-        quirks = self._servo.quirks
-        if row.name in ("firmware_version", "software_version"):  # first character first (manual, command 8)
-            text = quirks.firmware if row.name == "firmware_version" else SOFTWARE
-            return text.encode("ascii").ljust(sdo.EXPEDITED, b"\0")
-        if row.name == "present_position" and quirks.status_6002 == "x1x2":
-            return bytes((quirks.x1, quirks.x2))
-        return (self._servo.read(row.name, at) & (1 << 8 * row.size) - 1).to_bytes(row.size, "little")
+            return sdo.encode_upload_reply(node, index, subindex, data, extended=extended)
+        self._transfer = request, data, 0
+        return sdo.encode_upload_start(node, index, subindex, len(data), extended=extended)
 
     def _segment(self, request: sdo.SdoRequest) -> CanFrame:
-        if self._transfer is None or self._transfer[3] != self._servo.lives:
+        if self._transfer is None:
             return self._abort(request, UNKNOWN_COMMAND)
-        first, left, toggle, lives = self._transfer
+        first, left, toggle = self._transfer
         if request.toggle != toggle:
             self._transfer = None
             return self._abort(first, TOGGLE)
         data, left = left[: sdo.SEGMENT_BYTES], left[sdo.SEGMENT_BYTES :]
-        self._transfer = (first, left, toggle ^ 1, lives) if left else None
+        self._transfer = (first, left, toggle ^ 1) if left else None
         node, extended = self._servo.node, request.extended
         return sdo.encode_segment_reply(node, request.toggle, data, not left, extended=extended)
 
@@ -112,12 +111,11 @@ class SdoServer:
         quirks = self._servo.quirks
         if not row.writable:
             return READ_ONLY
-        if request.sized:
-            if not quirks.accept_sized:
-                return UNKNOWN_COMMAND
-            if len(request.data) != row.size:
-                return TOO_LONG if len(request.data) > row.size else TOO_SHORT
-        elif not quirks.accept_unsized and row.size != sdo.EXPEDITED:
+        if request.sized and not quirks.accept_sized:
+            return UNKNOWN_COMMAND
+        if request.sized and len(request.data) != row.size:
+            return TOO_LONG if len(request.data) > row.size else TOO_SHORT
+        if not request.sized and not quirks.accept_unsized and row.size != sdo.EXPEDITED:
             return OTHER_LENGTH
         # Without a stated length the size of the object counts, and the other bytes are ignored (CiA 301).
         code = self._servo.write(row, row.decode(request.data[: row.size]), at)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from math import inf, pi
+from collections.abc import Callable, Mapping
+from math import pi
 from typing import Final
 
 from motorbus.core.can_frame import CanFrame
-from motorbus.core.plant import Drive
+from motorbus.core.plant import Drive, rest
 from motorbus.core.register import Register
 from motorbus.errors import RequestError
 from motorbus.families.kst import notifications
-from motorbus.families.kst.profiles import BIT_RATES, REVERSED, SAVE, Profile
+from motorbus.families.kst.profiles import BIT_RATES, REVERSED, SAVE, Profile, bit_rate_code
 from motorbus.families.kst.simulator.motor import Flash, Shaft
 from motorbus.families.kst.simulator.quirks import Quirks
 
@@ -20,12 +20,26 @@ TOO_HIGH: Final = 0x0609_0031
 TOO_LOW: Final = 0x0609_0032
 NOT_STORED: Final = 0x0800_0020
 """CiA 301, object 1010h: the reply to a wrong signature."""
+STORED: Final = (
+    "node_id",
+    "bit_rate_code",
+    "mid_point",
+    "negative_limit",
+    "positive_limit",
+    "function_enable",
+    "zero",
+)
+"""What a save keeps: "node id, bit rate, etc." (manual, command 3); travel limits and function byte by a public
+flight-controller driver, the mid point by a public demo of a newer protocol; never the target position. `zero` is the
+place of the shaft that a mid point sets."""
 SOFTWARE: Final = "1.00"
 """Version in 0x100B. # assumption"""
 INTERVAL: Final = 20
 """ms between reports as shipped; the public drivers expect 50 a second. # assumption"""
 LOW_VOLTAGE: Final = 6.0
 """V; below it the servo sends the alarm. # assumption"""
+SPEED: Final = 7.0
+"""rad/s; 0.15 s for 60 degrees. # assumption"""
 ACCELERATION: Final = 100.0
 """rad/s². # assumption"""
 DRIVE: Final = Drive(top_speed=1.0, idle_current=0.2, stall_current=2.5)
@@ -38,13 +52,15 @@ class Servo:
     `unit`      its number on this bus, from 1, whatever its id becomes
     `node`      the id it answers to; `bit_rate` its rate (bit/s)
     `values`    raw values by name, in force until the next restart
-    `memory`    the raw value of each row as a host reads it
     `errors`    bus errors since its restart
-    `started`   a start was received; `lives` counts its restarts
-    `delay`     s added to its replies; `busy_until` is when its last reply began
+    `started`   a start was received
+    `lives`     number of restarts; what was to be sent before is not sent
+    `reports`   number of changes of its reports; the next one is due by the last change only
+    `delay`     s added to its replies
     `temperature` (°C) and `load` (-1 to 1, a share of full torque) may be set
     `extended`  the last request had a 29-bit identifier: unsolicited frames then have one as well
-    `changed`   is called when its id, rate, plug or reports change
+
+    `send(servo, time, frame)` sends a frame that starts at this time; without a frame `report` makes it then.
     """
 
     def __init__(
@@ -54,38 +70,35 @@ class Servo:
         profile: Profile,
         quirks: Quirks,
         now: Callable[[], float],
-        send: Callable[[Servo, float, CanFrame], None],
+        send: Callable[[Servo, float, CanFrame | None], None],
     ) -> None:
-        self.changed: Callable[[], None] = lambda: None
         self.unit = unit
+        self.node = node
+        self.bit_rate = quirks.bit_rate
         self.profile = profile
         self.quirks = quirks
-        self.delay = 0.0
-        self.busy_until = -inf
-        self.errors = 0
-        self.lives = 0
-        self.started = False
+        self.plugged = True
+        self.errors = self.lives = self.reports = 0
+        self.delay = self.load = 0.0
         self.temperature = 25.0
-        self.load = 0.0
         self.extended = quirks.id_format == "ext"
         self._now = now
         self._send = send
         self._voltage = 7.4
-        self._plugged = True
-        self._interval = 0.0
-        self._reports_from = inf
-        self._reported = 0
         per_radian = 180 / pi * profile.counts_per_degree
         self.shaft = Shaft(
-            now(),
-            quirks.position,
-            speed=quirks.speed * per_radian,
-            acceleration=ACCELERATION * per_radian,
+            now(), quirks.position, speed=SPEED * per_radian, acceleration=ACCELERATION * per_radian
         )
-        self._factory = _factory(node, profile, quirks)
-        self.flash = Flash(self._factory)
-        self.values: dict[str, int] = {}
-        self._node, self._bit_rate = node, quirks.bit_rate
+        self._shipped = {row.name: row.default or 0 for row in profile.table.values()}
+        shipped = {
+            "node_id": node,
+            "bit_rate_code": bit_rate_code(quirks.bit_rate),
+            "report_interval": INTERVAL,
+            "negative_limit": -profile.limit,
+            "positive_limit": profile.limit,
+        }
+        self._shipped |= {name: raw for name, raw in shipped.items() if name in profile.table} | {"zero": 0}
+        self.flash = Flash({name: raw for name, raw in self._shipped.items() if name in STORED})
         self._power_up(now())
         self.values["goal_position"] = quirks.position
 
@@ -94,35 +107,7 @@ class Servo:
     @property
     def memory(self) -> Mapping[str, int]:
         """The raw value of each row at this time."""
-        return _Memory(self, self._now)
-
-    @property
-    def node(self) -> int:
-        return self._node
-
-    @node.setter
-    def node(self, node: int) -> None:
-        self._node = node
-        self.changed()
-
-    @property
-    def bit_rate(self) -> int:
-        return self._bit_rate
-
-    @bit_rate.setter
-    def bit_rate(self, rate: int) -> None:
-        self._bit_rate = rate
-        self.changed()
-
-    @property
-    def plugged(self) -> bool:
-        """Its cable is connected."""
-        return self._plugged
-
-    @plugged.setter
-    def plugged(self, yes: bool) -> None:
-        self._plugged = yes
-        self.changed()
+        return {name: self.read(name, self._now()) for name in self.profile.table}
 
     def unplug(self) -> None:
         """Disconnect bus and supply. The shaft stays."""
@@ -130,7 +115,7 @@ class Servo:
         self.shaft.halt(now)
         self.flash.load(now, cut=self.quirks.flash_cut)
         self.lives += 1
-        self._reports_from = inf
+        self.set_reporting(False, now)
         self.plugged = False
 
     def plug(self) -> None:
@@ -171,7 +156,7 @@ class Servo:
             "raw_target": self.values["goal_position"],
             "moving": self.shaft.motion.moving(now),
             "started": self.started,
-            "reporting": self.report_due() is not None,
+            "reporting": self.reporting and self._interval > 0,
             "errors": self.errors,
             "voltage": self._voltage,
             "current": self.current(now),
@@ -185,7 +170,7 @@ class Servo:
 
     @raw_position.setter
     def raw_position(self, raw: int) -> None:
-        self.shaft.turn_by_hand(raw, self._now())
+        self.shaft.motion = rest(self._now(), self.shaft.place(raw))
 
     @property
     def voltage(self) -> float:
@@ -224,41 +209,43 @@ class Servo:
             case "status":  # current (16 bits), temperature (8 bits, signed), one unused byte
                 current = min(0xFFFF, round(abs(self.current(at)) / self.profile.current_scale))
                 return current | (max(-128, min(127, round(self.temperature))) & 0xFF) << 16
-            case "firmware_version":
-                return int.from_bytes(self.quirks.firmware.encode()[:4], "little")
-            case "software_version":
-                return int.from_bytes(SOFTWARE.encode()[:4], "little")
-            case _:
-                return self.values[name]
+            case "firmware_version" | "software_version":
+                return int.from_bytes(self.version(name)[:4], "little")
+        return self.values[name]
+
+    def version(self, name: str) -> bytes:
+        """The text of a version, the first character first (manual, command 8)."""
+        text = self.quirks.firmware if name == "firmware_version" else SOFTWARE
+        return text.encode("ascii").ljust(4, b"\0")
 
     def write(self, row: Register, raw: int, at: float) -> int:
         """Write a raw value; returns the abort code, 0 if it was accepted."""
         values, name = self.values, row.name
         match name:
             case "store":  # the signature "save" (manual, command 3)
-                values[name] = raw
                 if raw != SAVE or self.quirks.save_reply == "abort":
                     return NOT_STORED
                 self.flash.save(values, at, self.quirks.flash_time)
-            case "goal_position":
-                return self._write_goal(raw, at)
-            case "negative_limit" | "positive_limit":
-                raw, code = self._into_range(raw, row.low, row.high)
-                if code:
-                    return code
-                values[name] = raw
-                if self.shaft.reversed:  # a change of one limit changes the other (flight-controller driver)
-                    other = "positive_limit" if name == "negative_limit" else "negative_limit"
-                    values[other] = -raw  # as its mirror image # assumption
+            case "goal_position" | "negative_limit" | "positive_limit":
+                clamped = max(row.low, min(row.high, raw))
+                if raw != clamped and self.quirks.out_of_range != "clamp":
+                    return TOO_HIGH if raw > clamped else TOO_LOW
+                if name == "goal_position":
+                    self._move(clamped, at)
+                else:
+                    values[name] = clamped
+                    if (
+                        self.shaft.reversed
+                    ):  # a change of one limit changes the other (flight-controller driver)
+                        other = "positive_limit" if name == "negative_limit" else "negative_limit"
+                        values[other] = -clamped  # as its mirror image # assumption
             case "report_interval":  # XQPOWER raises a short interval; 0 means none # assumption
-                if raw or row.low > 1:
-                    raw = max(row.low, raw)
-                values[name] = raw
-                self.report_every(raw / 1000, at)
+                values[name] = max(row.low, raw) if raw or row.low > 1 else 0
+                self._interval = values[name] / 1000
+                self.set_reporting(self.reporting, at)
             case "mid_point":  # one source writes 0 and one 1, so any value sets it
                 self.shaft.set_zero(at)
-                values[name], values["zero"] = raw, self.shaft.zero
-                values["goal_position"] = self.shaft.reading(at)  # the target stays here # assumption
+                values |= {name: raw, "zero": self.shaft.zero, "goal_position": 0}  # it stays # assumption
             case "function_enable":  # bit 5 reverses at once and the shaft stays # assumption
                 values[name] = raw
                 if bool(raw >> REVERSED & 1) != self.shaft.reversed:
@@ -271,131 +258,52 @@ class Servo:
                 values[name] = raw
         return 0
 
-    def _write_goal(self, raw: int, at: float) -> int:
-        """It takes effect at once (manual, command 5); before a start XQPOWER acknowledges and ignores it."""
-        limit = self.profile.limit
-        raw, code = self._into_range(raw, -limit, limit)
-        if code:
-            return code
-        if self.accepts_targets:
-            low, high = self.travel
-            self.values["goal_position"] = max(
-                low, min(high, raw)
-            )  # clamped to the travel limits # assumption
+    def _move(self, raw: int, at: float) -> None:
+        """Move at once (manual, command 5); before a start XQPOWER acknowledges a target and ignores it."""
+        if self.started or self.profile.nmt != "standard":
+            limit = self.profile.limit  # clamped to the travel limits # assumption
+            low, high = self.values.get("negative_limit", -limit), self.values.get("positive_limit", limit)
+            self.values["goal_position"] = max(low, min(high, raw))
             self.shaft.move(self.values["goal_position"], at)
-        return 0
 
-    def _into_range(self, raw: int, low: int, high: int) -> tuple[int, int]:
-        """The value to use and 0, or the value and the abort code."""
-        if low <= raw <= high:
-            return raw, 0
-        if self.quirks.out_of_range == "clamp":
-            return max(low, min(high, raw)), 0
-        return raw, TOO_HIGH if raw > high else TOO_LOW
+    # -- supply, start and reports -------------------------------------------------------------------------------
 
-    # -- frames of the host --------------------------------------------------------------------------------------
-
-    def receives_at(self, rate: int | None) -> bool:
-        """It is connected and set to this rate (None: any rate)."""
-        return self.plugged and (rate is None or rate == self.bit_rate)
-
-    def takes(self, extended: bool) -> bool:
-        """It accepts this identifier format."""
-        return self.quirks.id_format in ("asked", "ext" if extended else "std")
-
-    def send(self, frame: CanFrame, at: float) -> None:
-        """Send a frame that starts at this time."""
-        self._send(self, at, frame)
+    def _power_up(self, at: float) -> None:
+        """Load the flash. The shaft stays; the target is the default, 0 (manual, command 5). # assumption"""
+        self.lives += 1
+        self.values = self._shipped | self.flash.load(at, cut=self.quirks.flash_cut)
+        self.node = self.values["node_id"]
+        self.bit_rate = BIT_RATES[self.values["bit_rate_code"]]
+        self.errors, self.started = 0, False
+        self.shaft.halt(at)
+        self.shaft.zero = self.values["zero"]
+        self.shaft.reversed = bool(self.values.get("function_enable", 0) >> REVERSED & 1)
+        self._interval = (self.quirks.reports_ms or self.values.get("report_interval", INTERVAL)) / 1000
+        self.set_reporting(self.quirks.reports_ms > 0, at)
+        if self.quirks.boot_notice and self.lives > 1:
+            self._send(self, at, notifications.encode_boot(self.node, extended=self.extended))
+        if self._voltage < LOW_VOLTAGE:
+            self.alarm()
 
     def receive_start(self, order: notifications.Start, at: float) -> None:
         """Start or stop in the form that this servo knows; lost during a save. # assumption"""
         form = self.profile.nmt if self.quirks.nmt == "profile" else self.quirks.nmt
         if form in order.forms and not self.flash.saving(at):
             self.started = order.on
-            self._set_reporting(order.on, at)
+            self.set_reporting(order.on, at)
 
-    @property
-    def accepts_targets(self) -> bool:
-        """Whether a target moves it: XQPOWER must be started first (public XQPOWER module)."""
-        return self.started or self.profile.nmt != "standard"
-
-    @property
-    def travel(self) -> tuple[int, int]:
-        """The travel limits in force, raw."""
-        limit = self.profile.limit
-        return self.values.get("negative_limit", -limit), self.values.get("positive_limit", limit)
-
-    # -- reports -------------------------------------------------------------------------------------------------
-
-    def report_every(self, seconds: float, at: float) -> None:
-        """Set the interval of reports; 0: none."""
-        self._interval = seconds
-        self.changed()
-        if self._reports_from < inf:
-            self._set_reporting(True, at)
-
-    def report_due(self) -> float | None:
-        """Time (s) of the next report, or None."""
-        if self._reports_from == inf or not self._interval:
-            return None
-        return self._reports_from + self._interval * (self._reported + 1)
-
-    def begin(self, at: float) -> None:
-        """The clock begins: so do reports from power-up on."""
-        if self._reports_from < inf:
-            self._set_reporting(True, at)
+    def set_reporting(self, on: bool, at: float) -> None:
+        """Start or stop the reports; a start begins a new interval."""
+        self.reporting = on
+        self.reports += 1
+        if on and self._interval:
+            self._send(self, at + self._interval, None)
 
     def report(self, at: float) -> CanFrame:
         """The report that is due, under 0x580 + id; XQPOWER sends another one under 0x180 + id, which is left out."""
-        self._reported += 1
+        self._send(self, at + self._interval, None)
         return notifications.encode_report(self.node, self.shaft.reading(at), extended=self.extended)
 
-    def _set_reporting(self, on: bool, at: float) -> None:
-        self._reports_from, self._reported = (at if on else inf), 0
-        self.changed()
-
-    def _power_up(self, at: float) -> None:
-        """Load the flash. The shaft stays; the target is the default, 0 (manual, command 5). # assumption"""
-        self.lives += 1
-        self.values = self._factory | self.flash.load(at, cut=self.quirks.flash_cut)
-        self.node = self.values["node_id"]
-        self.bit_rate = BIT_RATES[self.values["bit_rate_code"]]
-        self.errors, self.busy_until, self.started = 0, -inf, False
-        self.shaft.halt(at)
-        self.shaft.zero = self.values["zero"]
-        self.shaft.reversed = bool(self.values.get("function_enable", 0) >> REVERSED & 1)
-        interval = self.quirks.reports_ms or self.values.get("report_interval", INTERVAL)
-        self._interval = interval / 1000
-        self._set_reporting(bool(self.quirks.reports_ms), at)
-        if self.quirks.boot_notice and self.lives > 1:
-            self._send(self, at, notifications.encode_boot(self.node, extended=self.extended))
-        if self._voltage < LOW_VOLTAGE:
-            self.alarm()
-
-
-class _Memory(Mapping[str, int]):
-    def __init__(self, servo: Servo, now: Callable[[], float]) -> None:
-        self._servo = servo
-        self._now = now
-
-    def __getitem__(self, name: str) -> int:
-        return self._servo.read(self._servo.profile.table[name].name, self._now())
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._servo.profile.table)
-
-    def __len__(self) -> int:
-        return len(self._servo.profile.table)
-
-
-def _factory(node: int, profile: Profile, quirks: Quirks) -> dict[str, int]:
-    """Raw values of all rows as shipped, with this id and rate."""
-    codes = {rate: code for code, rate in BIT_RATES.items()}
-    special = {
-        "node_id": node,
-        "bit_rate_code": codes[quirks.bit_rate],
-        "report_interval": INTERVAL,
-        "negative_limit": -profile.limit,
-        "positive_limit": profile.limit,
-    }
-    return {row.name: special.get(row.name, row.default or 0) for row in profile.table.values()} | {"zero": 0}
+    def send(self, frame: CanFrame, at: float) -> None:
+        """Send a frame that starts at this time."""
+        self._send(self, at, frame)
