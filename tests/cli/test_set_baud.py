@@ -62,7 +62,7 @@ def test_it_is_asked_before_and_a_dry_run_asks_nobody(run: Run, arm: Simulation)
     assert rates(arm) == [1_000_000] * 3
 
 
-@pytest.mark.parametrize("words", ["BUS#3 fast", "BUS#3 28800", "BUS#254 1M", "BUS#3 500k --patience 1s"])
+@pytest.mark.parametrize("words", ["BUS#3 fast", "BUS#3 28800", "BUS#254 1M", "BUS#3 500k --timeout 1s"])
 def test_what_is_no_request(words: str, run: Run, arm: Simulation) -> None:
     ran = run("set-baud", *words.replace("BUS", arm.url).split(), "--yes")
     assert (ran.code, ran.out) == (2, "")
@@ -75,7 +75,7 @@ def test_nobody_is_5(run: Run, arm: Simulation) -> None:
 
 def test_a_kst_servo_is_provisioned(run: Run) -> None:
     with motorbus.simulate("kst", ids="37") as simulation:
-        words = ["set-baud", simulation.url, "1M", "--yes", "--patience", "1s"]
+        words = ["set-baud", simulation.url, "1M", "--yes", "--timeout", "1s"]
         assert run(*words).code == 1
         simulation[37].power_cycle()
         ran = run(*words[:1], f"{simulation.url}#37", *words[2:])

@@ -78,7 +78,7 @@ def test_what_is_no_request(words: str, run: Run, arm: Simulation) -> None:
 
 
 def test_an_option_that_a_family_lacks_is_no_request(run: Run, arm: Simulation) -> None:
-    assert run("set-id", f"{arm.url}#3", "7", "--yes", "--patience", "1s").code == 2
+    assert run("set-id", f"{arm.url}#3", "7", "--yes", "--timeout", "1s").code == 2
     with motorbus.simulate("kst", ids="37") as simulation:
         assert run("set-id", f"{simulation.url}#37", "38", "--yes", "--among", "1-9").code == 2
 
@@ -89,7 +89,7 @@ def test_a_family_whose_devices_have_no_such_verb(run: Run) -> None:
 
 def test_a_kst_servo_is_provisioned(run: Run) -> None:
     with motorbus.simulate("kst", ids="37") as simulation:
-        words = ["set-id", f"{simulation.url}#37", "39", "--yes", "--patience", "1s"]
+        words = ["set-id", f"{simulation.url}#37", "39", "--yes", "--timeout", "1s"]
         ran = run(*words)
         assert ran.code == 1
         assert "take the supply of this servo away now" in ran.err

@@ -31,13 +31,13 @@ def id_said(text: str) -> int:
         ) from None
 
 
-def said_of_others(among: str, patience: str) -> dict[str, object]:
-    """--among and --patience as the verbs take them, where they were said. Raises RequestError."""
+def said_of_others(among: str, timeout: str) -> dict[str, object]:
+    """--among and --timeout as the verbs take them, where they were said. Raises RequestError."""
     from motorbus import session
 
     return {
         **({"among": session.parse_ids(among)} if among else {}),
-        **({"patience": units.parse(patience, "time")} if patience else {}),
+        **({"timeout": units.parse(timeout, "time")} if timeout else {}),
     }
 
 

@@ -42,7 +42,7 @@ def set_baud(
     /,
     *,
     among: str = "",
-    patience: str = "",
+    timeout: str = "",
     yes: Flag = False,
     dry_run: DryRun = False,
     output: Silent,
@@ -58,7 +58,7 @@ def set_baud(
         In bit/s, as 500000, 500k or 1M.
     among
         Ids that other devices on this bus may have, as 1-20; every id is asked when left out.
-    patience
+    timeout
         How long to wait for a power cycle, where one is needed; 120s when left out.
     yes
         Do not ask before their memory is written.
@@ -68,7 +68,7 @@ def set_baud(
     bus, family, named = target(devices)
     offers(family, "set_baud")
     wanted = units.rate(rate)
-    extra = said_of_others(among, patience)
+    extra = said_of_others(among, timeout)
     with opened(bus, options, output) as opening:
         nodes = everyone(bus, opening, named, output)
         takes(face(opening, nodes[0]), "set_baud", extra)

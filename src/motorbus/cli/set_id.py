@@ -23,7 +23,7 @@ Examples:
 
     motorbus set-id feetech:/dev/ttyACM0#1 7
     motorbus set-id feetech:/dev/ttyACM0#1 7 --yes --among 1-20
-    motorbus set-id kst:can://slcan/dev/ttyACM0#0x25 0x26 --patience 60s
+    motorbus set-id kst:can://slcan/dev/ttyACM0#0x25 0x26 --timeout 60s
     motorbus set-id feetech:/dev/ttyACM0#1 7 --dry-run""",
 )
 
@@ -35,7 +35,7 @@ def set_id(
     /,
     *,
     among: str = "",
-    patience: str = "",
+    timeout: str = "",
     yes: Flag = False,
     dry_run: DryRun = False,
     output: Silent,
@@ -51,7 +51,7 @@ def set_id(
         Its new id, which nobody may have.
     among
         Ids that other devices on this bus may have, as 1-20; every id is asked when left out.
-    patience
+    timeout
         How long to wait for a power cycle, where one is needed; 120s when left out.
     yes
         Do not ask before its memory is written.
@@ -62,7 +62,7 @@ def set_id(
     offers(family, "set_id")
     wanted = id_said(new)
     family.devices.blocking(None, wanted)  # raises when it is no id
-    extra = said_of_others(among, patience)
+    extra = said_of_others(among, timeout)
     with opened(bus, options, output) as opening:
         takes(face(opening, node), "set_id", extra)
         if dry_run:

@@ -49,7 +49,7 @@ def test_a_person_is_asked_for_the_power_cycle_and_the_servo_comes_back(
 
 
 def test_interrupted_it_says_so_and_goes_on_when_said_again(servos: Simulation, run: Run) -> None:
-    words = ["kst", "provision", f"{servos.url}#37", "--new-id", "39", "--yes", "--patience", "1s"]
+    words = ["kst", "provision", f"{servos.url}#37", "--new-id", "39", "--yes", "--timeout", "1s"]
     ran = run(*words)
     assert ran.code == 1
     assert "power-cycle it, then call provision again" in ran.err

@@ -173,7 +173,7 @@ def test_d12_a_bus_in_use_at_the_old_rate_is_not_spoken_to_at_the_new_one() -> N
 def test_what_it_asks_for_says_all_that_a_person_needs() -> None:
     with bench() as there:
         with pytest.raises(OutcomeUnknown) as raised:
-            there.servo().provision(new_id=9, patience=1.0)
+            there.servo().provision(new_id=9, timeout=1.0)
         (needed,) = there.of(PowerCycleNeeded)
         assert needed == PowerCycleNeeded(5, 9, 500_000)
         assert SAVE in there.sent()
@@ -241,7 +241,7 @@ def test_another_servo_with_the_new_id_is_not_taken_for_the_one_that_has_not_res
     with bench(ids=(5, 9)) as there:
         joining(there, restarts=False)
         with pytest.raises(OutcomeUnknown, match="did not come back"):
-            there.servo().provision(new_id=9, patience=2.0)
+            there.servo().provision(new_id=9, timeout=2.0)
 
 
 @pytest.mark.parametrize("turned", [0, 77])
@@ -299,15 +299,15 @@ def test_a_silence_without_a_restart_is_no_restart() -> None:
 
         there.on = on
         with pytest.raises(OutcomeUnknown, match="did not come back"):
-            there.servo().provision(new_id=9, patience=3.0)
+            there.servo().provision(new_id=9, timeout=3.0)
         servo.power_cycle()
         assert there.servo().provision(new_id=9).resumed is True
 
 
-@pytest.mark.parametrize("patience", [0, -1.0, float("nan"), float("inf"), "120s", True])
-def test_nobody_waits_for_ever(patience: Any) -> None:
-    with pytest.raises(RequestError, match="patience"):
-        play(provision(node(), new_id=9, patience=patience))
+@pytest.mark.parametrize("timeout", [0, -1.0, float("nan"), float("inf"), "120s", True])
+def test_nobody_waits_for_ever(timeout: Any) -> None:
+    with pytest.raises(RequestError, match="timeout"):
+        play(provision(node(), new_id=9, timeout=timeout))
 
 
 def test_the_rate_of_one_among_others_is_not_changed() -> None:
@@ -324,6 +324,6 @@ def test_while_it_is_waited_for_nobody_at_another_rate_is_disturbed() -> None:
             there.simulator.servos[0].unplug() if isinstance(event, PowerCycleNeeded) else None
         )
         with pytest.raises(OutcomeUnknown):
-            there.servo().provision(new_rate=250_000, patience=5.0)
+            there.servo().provision(new_rate=250_000, timeout=5.0)
         assert there.sim(6).errors == 0
         assert (there.bus.rate, is_listening(there.bus)) == (500_000, False)

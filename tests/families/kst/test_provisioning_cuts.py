@@ -115,7 +115,7 @@ class World:
         family = FAMILY.configured()
         bus = Bus(link, family, interlock=Gate(), report=self._asked)
         try:
-            return Servo(bus, OLD).provision(**self.wanted, patience=5.0)
+            return Servo(bus, OLD).provision(**self.wanted, timeout=5.0)
         except MotorbusError as error:
             return error
         finally:

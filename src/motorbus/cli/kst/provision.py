@@ -51,7 +51,7 @@ def provision(
     *,
     new_id: str = "",
     new_bitrate: str = "",
-    patience: str = "120s",
+    timeout: str = "120s",
     yes: Flag = False,
     dry_run: DryRun = False,
     output: Silent,
@@ -65,14 +65,14 @@ def provision(
         The id it shall have, 1 to 127.
     new_bitrate
         The bit rate it shall have, as 1000000 or 1M.
-    patience
+    timeout
         How long to wait for the power cycle.
     yes
         Do not ask before its memory is written.
     """
     bus, _, (node,) = one_of_ours(device_)
     wanted = _wanted(new_id, new_bitrate)
-    seconds = units.parse(patience, "time")
+    seconds = units.parse(timeout, "time")
     become = " and ".join(_words(wanted))
     with opened(bus, options, output) as opening:
         if dry_run:
@@ -80,7 +80,7 @@ def provision(
         rehearse = partial(_rehearse, dry.DryBus(opening), node, wanted)
         consent_to(f"let {named(node)} become {become}, for good", output, yes=yes, rehearse=rehearse)
         with output.progress("provisioning") as bar:
-            procedure = provision_procedure(face(opening, node), patience=seconds, **wanted)
+            procedure = provision_procedure(face(opening, node), timeout=seconds, **wanted)
             done = opening.run(procedure, report=lambda event: _tell(event, bar, output))
     facts = {"id": done.node, "bitrate": done.rate, "firmware": done.firmware, "resumed": done.resumed}
     output.document(SCHEMA, {"event": "provisioned", "from": node, **facts})

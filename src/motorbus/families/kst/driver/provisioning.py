@@ -33,7 +33,7 @@ from motorbus.families.kst.profiles import bit_rate_code
 
 T = TypeVar("T")
 
-PATIENCE: Final = 120.0
+TIMEOUT: Final = 120.0
 """s to wait for the power cycle."""
 PERIOD: Final = 0.1
 """s between two reads while waiting."""
@@ -67,23 +67,23 @@ class _Place(NamedTuple):
     reads_back: int | None = None
 
 
-async def set_id(node: Node, new: int, *, patience: float = PATIENCE) -> Provisioned:
+async def set_id(node: Node, new: int, *, timeout: float = TIMEOUT) -> Provisioned:
     """Give this servo the id `new`, see `provision`."""
-    return await provision(node, new_id=new, patience=patience)
+    return await provision(node, new_id=new, timeout=timeout)
 
 
-async def set_baud(node: Node, rate: int, *, patience: float = PATIENCE) -> Provisioned:
+async def set_baud(node: Node, rate: int, *, timeout: float = TIMEOUT) -> Provisioned:
     """Give this servo the bit rate `rate` (bit/s), see `provision`. The bus keeps its own rate."""
-    return await provision(node, new_rate=rate, patience=patience)
+    return await provision(node, new_rate=rate, timeout=timeout)
 
 
 async def provision(
-    node: Node, *, new_id: int | None = None, new_rate: int | None = None, patience: float = PATIENCE
+    node: Node, *, new_id: int | None = None, new_rate: int | None = None, timeout: float = TIMEOUT
 ) -> Provisioned:
     """Give this servo another id, another bit rate (bit/s), or both, and wait until it comes back with them.
 
     Checks that one servo answers alone and that the new id is free; writes, reads back, saves; reports
-    `PowerCycleNeeded`; waits at most `patience` s; verifies. It may be called again at any point. At a new rate the
+    `PowerCycleNeeded`; waits at most `timeout` s; verifies. It may be called again at any point. At a new rate the
     adapter listens first.
 
     Raises RequestError (nothing is written) for an invalid id or rate, an id in use, two servos with one id, or
@@ -95,7 +95,7 @@ async def provision(
         raise RequestError(
             "what shall it become?", expected="new_id=, new_rate=, or both", advice="nothing was sent"
         )
-    check_above_zero("patience", patience, "s", node=node.node)
+    check_above_zero("timeout", timeout, "s", node=node.node)
     new = node if new_id is None else Node(checked_id(new_id), node.settings)
     if new_rate is not None:
         bit_rate_code(new_rate)
@@ -104,7 +104,7 @@ async def provision(
     place = await Exclusive(_at_own_rate(change.write))
     if place is not None:
         await Emit(PowerCycleNeeded(node.node, new.node, change.new_rate))
-        await change.wait(place, patience)
+        await change.wait(place, timeout)
     await Emit(Progress(STEPS - 1, STEPS, "it is back: verifying"))
     return await Exclusive(_at_own_rate(partial(change.verify, place)))
 
@@ -184,7 +184,7 @@ class _Change:
 
     # -- wait for the power cycle --------------------------------------------------------------------------------
 
-    async def wait(self, place: _Place, patience: float) -> None:
+    async def wait(self, place: _Place, timeout: float) -> None:
         """Read at the old place and the new one in turn until the servo answers at the new one only."""
         begun: float | None = None
         silent = 0
@@ -198,8 +198,8 @@ class _Change:
                 return
             if now.answered and (came_back or self._has_forgotten(place, now)):
                 raise self._answers_at_both(place) if arrived else self._unchanged(place)
-            if now.at - begun > patience:
-                raise self._not_back(patience)
+            if now.at - begun > timeout:
+                raise self._not_back(timeout)
             await Sleep(PERIOD)
 
     async def _has_arrived(self, place: _Place, now: Presence) -> bool:
@@ -279,10 +279,10 @@ class _Change:
             node=place.node.node,
         )
 
-    def _not_back(self, patience: float) -> MotorbusError:
+    def _not_back(self, timeout: float) -> MotorbusError:
         return OutcomeUnknown(
             f"{hexadecimal(self.old.node)} was set to {hexadecimal(self.new.node)} at {self.new_rate} bit/s "
-            f"and saved; it did not come back within {patience:g} s",
+            f"and saved; it did not come back within {timeout:g} s",
             cause="its supply has not been taken away and given back yet, and there is no other way to restart it",
             advice="power-cycle it, then call provision again with the same arguments: it finds out where things stand",
             node=self.old.node,
