@@ -120,6 +120,7 @@ class Kst:
     """The family of KST CAN servos; see `core.family.Family` for each member."""
 
     name: Final = "kst"
+    cli: Final = "motorbus.families.kst.cli"
     tables: Final[Mapping[str, RegisterMap]] = TABLES
     devices: Final = Devices(Servo, AsyncServo, GUARANTEES)
 
