@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from motorbus import families
-from motorbus.cli.kst import budget_frames
 from motorbus.diagnose.budget import Transfer, budget
 from motorbus.diagnose.loops import Wanted, count
 from motorbus.errors import RequestError
+from motorbus.families.kst.cli import budget_frames
 from motorbus.session.robot import Robot
 from tests.support.machines import machine
 

@@ -1,6 +1,7 @@
-"""What one family can do beyond the common verbs, for common commands that use it where it is there.
+"""The commands of one family, and what common commands use of it.
 
-A family's face is the module (or package) of its name in this folder. Apart from its own commands it may offer
+`Family.cli` is the dotted name of a module, imported when it is used. Its `app` has the commands of the family. For
+common commands it may offer
 
     move_together(bus, goals, velocity, acceleration, wait)    goals in rad by node, begun in the same instant where the
                                                                family can; when one device is lost the others stop
@@ -36,27 +37,28 @@ A family that lacks one of them is served by the common verbs, or the command sa
 
 from __future__ import annotations
 
-from functools import cache
 from importlib import import_module
-from importlib.util import find_spec
 from typing import Any
+
+from cyclopts import App
 
 from motorbus import families
 
 
 def names() -> list[str]:
-    """The families that have a face here."""
-    return [name for name in families.names() if find_spec(f"motorbus.cli.{name}")]
+    """The families that may have commands of their own; none is imported."""
+    return families.names()
+
+
+def __getattr__(family: str) -> App:
+    """The commands of a family; the parser imports them by this name when one is called."""
+    if family not in families.names():
+        raise AttributeError(f"no family {family!r}")
+    app: App | None = offer(family, "app")
+    return app or App(name=family, help=f"{family} devices have no commands of their own.")
 
 
 def offer(family: str, what: str) -> Any:
-    """What the face of this family offers by this name, or None."""
-    if not _has_one(family):
-        return None
-    return getattr(import_module(f"motorbus.cli.{family}"), what, None)
-
-
-@cache
-def _has_one(family: str) -> bool:
-    """Kept, for a scan asks at every frame, and what is installed is looked through for 2 ms. Faces come with us."""
-    return family in names()
+    """What the module of this family offers by this name, or None."""
+    name = families.load(family).cli
+    return getattr(import_module(name), what, None) if name else None

@@ -116,4 +116,5 @@ FAMILY: Final = Family(
     simulator=_simulator,
     simulator_options=_simulator_options,
     safety=GUARANTEES,
+    cli="motorbus.families.kst.cli",
 )

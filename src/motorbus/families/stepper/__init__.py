@@ -208,4 +208,5 @@ FAMILY: Final = Family(
     simulator=_simulator,
     simulator_options=_simulator_options,
     safety=ASSURANCE,
+    cli="motorbus.cli.stepper",
 )
