@@ -8,6 +8,7 @@ from __future__ import annotations
 from motorbus.core.can_frame import CanFrame
 from motorbus.families.kst.simulator import KstBus, Servo, simulate
 
+SAVE = "2210100173617665"
 ERROR = "20000088#0000000000000000"
 """What the host gets where a frame was broken."""
 
