@@ -155,7 +155,7 @@ def _commands() -> Iterator[str]:
 
 def _aborts() -> Iterator[str]:
     yield "## Abort codes\n"
-    yield f"`motorbus frame` decodes each (`{DECODE_TESTS}::test_each_abort_code_is_decoded_in_both_byte_orders`). The"
+    yield f"`motorbus frame` decodes each (`{DECODE_TESTS}::test_abort_code_is_decoded_in_both_byte_orders`). The"
     yield f"simulator sends 13 (`{MANUAL_TESTS}::test_servo_sends_abort_codes_of_the_list`).\n"
     yield from listed(("code", "meaning"), [[f"0x{code:08X}", text] for code, text in ABORTS.items()])
 
