@@ -111,7 +111,7 @@ def test_reports_from_power_up_begin_with_any_clock() -> None:
     assert before_all is not None
     assert before_all < 0
     assert bus.advance(before_all) == []
-    assert bus.due() is None, "it has said so once"
+    assert bus.due() is None
     assert bus.advance(86_400.0) == []
     assert bus.due() == pytest.approx(86_400.002)
 
