@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from motorbus.errors import RequestError
-from motorbus.families.kst.eds import REVISED, Moment, eds
+from motorbus.families.kst.eds import eds
 from motorbus.families.kst.profiles import PROFILES, Profile
 
 HERE = Path(__file__).resolve().parent
@@ -144,29 +144,9 @@ def test_angles_are_in_degrees() -> None:
         assert (keys["Factor"], keys["Unit"]) == (factor, "deg")
 
 
-def test_the_same_call_gives_the_same_file() -> None:
-    assert eds(PROFILES["kst-ext"]) == eds(PROFILES["kst-ext"], made=REVISED)
-
-
-@pytest.mark.parametrize(
-    ("made", "time", "date"),
-    [
-        (Moment(2027, 1, 2, 0, 5), "12:05AM", "01-02-2027"),
-        (Moment(2027, 1, 2, 11, 59), "11:59AM", "01-02-2027"),
-        (Moment(2030, 12, 31, 23, 59), "11:59PM", "12-31-2030"),
-    ],
-)
-def test_the_head_says_who_and_when(made: Moment, time: str, date: str) -> None:
-    head = parsed(eds(PROFILES["kst"], file_name="arm.eds", creator="Ada", made=made))["FileInfo"]
-    assert head["FileName"] == "arm.eds"
-    for what in ("Creation", "Modification"):
-        assert (head[f"{what}Time"], head[f"{what}Date"]) == (time, date)
-    assert head["CreatedBy"] == head["ModifiedBy"] == "Ada"
-
-
-def test_what_is_given_cannot_break_the_file() -> None:
-    text = eds(PROFILES["kst"], creator="Zoë\n[6003]\nA=1 ; b")
-    assert parsed(text)["FileInfo"]["CreatedBy"] == "Zo? [6003] A=1 | b"
+def test_file_name_cannot_break_the_file() -> None:
+    text = eds(PROFILES["kst"], file_name="Zoë\n[6003]\nA=1 ; b")
+    assert parsed(text)["FileInfo"]["FileName"] == "Zo? [6003] A=1 | b"
 
 
 def test_a_node_id_is_the_default_of_its_object() -> None:
