@@ -17,7 +17,7 @@ from motorbus.families.kst import sdo
 from motorbus.families.kst.driver.motion import Promise, hold
 from motorbus.families.kst.driver.node import BusSettings, Node
 from motorbus.families.kst.driver.requests import acknowledged, decoded, upload
-from motorbus.families.kst.driver.storage import LISTEN
+from motorbus.families.kst.driver.settings import LISTEN
 
 WINDOW: Final = 16
 """Nodes in flight at once; four to ten fill any CAN bus."""

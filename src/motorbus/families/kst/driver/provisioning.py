@@ -27,7 +27,7 @@ from motorbus.families.kst.driver.identity import (
 )
 from motorbus.families.kst.driver.node import Node, check_above_zero, checked_id, hexadecimal
 from motorbus.families.kst.driver.scan import broadcast_ids, set_named_rate
-from motorbus.families.kst.driver.storage import save
+from motorbus.families.kst.driver.settings import save
 from motorbus.families.kst.profiles import bit_rate_code
 
 TIMEOUT: Final = 120.0
@@ -226,7 +226,8 @@ class Change:
             moved = place is not None and place.rate == self.new_rate and place.node is not self.new
             if place is not None and moved and (await look(place.node)).replies:
                 raise self._answers_at_both(place.node.node)
-            if second := (await survey(self.new)).second:
+            _, second = await survey(self.new)
+            if second:
                 raise VerificationFailed(
                     f"two servos answer as {hexadecimal(new)} after the restart: {second}",
                     cause="a servo that had this id already has joined the bus, or the bus is disturbed",
