@@ -36,7 +36,7 @@ async def open_stream(servos: Sequence[Node], *, rate: int) -> PositionStream:
             await ask_presence(node)
         return found
 
-    found = await gather(*[read_limits(node) for node in servos])
+    found = await gather(*map(read_limits, servos))
     return PositionStream(dict(zip(servos, found, strict=True)))
 
 
@@ -45,7 +45,7 @@ class PositionStream:
 
     def __init__(self, servos: Mapping[Node, tuple[float, float]]) -> None:
         self.nodes: Final = tuple(node.node for node in servos)
-        self.positions: Final = tuple(_read_positions(node) for node in servos)
+        self.positions: Final = tuple(map(_read_positions, servos))
         self._servos: Final = {node.node: (node, known) for node, known in servos.items()}
 
     def goals(self, to: Mapping[int, float]) -> Sequence[Request[None]]:
@@ -59,8 +59,7 @@ class PositionStream:
     async def begin(self, speeds: Mapping[int, float]) -> None:
         """Start each servo where the profile has that rule, and make its present position its target.
 
-        The servos have no speed setting; `speeds` are only checked. Each servo is visited; then the first error is
-        raised.
+        The servos have no speed setting; `speeds` (rad/s) are only checked.
         """
         for id, speed in speeds.items():
             check_above_zero("speed", speed, "rad/s", node=self._servo(id)[0].node)
@@ -73,11 +72,10 @@ class PositionStream:
         await gather(*[begin_one(node) for node, _ in self._servos.values()])
 
     def _servo(self, id: int) -> tuple[Node, tuple[float, float]]:
-        if id in self._servos:
-            return self._servos[id]
-        raise RequestError(
-            f"node {shown(id)} is not in this loop", expected=f"one of {', '.join(map(str, self.nodes))}"
-        )
+        if id not in self._servos:
+            expected = f"one of {', '.join(map(str, self.nodes))}"
+            raise RequestError(f"node {shown(id)} is not in this loop", expected=expected)
+        return self._servos[id]
 
     def _goal(self, id: int, to: float) -> Request[None]:
         node, known = self._servo(id)
@@ -87,8 +85,7 @@ class PositionStream:
             if node.limits is known or node.limits == known:
                 return None
             return RequestError(
-                f"the settings of node {node.node} were written since its limits were read",
-                cause="a target may mean another position after a change of limits, mid point or sense of rotation",
+                f"limits, mid point or sense of rotation of node {node.node} were written since this loop began",
                 advice="end the loop and begin another",
                 node=node.node,
             )
