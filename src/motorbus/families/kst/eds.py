@@ -93,8 +93,7 @@ TYPES: Final = {(1, False): 0x0005, (2, False): 0x0006, (4, False): 0x0007, (2, 
 """Data type of CiA 301 by size and sign."""
 VISIBLE_STRING: Final = 0x0009
 ACCESS: Final = {Access.READ: "ro", Access.WRITE: "wo", Access.READ_WRITE: "rw"}
-WIDEST: Final = 200
-"""Characters in a line of comment."""
+WIDEST: Final = 200  # characters in a line of comment
 
 _absent = partial(
     Register,

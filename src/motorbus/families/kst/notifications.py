@@ -24,8 +24,7 @@ PDO: Final = 0x180
 ALARM: Final = 0x380
 EMERGENCY: Final = 0x080
 HEARTBEAT: Final = 0x700
-REPORT_LENGTH: Final = 4
-"""Data bytes of a report and of an alarm."""
+REPORT_LENGTH: Final = 4  # data bytes of a report and of an alarm
 NOTIFICATIONS: Final = {
     sdo.REPLY: ("report", REPORT_LENGTH),
     PDO: ("report", REPORT_LENGTH),
@@ -35,8 +34,7 @@ NOTIFICATIONS: Final = {
 }
 """Identifier without the node -> kind and number of data bytes."""
 REPORT_FORMS: Final = {"sdo": sdo.REPLY, "pdo": PDO}
-LOW_VOLTAGE: Final = b"\x0a\x02\x00\x00"
-"""The only alarm that a source names."""
+LOW_VOLTAGE: Final = b"\x0a\x02\x00\x00"  # the only alarm that a source names
 START_FORMS: Final = ("vendor", "standard")
 STATES: Final = {0x00: "boot-up", 0x04: "stopped", 0x05: "operational", 0x7F: "pre-operational"}
 """States of a heartbeat (CiA 301)."""

@@ -20,16 +20,12 @@ from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Expected
 from motorbus.errors import RequestError
 
-REQUEST: Final = 0x600
-"""Identifier of a request, plus the node."""
-REPLY: Final = 0x580
-"""Identifier of a reply, plus the node."""
+REQUEST: Final = 0x600  # identifier of a request, plus the node
+REPLY: Final = 0x580  # identifier of a reply, plus the node
 BROADCAST: Final = 0
 NODES: Final = range(1, 128)
-LENGTH: Final = 8
-"""Data bytes of each request and reply."""
-EXPEDITED: Final = 4
-"""Maximum number of value bytes in one frame."""
+LENGTH: Final = 8  # data bytes of each request and reply
+EXPEDITED: Final = 4  # maximum number of value bytes in one frame
 SEGMENT_BYTES: Final = 7
 
 UPLOAD: Final = 0x40

@@ -19,8 +19,7 @@ from motorbus.families.kst.driver.node import BusSettings, Node
 from motorbus.families.kst.driver.requests import acknowledged, decoded, upload
 from motorbus.families.kst.driver.settings import LISTEN
 
-WINDOW: Final = 16
-"""Nodes in flight at once; four to ten fill any CAN bus."""
+WINDOW: Final = 16  # nodes in flight at once; four to ten fill any CAN bus
 STUFFING: Final = 1.1
 """Bits on the wire per bit of a frame: over all nodes and positions, frames of this protocol have 118 to 126 bits where
 111 are without stuffing."""
@@ -32,8 +31,7 @@ BROADCAST_TIME: Final = 0.100
 """s in which all servos have answered a broadcast: a public demo driver collects until 100 ms pass without a reply."""
 QUIET: Final = 0.020
 """s beside the frames that may still be on their way; as long as the bus waits for a late reply."""
-FRAMES_IN_ADAPTER: Final = 5
-"""Frames of one node that an adapter may hold. # assumption"""
+FRAMES_IN_ADAPTER: Final = 5  # frames of one node that an adapter may hold # assumption
 
 
 def air_time(request: Request[Any], rate: int) -> float:

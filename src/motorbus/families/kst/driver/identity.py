@@ -32,8 +32,7 @@ from motorbus.families.kst.profiles import BIT_RATES, bit_rate_code, version_tex
 ROUNDS: Final = 3
 OBJECTS: Final = ("node_id", "present_position", "firmware_version")
 """Two servos may agree on the id, and seldom on position and version."""
-ERROR_TIME: Final = 0.5
-"""s in which bus errors count; about the time that all reads of a survey take."""
+ERROR_TIME: Final = 0.5  # s in which bus errors count; about the time that all reads of a survey take
 
 
 async def ping(node: Node) -> bool:

@@ -72,8 +72,7 @@ def _choice(name: str, value: object, choices: Iterable[str]) -> str:
     raise RequestError(f"{name}={value} is not possible", expected=f"one of {', '.join(choices)}")
 
 
-DEFAULT: Final = BusSettings()
-"""The settings of the manual."""
+DEFAULT: Final = BusSettings()  # the settings of the manual
 
 
 class Node:

@@ -30,10 +30,8 @@ from motorbus.families.kst.driver.scan import broadcast_ids, set_named_rate
 from motorbus.families.kst.driver.settings import save
 from motorbus.families.kst.profiles import bit_rate_code
 
-TIMEOUT: Final = 120.0
-"""s to wait for the power cycle."""
-PERIOD: Final = 0.1
-"""s between two reads while waiting."""
+TIMEOUT: Final = 120.0  # s to wait for the power cycle
+PERIOD: Final = 0.1  # s between two reads while waiting
 SILENT_READS: Final = 3
 """Reads without a reply in a row that count as a loss of power; a single one may be a lost frame."""
 STEPS: Final = 4

@@ -27,8 +27,7 @@ UNSIZED_REFUSED: Final = frozenset((0x0504_0001, 0x0607_0010, 0x0607_0012, 0x060
 """Abort codes that may mean "state the length"."""
 ABSENT: Final = frozenset((0x0601_0000, 0x0601_0001, 0x0602_0000, 0x0609_0011))
 """Abort codes of an object that cannot be read."""
-SEGMENTS: Final = 40
-"""Maximum segments, of 7 bytes, of a value; a version has a few."""
+SEGMENTS: Final = 40  # maximum segments, of 7 bytes, of a value; a version has a few
 GENERAL_ERROR: Final = 0x0800_0000
 
 

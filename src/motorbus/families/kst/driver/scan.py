@@ -28,14 +28,11 @@ from motorbus.families.kst.driver.requests import decoded, upload
 from motorbus.families.kst.notifications import BusState
 from motorbus.families.kst.profiles import RATES, bit_rate_code
 
-PASSES: Final = 2
-"""A silent id is read twice: a servo may miss the first frame after power-up."""
-BATCH: Final = 16
-"""Ids that are read at the same time."""
+PASSES: Final = 2  # a silent id is read twice: a servo may miss the first frame after power-up
+BATCH: Final = 16  # ids that are read at the same time
 SHORT_LISTEN: Final = 0.25
 """s to listen at a rate that the caller has named; two periods of traffic at 10 Hz."""
-LISTEN: Final = 1.0
-"""s to listen at each rate of `scan_bit_rates`."""
+LISTEN: Final = 1.0  # s to listen at each rate of `scan_bit_rates`
 WRONG_RATE: Final = "the first frame caused a bus error and had no reply: this bus uses another rate"
 OTHER_FORMAT: Final = "no reply; servos with 29-bit identifiers need id_format=ext, others id_format=std"
 ERRORS: Final = "two servos with one id, another rate on the bus, bad wiring, or a missing terminator"

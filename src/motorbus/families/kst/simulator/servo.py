@@ -18,8 +18,7 @@ from motorbus.families.kst.simulator.quirks import Quirks
 OUT_OF_RANGE: Final = 0x0609_0030
 TOO_HIGH: Final = 0x0609_0031
 TOO_LOW: Final = 0x0609_0032
-NOT_STORED: Final = 0x0800_0020
-"""CiA 301, object 1010h: the reply to a wrong signature."""
+NOT_STORED: Final = 0x0800_0020  # CiA 301, object 1010h: the reply to a wrong signature
 STORED: Final = (
     "node_id",
     "bit_rate_code",
@@ -32,18 +31,13 @@ STORED: Final = (
 """What a save keeps: "node id, bit rate, etc." (manual, command 3); travel limits and function byte by a public
 flight-controller driver, the mid point by a public demo of a newer protocol; never the target position. `zero` is the
 place of the shaft that a mid point sets."""
-SOFTWARE: Final = "1.00"
-"""Version in 0x100B. # assumption"""
+SOFTWARE: Final = "1.00"  # version in 0x100B # assumption
 INTERVAL: Final = 20
 """ms between reports as shipped; the public drivers expect 50 a second. # assumption"""
-LOW_VOLTAGE: Final = 6.0
-"""V; below it the servo sends the alarm. # assumption"""
-SPEED: Final = 7.0
-"""rad/s; 0.15 s for 60 degrees. # assumption"""
-ACCELERATION: Final = 100.0
-"""rad/s². # assumption"""
-DRIVE: Final = Drive(top_speed=1.0, idle_current=0.2, stall_current=2.5)
-"""Currents in A. # assumption"""
+LOW_VOLTAGE: Final = 6.0  # V; below it the servo sends the alarm # assumption
+SPEED: Final = 7.0  # rad/s; 0.15 s for 60 degrees # assumption
+ACCELERATION: Final = 100.0  # rad/s² # assumption
+DRIVE: Final = Drive(top_speed=1.0, idle_current=0.2, stall_current=2.5)  # currents in A # assumption
 
 
 class Servo:
