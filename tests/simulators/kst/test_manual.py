@@ -84,7 +84,7 @@ def test_commands_5_and_6_set_a_position_and_read_it(raw: int) -> None:
 def test_command_5_acts_at_once_and_is_forgotten_at_a_restart() -> None:
     host = Host()
     host.say("625#2203600084030000")
-    assert host[0x25].shaft.motion.start == 1.0
+    assert host[0x25].motion.start == 1.0
     host.wait(2.0)
     host[0x25].power_cycle()
     assert host[0x25].memory["goal_position"] == 0

@@ -108,10 +108,10 @@ def test_the_mid_point_makes_the_present_position_zero_and_nothing_moves(data: i
     host = ext(position=345)
     assert write(host, 0x3009, data) == "6009300000000000"
     assert (read(host, 0x6002), read(host, 0x6003)) == (0, 0)
-    assert host[0x25].shaft.motion.moving(host.now) is False
+    assert host[0x25].motion.moving(host.now) is False
     write(host, 0x6003, 100)
     host.wait(1.0)
-    assert (read(host, 0x6002), host[0x25].shaft.motion.position(host.now)) == (100, 445)
+    assert (read(host, 0x6002), host[0x25].motion.position(host.now)) == (100, 445)
 
 
 def test_the_mid_point_is_kept_by_a_save_and_lost_without() -> None:
@@ -133,7 +133,7 @@ def test_bit_5_reverses_reading_and_target_and_nothing_moves() -> None:
     assert (read(host, 0x6002), read(host, 0x6003)) == (-200, -200)
     write(host, 0x6003, 300)
     host.wait(1.0)
-    assert (read(host, 0x6002), host[0x25].shaft.motion.position(host.now)) == (300, -300)
+    assert (read(host, 0x6002), host[0x25].motion.position(host.now)) == (300, -300)
     write(host, 0x300F, 0)
     assert read(host, 0x6002) == -300
 

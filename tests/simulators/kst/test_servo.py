@@ -75,7 +75,7 @@ def test_without_supply_the_shaft_stays_where_it_is(cut: str) -> None:
     getattr(host[0x25], cut)()
     host.wait(1.0)
     assert host[0x25].raw_position == place
-    assert host[0x25].shaft.motion.moving(host.now) is False
+    assert host[0x25].motion.moving(host.now) is False
 
 
 def test_it_says_of_itself_what_is_in_force_and_what_is_to_come() -> None:
