@@ -65,15 +65,15 @@ class Bench:
         profile: str = "kst",
         **options: object,
     ) -> None:
-        self.family = FAMILY.open(**{"profile": profile, **(settings or {})})
-        self.settings = settings_of(self.bus)
         simulator = FAMILY.simulator(ids or (5,), profile, **options)
         assert isinstance(simulator, KstBus)
         self.simulator = simulator
         self.link: Any = link(simulator, rate=500_000, line=line)
         self.events: list[object] = []
         self.on: Callable[[object], object] = lambda event: None
-        self.bus = make_bus(self.link, self.family, report=self._report)
+        driver = FAMILY.open(**{"profile": profile, **(settings or {})})
+        self.bus = make_bus(self.link, driver, report=self._report)
+        self.settings = settings_of(self.bus)
         self._trace = self.bus.trace.subscribe(limit=1_000_000)
 
     def __enter__(self) -> Self:

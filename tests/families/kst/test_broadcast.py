@@ -46,7 +46,7 @@ def test_broadcast_position_starts_and_moves_all(profile: str, start: str) -> No
 
 def test_broadcast_position_without_servos_or_out_of_range_is_refused() -> None:
     with Bench(1) as bench:
-        with pytest.raises(RequestError, match="none is named"):
+        with pytest.raises(RequestError, match="moves all servos"):
             bench.bus.run(broadcast_position(0.1, (), bench.settings))
         with pytest.raises(LimitExceeded):
             bench.bus.run(broadcast_position(9.0, (1,), bench.settings))

@@ -53,7 +53,7 @@ def test_erratum_4_scan_reads_all_at_once_and_silent_ids_one_by_one(has_reply: b
     with Bench(7, 3, 0x25, broadcast_read=has_reply) as bench:
         found = bench.bus.run(broadcast_read("node_id", bench.settings))
         assert found == ({3: 3, 7: 7, 0x25: 0x25} if has_reply else {})
-        assert [one.node for one in bench.bus.run(bench.family.scan())] == [3, 7, 0x25]
+        assert [one.node for one in bench.bus.run(bench.bus.driver.scan())] == [3, 7, 0x25]
         with pytest.raises(RequestError, match="0 addresses all servos"):
             bench.servo(0)
 
@@ -166,7 +166,7 @@ def test_erratum_17_missing_object_is_refused_by_name_and_left_out_of_all() -> N
 
 def test_erratum_18_requests_have_eight_bytes_and_others_no_reply() -> None:
     with Bench() as bench:
-        bench.bus.run(bench.family.scan())
+        bench.bus.run(bench.bus.driver.scan())
         assert {len(text.partition("#")[2]) for text in bench.sent()} == {16}
         for text in ("605#40026000", "605#40026000000000", "605#"):
             bench.link.write(frame(text))
@@ -194,7 +194,7 @@ def test_erratum_20_two_servos_with_one_id_get_no_other(delay: float) -> None:
         with pytest.raises(RequestError, match=r"two servos answer as 0x05 \(5\)"):
             bench.servo().set_node_id(9)
         assert bench.written() == []
-        bench.bus.run(bench.family.scan((5,)))
+        bench.bus.run(bench.bus.driver.scan((5,)))
         assert "two servos with one id" in bench.of(Suspicion)[0].what
 
 
@@ -203,7 +203,7 @@ def test_erratum_21_scan_of_other_rates_listens_before_it_sends() -> None:
         with pytest.raises(NoReply):
             bench.servo().position()
         bench[5].power_cycle()
-        found = bench.bus.run(bench.family.scan((), tuple(rate for rate in RATES if rate != 500_000)))
+        found = bench.bus.run(bench.bus.driver.scan((), tuple(rate for rate in RATES if rate != 500_000)))
         assert [(one.node, one.rate) for one in found] == [(5, 250_000)]
         assert {one.rate for one in bench.of(Skipped)} == set(RATES) - {250_000, 500_000}
         assert (bench[5].status()["errors"], bench.written(), bench.bus.rate) == (0, [], 500_000)

@@ -75,7 +75,7 @@ def test_invalid_segments_are_an_error() -> None:
         bench.servo().version()
     endless = {**start, first: "585#0031323334353637", second: "585#1031323334353637"}
     with Bench(line=Answers(endless)) as bench:
-        with pytest.raises(UnexpectedReply, match="does not end"):
+        with pytest.raises(UnexpectedReply, match="announced 10 bytes"):
             bench.servo().version()
         assert bench.sent()[-1] == "605#800A100000000008"
 

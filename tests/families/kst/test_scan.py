@@ -42,7 +42,7 @@ def test_scan_sends_one_broadcast_and_reads_silent_ids_twice() -> None:
 def test_scan_reports_an_id_that_needs_a_restart(ids: tuple[int, ...]) -> None:
     with Bench() as bench:
         bench.servo().set_node_id(9)
-        (found,) = bench.bus.run(bench.family.scan(ids))
+        (found,) = bench.bus.run(bench.bus.driver.scan(ids))
         assert found.identity is not None
         assert found.identity.details["reads_back_id"] == 9
         (suspicion,) = bench.of(Suspicion)

@@ -108,9 +108,8 @@ def test_write_is_repeated_until_it_reads_back() -> None:
         set_limit(bench.servo())
         assert bench.written() == [LIMIT[4:]] * 3 + [SAVE]
     with Bench(profile="kst-ext", line=Answers({READ: OLD, LIMIT: ACK})) as bench:
-        with pytest.raises(VerificationFailed, match="reads back -1000, not -500") as raised:
+        with pytest.raises(VerificationFailed, match="reads back -1000, not -500"):
             set_limit(bench.servo())
-        assert raised.value.received == bytes.fromhex("18fc")
         assert bench.written() == [LIMIT[4:]] * 3
 
 

@@ -17,8 +17,7 @@ from motorbus.core.request import Notification
 from motorbus.families.kst import notifications, profiles, sdo
 from motorbus.families.kst.profiles import KST_EXT, PROFILES, VERSIONS, Profile, version_text
 
-HEAD: Final = 5
-"""Bytes before the data in `CanFrame.flat()`: identifier (4), number of data bytes (1)."""
+HEAD: Final = 5  # bytes before the data in `CanFrame.flat()`: identifier (4), number of data bytes (1)
 BUS_ERRORS: Final = (
     "a frame could not be sent in time",
     "arbitration was lost",

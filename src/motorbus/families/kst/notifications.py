@@ -5,10 +5,8 @@
     emergency   0x080 + node                   8 bytes (CiA 301, decoded only)
     heartbeat   0x700 + node                   1 byte (CiA 301)
 
-A report and a reply share an identifier; their length tells them apart, never the first byte.
-
-Source: the KST CAN protocol manual has none of this; public drivers of these servos (a flight-controller driver, an
-STM32 driver, a driver of XQPOWER servos) do.
+The length of a frame tells a report from a reply, never the first byte. Source: the KST CAN protocol manual has none of
+this; public drivers of these servos (a flight-controller driver, an STM32 driver, a driver of XQPOWER servos) do.
 """
 
 from __future__ import annotations
@@ -20,35 +18,23 @@ from typing import Final, NamedTuple
 from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
 from motorbus.core.request import Data, Event, Noise, Notification, Reply
 from motorbus.errors import RequestError
-from motorbus.families.kst.sdo import (
-    ABORTS,
-    BROADCAST,
-    LENGTH,
-    NODES,
-    REPLY,
-    REQUEST,
-    Key,
-    check_node,
-    reply_kind,
-)
+from motorbus.families.kst import sdo
 
 PDO: Final = 0x180
 ALARM: Final = 0x380
 EMERGENCY: Final = 0x080
 HEARTBEAT: Final = 0x700
-REPORT_LENGTH: Final = 4
-"""Data bytes of a report and of an alarm."""
+REPORT_LENGTH: Final = 4  # data bytes of a report and of an alarm
 NOTIFICATIONS: Final = {
-    REPLY: ("report", REPORT_LENGTH),
+    sdo.REPLY: ("report", REPORT_LENGTH),
     PDO: ("report", REPORT_LENGTH),
     ALARM: ("alarm", REPORT_LENGTH),
-    EMERGENCY: ("emergency", LENGTH),
+    EMERGENCY: ("emergency", sdo.LENGTH),
     HEARTBEAT: ("heartbeat", 1),
 }
 """Identifier without the node -> kind and number of data bytes."""
-REPORT_FORMS: Final = {"sdo": REPLY, "pdo": PDO}
-LOW_VOLTAGE: Final = b"\x0a\x02\x00\x00"
-"""The only alarm that a source names."""
+REPORT_FORMS: Final = {"sdo": sdo.REPLY, "pdo": PDO}
+LOW_VOLTAGE: Final = b"\x0a\x02\x00\x00"  # the only alarm that a source names
 START_FORMS: Final = ("vendor", "standard")
 STATES: Final = {0x00: "boot-up", 0x04: "stopped", 0x05: "operational", 0x7F: "pre-operational"}
 """States of a heartbeat (CiA 301)."""
@@ -57,7 +43,7 @@ ALARM_TIME: Final = 5.0
 
 
 class Start(NamedTuple):
-    """Start (`on`) or stop of reports, for one node or all (0). `forms`: a broadcast of `01 00` is of both forms."""
+    """Start (`on`) or stop of reports, for one node or all (0); for all it is of both forms."""
 
     forms: frozenset[str]
     node: int
@@ -66,12 +52,9 @@ class Start(NamedTuple):
 
 def encode_report(node: int, raw: int, *, form: str = "sdo", extended: bool = False) -> CanFrame:
     """A position (raw counts) under 0x580 + node, or with `form` "pdo" under 0x180 + node."""
-    check_node(node)
+    sdo.check_node(node)
     if form not in REPORT_FORMS or not -0x8000 <= raw <= 0x7FFF:
-        raise RequestError(
-            f"no report of the form {form!r} has position {raw}",
-            expected="sdo or pdo, -32768 to 32767 counts",
-        )
+        raise RequestError(f"no {form} report of {raw}", expected="sdo or pdo, -32768 to 32767 counts")
     return CanFrame(REPORT_FORMS[form] + node, raw.to_bytes(2, "little", signed=True) + b"\0\0", extended)
 
 
@@ -82,7 +65,7 @@ def decode_report(data: bytes) -> int:
 
 def encode_alarm(node: int, data: bytes = LOW_VOLTAGE, *, extended: bool = False) -> CanFrame:
     """An alarm of 4 bytes."""
-    check_node(node)
+    sdo.check_node(node)
     if len(data) != REPORT_LENGTH:
         raise RequestError(f"an alarm has not {len(data)} bytes", expected="4 bytes")
     return CanFrame(ALARM + node, data, extended)
@@ -90,17 +73,16 @@ def encode_alarm(node: int, data: bytes = LOW_VOLTAGE, *, extended: bool = False
 
 def encode_boot(node: int, *, extended: bool = False) -> CanFrame:
     """The heartbeat of a node that has just started."""
-    check_node(node)
+    sdo.check_node(node)
     return CanFrame(HEARTBEAT + node, b"\0", extended)
 
 
 def encode_start(form: str, node: int, on: bool, *, extended: bool = False) -> CanFrame:
     """Start or stop the reports of one node or of all (0); it has no reply.
 
-    Form "vendor" has the node as identifier and `01 00` or `02 00`; "standard" is the NMT of CiA 301, identifier 0 and
-    `01 node` or `02 node`, without which an XQPOWER servo ignores positions.
+    "vendor": identifier = node, `01 00` or `02 00`. "standard": NMT of CiA 301, identifier 0, `01 node` or `02 node`.
     """
-    check_node(node, lowest=BROADCAST)
+    sdo.check_node(node, lowest=sdo.BROADCAST)
     if form not in START_FORMS:
         raise RequestError(f"there is no start form {form!r}", expected="vendor or standard")
     command = 1 if on else 2
@@ -115,26 +97,23 @@ def decode_start(frame: CanFrame) -> Start | None:
     if len(data) != 2 or data[0] not in (1, 2):
         return None
     on, node = data[0] == 1, data[1]
-    if identifier == 0 and node == BROADCAST:
-        return Start(frozenset(START_FORMS), BROADCAST, on)
-    if identifier == 0 and node in NODES:
+    if identifier == 0 and node == sdo.BROADCAST:
+        return Start(frozenset(START_FORMS), sdo.BROADCAST, on)
+    if identifier == 0 and node in sdo.NODES:
         return Start(frozenset({"standard"}), node, on)
-    if identifier in NODES and node == 0:
+    if identifier in sdo.NODES and node == 0:
         return Start(frozenset({"vendor"}), identifier, on)
     return None
 
 
 def decode_notification(frame: CanFrame) -> Notification | None:
-    """A frame that a servo or the adapter sends unsolicited, in either identifier format; else None.
-
-    Kinds: "report", "alarm", "emergency", "heartbeat", and "bus error" (node 0) from the adapter.
-    """
+    """A frame of `NOTIFICATIONS` with either identifier format, or a "bus error" of the adapter (node 0); else None."""
     identifier, data, _ = frame
     if identifier & ERROR_FLAG:
-        return Notification(BROADCAST, "bus error", data)
+        return Notification(sdo.BROADCAST, "bus error", data)
     node = identifier & 0x7F
     kind, length = NOTIFICATIONS.get(identifier - node, ("", 0))
-    if not kind or node == BROADCAST or len(data) != length:
+    if not kind or node == sdo.BROADCAST or len(data) != length:
         return None
     if (kind == "report" and data[2:] != b"\0\0") or (kind == "heartbeat" and data[0] & 0x7F not in STATES):
         return None
@@ -143,8 +122,8 @@ def decode_notification(frame: CanFrame) -> Notification | None:
 
 def addressee(frame: CanFrame) -> int | None:
     """The node that a frame of a host addresses, 0 for all; None for a frame that no host sends."""
-    node = (frame.id & ~REMOTE_FLAG) - REQUEST
-    if node == BROADCAST or node in NODES:
+    node = (frame.id & ~REMOTE_FLAG) - sdo.REQUEST
+    if node == sdo.BROADCAST or node in sdo.NODES:
         return node
     start = decode_start(frame)
     return None if start is None else start.node
@@ -178,10 +157,7 @@ class BusState:
             self.boots[event.node] += 1
 
     def alarm(self, node: int, at: float) -> tuple[str, ...]:
-        """Alarms of this node received within `ALARM_TIME`; `at` is the time of its last reply (s), -inf for none.
-
-        A receiver has no clock, so the time of an alarm is that of the next reply of its node.
-        """
+        """Alarms of this node, for `ALARM_TIME` from its next reply on; `at` is the time of its last reply (s)."""
         names, since = self._alarms.get(node, ((), None))
         if names and since is None and at > -inf:
             since = at
@@ -189,17 +165,16 @@ class BusState:
         return names if since is None or at - since <= ALARM_TIME else ()
 
 
-_KEY_KINDS: Final = tuple(reply_kind(specifier).removesuffix("-start") for specifier in range(256))
+_KEY_KINDS: Final = tuple(sdo.reply_kind(specifier).removesuffix("-start") for specifier in range(256))
 """Kind of `Key` by byte 0; "" for no reply."""
-_ABORT_CODES: Final = frozenset(code.to_bytes(4, order) for code in ABORTS for order in ("little", "big"))
+_ABORT_CODES: Final = frozenset(code.to_bytes(4, order) for code in sdo.ABORTS for order in ("little", "big"))
 
 
 class FrameReceiver:
     """Replies and notifications of one bus; any other frame is noise. One frame is one event.
 
-    A CAN controller drops damaged frames, so noise does not make other frames doubtful. The text of an slcan adapter
-    has no such check: one wrong digit turns an abort (80) into an acknowledgement (60). So an acknowledgement that
-    carries an abort code is noise.
+    The text of an slcan adapter has no checksum: one wrong digit turns an abort (80) into an acknowledgement (60).
+    So an acknowledgement that carries an abort code is noise.
     """
 
     held: Final = 0
@@ -213,9 +188,9 @@ class FrameReceiver:
         if not isinstance(data, CanFrame):
             return [Noise(data, "foreign")] if data else []
         identifier, payload, extended = data
-        node = identifier - REPLY
+        node = identifier - sdo.REPLY
         event: Event | None
-        if len(payload) == LENGTH and 0 < node < NODES.stop and extended is self._extended:
+        if len(payload) == sdo.LENGTH and 0 < node < sdo.NODES.stop and extended is self._extended:
             event = self._reply(node, payload)
         else:
             event = decode_notification(data)
@@ -230,8 +205,8 @@ class FrameReceiver:
         if not kind or (kind == "download" and data[4:] in _ABORT_CODES):
             return Noise(data, "foreign", node)
         if kind == "segment":
-            return Reply(node, Key(kind, toggle=data[0] >> 4 & 1), data)
-        return Reply(node, Key(kind, data[1] | data[2] << 8, data[3]), data)
+            return Reply(node, sdo.Key(kind, toggle=data[0] >> 4 & 1), data)
+        return Reply(node, sdo.Key(kind, data[1] | data[2] << 8, data[3]), data)
 
     def flush(self) -> list[Event]:
         """Nothing is held."""

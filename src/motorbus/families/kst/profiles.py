@@ -32,13 +32,11 @@ Neither the numbers of slcan nor those of CiA 305 LSS.
 """
 RATES: Final[tuple[int, ...]] = tuple(BIT_RATES.values())
 DEFAULT_NODE: Final = 0x25
-DEFAULT_RATE: Final = 500_000
-"""Bit/s as shipped; the manual adds "provisional"."""
+DEFAULT_RATE: Final = 500_000  # bit/s as shipped; the manual adds "provisional"
 SAVE: Final = int.from_bytes(b"save", "little")
 """What is written to `store`: the letters "save", the first in the lowest byte (CiA 301, object 1010h)."""
 VERSIONS: Final = ("firmware_version", "software_version")
-REVERSED: Final = 5
-"""The bit of `function_enable` that turns the sense of rotation round."""
+REVERSED: Final = 5  # the bit of `function_enable` that turns the sense of rotation round
 
 MANUAL: Final = "KST CAN protocol manual"
 FLIGHT: Final = "public flight-controller driver for KST servos"

@@ -3,9 +3,8 @@
     request   0x600 + node   8 bytes: specifier, index (2), sub-index, data (4), little-endian; node 0: all nodes
     reply     0x580 + node   8 bytes of the same form; an abort carries a code
 
-Byte 0, the specifier: bits 7 to 5 are the kind. In an upload or download bit 1 (e) says that the data are in this
-frame, bit 0 (s) that their length is stated, bits 3 and 2 (n) how many of the four data bytes are unused. Reserved
-bits are ignored (CiA 301); 0x60 and 0x80, which have no fields, are compared as a whole.
+Byte 0, the specifier: bits 7 to 5 are the kind; bit 1 (e): the data are in this frame, bit 0 (s): their length is
+stated, bits 3 and 2 (n): how many of the four data bytes are unused. Reserved bits are ignored (CiA 301).
 
 Source: KST CAN protocol manual, commands 1 to 9; CiA 301 for the specifier and for transfers in segments. Frames from a
 device never raise an error here; arguments that no frame can carry raise RequestError.
@@ -15,23 +14,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Expected
 from motorbus.errors import RequestError
 
-REQUEST: Final = 0x600
-"""Identifier of a request, plus the node."""
-REPLY: Final = 0x580
-"""Identifier of a reply, plus the node."""
+REQUEST: Final = 0x600  # identifier of a request, plus the node
+REPLY: Final = 0x580  # identifier of a reply, plus the node
 BROADCAST: Final = 0
 NODES: Final = range(1, 128)
-LENGTH: Final = 8
-"""Data bytes of each request and reply."""
-EXPEDITED: Final = 4
-"""Maximum number of value bytes in one frame."""
+LENGTH: Final = 8  # data bytes of each request and reply
+EXPEDITED: Final = 4  # maximum number of value bytes in one frame
 SEGMENT_BYTES: Final = 7
 
 UPLOAD: Final = 0x40
@@ -46,11 +40,9 @@ _S: Final = 1
 
 
 class SdoRequest(NamedTuple):
-    """A decoded request.
+    """A decoded request: "upload", "download", "segment", "abort" or "unknown".
 
-    `node` is 0 for all; `kind` is "upload", "download", "segment", "abort" or "unknown". `data` are the value bytes:
-    of a download that does not state its length (`sized` false) all four, of an abort its code, of an unknown kind
-    bytes 4 to 7; empty for an upload or a segment.
+    `data` is the value of a download (all four bytes unless `sized`), the code of an abort, else bytes 4 to 7 or empty.
     """
 
     node: int
@@ -64,12 +56,10 @@ class SdoRequest(NamedTuple):
 
 
 class SdoReply(NamedTuple):
-    """A decoded reply.
+    """A decoded reply: "upload", "upload-start" (segments follow), "segment", "download" or "abort" (with `code`).
 
-    `kind` is "upload" (with `data`), "upload-start" (segments follow), "segment" (with `data`), "download" or "abort"
-    (with `code`). `size` is the length that the reply states: of `data`, or of the whole value at an upload-start;
-    None where it states none, and `data` are then all four bytes. `index` and `subindex` are 0 in a segment, `toggle`
-    and `last` 0 and False in all other kinds.
+    `size` is the stated length of `data`, or of the whole value at an upload-start. None: not stated, and `data` are
+    all four bytes. A segment has no index.
     """
 
     kind: str
@@ -87,30 +77,27 @@ class SdoReply(NamedTuple):
 
 def encode_upload(node: int, index: int, subindex: int = 0, *, extended: bool = False) -> CanFrame:
     """Read an object of one node or of all (0): `40 il ih sub 00 00 00 00`. `extended`: 29-bit identifier."""
-    return _request(node, _head(UPLOAD, index, subindex), extended, lowest=BROADCAST)
+    return _frame(REQUEST, node, _head(UPLOAD, index, subindex), extended, lowest=BROADCAST)
 
 
 def encode_download(
     node: int, index: int, subindex: int, data: bytes, *, sized: bool = False, extended: bool = False
 ) -> CanFrame:
-    """Write 1 to 4 bytes to an object of one node or of all (0).
-
-    The manual uses specifier 0x22, which does not state the length; `sized` states it as CiA 301 does.
-    """
+    """Write 1 to 4 bytes to an object of one node or of all (0): specifier 0x22, or `sized` as in CiA 301."""
     if not 1 <= len(data) <= EXPEDITED:
         raise RequestError(f"{len(data)} bytes cannot be written in one frame", expected="1 to 4 bytes")
     specifier = DOWNLOAD_SIZED[len(data)] if sized else DOWNLOAD_UNSIZED
-    return _request(node, _head(specifier, index, subindex) + data, extended, lowest=BROADCAST)
+    return _frame(REQUEST, node, _head(specifier, index, subindex) + data, extended, lowest=BROADCAST)
 
 
 def encode_segment(node: int, toggle: int, *, extended: bool = False) -> CanFrame:
     """Request the next segment of an upload; `toggle` is 0 for the first segment, then alternates."""
-    return _request(node, bytes((SEGMENT | _toggle_bit(toggle),)), extended)
+    return _frame(REQUEST, node, bytes((SEGMENT | _toggle_bit(toggle),)), extended)
 
 
 def encode_abort(node: int, index: int, subindex: int, code: int, *, extended: bool = False) -> CanFrame:
     """Abort a transfer as the client; it has no reply."""
-    return _request(node, _head(ABORT, index, subindex) + _four_bytes(code), extended)
+    return _frame(REQUEST, node, _head(ABORT, index, subindex) + _four_bytes(code), extended)
 
 
 def decode_request(frame: CanFrame) -> SdoRequest | None:
@@ -178,7 +165,7 @@ def encode_upload_reply(
     """The value of an object, 1 to 4 bytes: specifier 4F, 4B, 47, 43."""
     if not 1 <= len(data) <= EXPEDITED:
         raise RequestError(f"{len(data)} bytes do not fit one reply", expected="1 to 4 bytes")
-    return _reply(node, upload_head(index, subindex, len(data)) + data, extended)
+    return _frame(REPLY, node, upload_head(index, subindex, len(data)) + data, extended)
 
 
 def encode_upload_start(
@@ -186,8 +173,8 @@ def encode_upload_start(
 ) -> CanFrame:
     """Announce segments of `size` bytes in all: specifier 41; 40 without a stated size (None)."""
     if size is None:
-        return _reply(node, _head(UPLOAD, index, subindex), extended)
-    return _reply(node, _head(UPLOAD | _S, index, subindex) + _four_bytes(size), extended)
+        return _frame(REPLY, node, _head(UPLOAD, index, subindex), extended)
+    return _frame(REPLY, node, _head(UPLOAD | _S, index, subindex) + _four_bytes(size), extended)
 
 
 def encode_segment_reply(
@@ -197,22 +184,19 @@ def encode_segment_reply(
     if len(data) > SEGMENT_BYTES:
         raise RequestError(f"{len(data)} bytes do not fit a segment", expected="0 to 7 bytes")
     specifier = _toggle_bit(toggle) | (SEGMENT_BYTES - len(data)) << 1 | int(last)
-    return _reply(node, bytes((specifier,)) + data, extended)
+    return _frame(REPLY, node, bytes((specifier,)) + data, extended)
 
 
 def encode_download_reply(node: int, index: int, subindex: int, *, extended: bool = False) -> CanFrame:
     """Acknowledge a write: `60 il ih sub 00 00 00 00`."""
-    return _reply(node, _head(DOWNLOADED, index, subindex), extended)
+    return _frame(REPLY, node, _head(DOWNLOADED, index, subindex), extended)
 
 
 def encode_abort_reply(
     node: int, index: int, subindex: int, code: int, *, extended: bool = False
 ) -> CanFrame:
     """Refuse a request: `80 il ih sub` and the code. Source: KST CAN protocol manual, command 9."""
-    return _reply(node, _head(ABORT, index, subindex) + _four_bytes(code), extended)
-
-
-# -- fields ----------------------------------------------------------------------------------------------------
+    return _frame(REPLY, node, _head(ABORT, index, subindex) + _four_bytes(code), extended)
 
 
 def check_node(node: int, *, lowest: int = 1) -> None:
@@ -221,14 +205,9 @@ def check_node(node: int, *, lowest: int = 1) -> None:
         raise RequestError(f"{node} is not a node id", expected=f"{lowest} to 127", node=node)
 
 
-def _request(node: int, data: bytes, extended: bool, *, lowest: int = 1) -> CanFrame:
+def _frame(base: int, node: int, data: bytes, extended: bool, *, lowest: int = 1) -> CanFrame:
     check_node(node, lowest=lowest)
-    return CanFrame(REQUEST + node, data.ljust(LENGTH, b"\0"), extended)
-
-
-def _reply(node: int, data: bytes, extended: bool) -> CanFrame:
-    check_node(node)
-    return CanFrame(REPLY + node, data.ljust(LENGTH, b"\0"), extended)
+    return CanFrame(base + node, data.ljust(LENGTH, b"\0"), extended)
 
 
 def _head(specifier: int, index: int, subindex: int) -> bytes:
@@ -256,16 +235,12 @@ def _toggle_bit(toggle: int) -> int:
     return toggle << 4
 
 
-# -- keys ------------------------------------------------------------------------------------------------------
-
-
 @dataclass(slots=True, eq=False)
 class Key:
     """What a reply has in common with its request beside the node: kind, index and sub-index, or a toggle.
 
-    An abort does not say which kind of request it refuses, and the manual leaves open what it repeats. So an abort
-    equals the requests with its index and sub-index, those with its index if its sub-index is 0, all if it says 0:0,
-    and every segment. Equality is symmetric but not transitive, so all keys have one hash.
+    The manual leaves open what an abort repeats. So an abort equals requests with its index and sub-index, or with its
+    index if its sub-index is 0, or all if it says 0:0, and every segment. Equality is not transitive: one hash for all.
     """
 
     kind: str
@@ -307,41 +282,39 @@ def segment_due(node: int, toggle: int) -> Expected:
 
 # -- abort codes -----------------------------------------------------------------------------------------------
 
-ABORTS: Final[Mapping[int, str]] = MappingProxyType(
-    {
-        0x0503_0000: "Toggle bit not alternated",
-        0x0504_0000: "SDO protocol timed out",
-        0x0504_0001: "Client/server command specifier not valid or unknown",
-        0x0504_0002: "Invalid block size (block mode only)",
-        0x0504_0003: "Invalid sequence number (block mode only)",
-        0x0504_0004: "CRC error (block mode only)",
-        0x0504_0005: "Out of memory",
-        0x0601_0000: "Unsupported access to an object",
-        0x0601_0001: "Attempt to read a write only object",
-        0x0601_0002: "Attempt to write a read only object",
-        0x0602_0000: "Object does not exist in the object dictionary",
-        0x0604_0041: "Object cannot be mapped to the PDO",
-        0x0604_0042: "The number and length of the objects to be mapped would exceed PDO length",
-        0x0604_0043: "General parameter incompatibility reason",
-        0x0604_0047: "General internal incompatibility in the device",
-        0x0606_0000: "Access failed due to a hardware error",
-        0x0607_0010: "Data type does not match, length of service parameter does not match",
-        0x0607_0012: "Data type does not match, length of service parameter too high",
-        0x0607_0013: "Data type does not match, length of service parameter too low",
-        0x0609_0011: "Sub-index does not exist",
-        0x0609_0030: "Value range of parameter exceeded (only for write access)",
-        0x0609_0031: "Value of parameter written too high",
-        0x0609_0032: "Value of parameter written too low",
-        0x0609_0036: "Maximum value is less than minimum value",
-        0x060A_0023: "Resource not available: SDO connection",
-        0x0800_0000: "General error",
-        0x0800_0020: "Data cannot be transferred or stored to the application",
-        0x0800_0021: "Data cannot be transferred or stored to the application because of local control",
-        0x0800_0022: "Data cannot be transferred or stored to the application because of the present device state",
-        0x0800_0023: "Object dictionary dynamic generation fails or no object dictionary is present",
-        0x0800_0024: "No data available",
-    }
-)
+ABORTS: Final[Mapping[int, str]] = {
+    0x0503_0000: "Toggle bit not alternated",
+    0x0504_0000: "SDO protocol timed out",
+    0x0504_0001: "Client/server command specifier not valid or unknown",
+    0x0504_0002: "Invalid block size (block mode only)",
+    0x0504_0003: "Invalid sequence number (block mode only)",
+    0x0504_0004: "CRC error (block mode only)",
+    0x0504_0005: "Out of memory",
+    0x0601_0000: "Unsupported access to an object",
+    0x0601_0001: "Attempt to read a write only object",
+    0x0601_0002: "Attempt to write a read only object",
+    0x0602_0000: "Object does not exist in the object dictionary",
+    0x0604_0041: "Object cannot be mapped to the PDO",
+    0x0604_0042: "The number and length of the objects to be mapped would exceed PDO length",
+    0x0604_0043: "General parameter incompatibility reason",
+    0x0604_0047: "General internal incompatibility in the device",
+    0x0606_0000: "Access failed due to a hardware error",
+    0x0607_0010: "Data type does not match, length of service parameter does not match",
+    0x0607_0012: "Data type does not match, length of service parameter too high",
+    0x0607_0013: "Data type does not match, length of service parameter too low",
+    0x0609_0011: "Sub-index does not exist",
+    0x0609_0030: "Value range of parameter exceeded (only for write access)",
+    0x0609_0031: "Value of parameter written too high",
+    0x0609_0032: "Value of parameter written too low",
+    0x0609_0036: "Maximum value is less than minimum value",
+    0x060A_0023: "Resource not available: SDO connection",
+    0x0800_0000: "General error",
+    0x0800_0020: "Data cannot be transferred or stored to the application",
+    0x0800_0021: "Data cannot be transferred or stored to the application because of local control",
+    0x0800_0022: "Data cannot be transferred or stored to the application because of the present device state",
+    0x0800_0023: "Object dictionary dynamic generation fails or no object dictionary is present",
+    0x0800_0024: "No data available",
+}
 """Code -> the words of the manual, which prints 29 codes of CiA 301, high word first ("0602 0000"); on the wire they
 are little-endian. 0x060A0023 and 0x08000024 are from CiA 301 version 4.2."""
 

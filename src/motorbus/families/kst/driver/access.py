@@ -12,7 +12,7 @@ from motorbus.errors import DeviceError, UnexpectedReply
 from motorbus.families.kst.driver.motion import send_target, setpoint, target
 from motorbus.families.kst.driver.node import Node
 from motorbus.families.kst.driver.requests import is_absent, read_register, write_register
-from motorbus.families.kst.driver.storage import store
+from motorbus.families.kst.driver.settings import store
 
 METHODS: Final[Mapping[str, str]] = {
     "node_id": "set_node_id(), or provision(), which also verifies it after the restart",

@@ -32,9 +32,9 @@ async def broadcast_read(name: str, settings: BusSettings = DEFAULT) -> dict[int
     if not row.readable:
         raise RequestError(f"{name} can only be written")
     # Reserve the bus: a reply to a broadcast looks like a reply to a request to that node.
-    request = Request[Response](settings.upload(sdo.BROADCAST, row), ANY, lane=EVERY_LANE)
+    answer = await Exclusive(Request[Response](settings.upload(sdo.BROADCAST, row), ANY, lane=EVERY_LANE))
     values: dict[int, set[bytes]] = {}
-    for reply in (await Exclusive(request)).replies:
+    for reply in answer.replies:
         one = sdo.decode_reply(reply.data)
         if one and one.kind == "upload" and (one.index, one.subindex) == (row.address, row.subindex):
             try:
@@ -54,11 +54,7 @@ async def broadcast_position(
     """
     checked = checked_ids(nodes)
     if not checked:
-        raise RequestError(
-            "a broadcast moves all servos on the bus, and none is named",
-            expected="the ids of all servos on it",
-            advice="scan() lists them",
-        )
+        raise RequestError("a broadcast moves all servos on the bus", expected="their ids; scan() lists them")
     row = settings.profile.table["goal_position"]
     raw = target(Node(checked[0], settings), to)
     value, low, high = (float(row.to_value(one)) for one in (raw, row.low, row.high))
@@ -67,14 +63,8 @@ async def broadcast_position(
     async def start_and_move() -> tuple[int, ...]:
         if settings.must_start:
             frame = encode_start(settings.nmt, sdo.BROADCAST, True, extended=settings.extended)
-            await Request[Response](
-                frame,
-                (),
-                lane=EVERY_LANE,
-                priority=Priority.CONTROL,
-                effect=Effect.MOTION,
-                setpoints=setpoints,
-            )
+            priority, effect = Priority.CONTROL, Effect.MOTION
+            await Request(frame, lane=EVERY_LANE, priority=priority, effect=effect, setpoints=setpoints)
             await Emit(Started(sdo.BROADCAST, frame))
         return await _write(settings, "goal_position", raw, setpoints)
 
@@ -99,8 +89,7 @@ async def broadcast_node_id(
     if not force:
         raise RequestError(
             f"a broadcast would give every servo on this bus the id {new}",
-            cause="servos with one id answer together, and can be given different ids only one at a time",
-            advice="connect one servo and use provision(), or say force=True",
+            expected="force=True where that is meant; else connect one servo and use provision()",
         )
     await Emit(IdChanged(None, new))
     return await Exclusive(_write(settings, "node_id", new))

@@ -21,7 +21,7 @@ from motorbus.families.kst.driver.motion import Promise, hold
 from motorbus.families.kst.driver.node import DEFAULT, Node
 from motorbus.families.kst.driver.requests import acknowledged, decoded, upload
 from motorbus.families.kst.driver.scan import scan
-from motorbus.families.kst.driver.storage import LISTEN
+from motorbus.families.kst.driver.settings import LISTEN
 from motorbus.families.kst.driver.stream import open_stream
 from motorbus.families.kst.notifications import BusState, FrameReceiver
 from motorbus.families.kst.profiles import PROFILES
@@ -37,8 +37,7 @@ BROADCAST_TIME: Final = 0.100
 """s in which all servos have answered a broadcast: a public demo driver collects until 100 ms pass without a reply."""
 QUIET: Final = 0.020
 """s beside the frames that may still be on their way; as long as the bus waits for a late reply."""
-FRAMES_IN_ADAPTER: Final = 5
-"""Frames of one node that an adapter may hold. # assumption"""
+FRAMES_IN_ADAPTER: Final = 5  # frames of one node that an adapter may hold # assumption
 
 
 _AXIS: Final = AxisDriver(

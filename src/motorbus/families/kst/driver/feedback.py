@@ -57,13 +57,12 @@ def status(node: Node) -> Request[RawStatus | Status]:
 
 
 def _status(node: Node) -> Request[Status]:
-    """Raises RequestError where the profile has no status object."""
     row = feature_row(node, "status", "current and temperature")
+    return read_register(node, row, lambda raw: _decode_status(node, raw))
 
-    def take(raw: int) -> Status:
-        return Status(profiles.current(node.profile, raw), float(profiles.temperature(raw)))
 
-    return read_register(node, row, take)
+def _decode_status(node: Node, raw: int) -> Status:
+    return Status(profiles.current(node.profile, raw), float(profiles.temperature(raw)))
 
 
 async def current(node: Node) -> float:
@@ -79,30 +78,29 @@ async def temperature(node: Node) -> float:
 async def telemetry(node: Node) -> State:
     """One sample: position (rad), with newer firmware current (A) and temperature (°C), recent alarms."""
     here = await position(node)
-    at = node.at
-    if node.profile.status_row is None:
-        return State(at=at, position=here, alarm=node.alarm)
-    now = await _status(node)
-    return State(at=at, position=here, current=now.current, temperature=now.temperature, alarm=node.alarm)
+    state = State(at=node.at, position=here)
+    if node.profile.status_row is not None:
+        state = state._replace(**(await _status(node))._asdict())
+    return state._replace(alarm=node.alarm)
 
 
 def health(node: Node) -> Request[Health]:
     """Current (A), temperature (°C) and recent alarms; by a profile without a status object the position (rad).
 
-    `restarts` counts the boot messages (CiA 301) received from the node. No source says that these servos send one: a
-    servo that does not restarts unnoticed, or is silent for a while.
+    `restarts` counts the boot messages (CiA 301) received from the node; no source says that these servos send one.
     """
-    profile, bus = node.profile, node.settings.state
-    has_status = profile.status_row is not None
-    row = profile.status_row or node.table["present_position"]
+    status_row, bus = node.profile.status_row, node.settings.state
+    row = status_row or node.table["present_position"]
 
     def take(raw: int) -> Health:
-        state = State(at=node.at, alarm=node.alarm)
-        if has_status:
-            now = profiles.current(profile, raw), float(profiles.temperature(raw))
-            state = state._replace(current=now[0], temperature=now[1])
-        else:
-            state = state._replace(position=float(row.to_value(raw)))
-        return Health(state, restarts=None if bus is None else bus.boots[node.node])
+        values = (
+            {"position": float(row.to_value(raw))}
+            if status_row is None
+            else _decode_status(node, raw)._asdict()
+        )
+        return Health(
+            State(at=node.at, alarm=node.alarm, **values),
+            restarts=None if bus is None else bus.boots[node.node],
+        )
 
-    return read_register(node, row, take, reports_position=not has_status)
+    return read_register(node, row, take, reports_position=status_row is None)

@@ -16,8 +16,8 @@ from typing import Final, NamedTuple
 
 from motorbus.core.family import IdChanged, Identity
 from motorbus.core.request import ANY, Notification, Priority, Request, Response
-from motorbus.core.steps import Emit, Exclusive, WaitFor, catch, gather
-from motorbus.errors import DeviceError, MotorbusError, NoReply, RequestError, VerificationFailed
+from motorbus.core.steps import Emit, Exclusive, WaitFor, gather
+from motorbus.errors import DeviceError, NoReply, RequestError, VerificationFailed
 from motorbus.families.kst.driver.node import Node, checked_id, hexadecimal
 from motorbus.families.kst.driver.requests import (
     ask_presence,
@@ -32,8 +32,7 @@ from motorbus.families.kst.profiles import BIT_RATES, bit_rate_code, version_tex
 ROUNDS: Final = 3
 OBJECTS: Final = ("node_id", "present_position", "firmware_version")
 """Two servos may agree on the id, and seldom on position and version."""
-ERROR_TIME: Final = 0.5
-"""s in which bus errors count; about the time that all reads of a survey take."""
+ERROR_TIME: Final = 0.5  # s in which bus errors count; about the time that all reads of a survey take
 
 
 async def ping(node: Node) -> bool:
@@ -52,12 +51,9 @@ async def identify(node: Node) -> Identity:
         firmware = await version(node)
     except DeviceError:
         firmware = "unknown"
-    details = {
-        "profile": node.profile.name,
-        "id_format": "ext" if node.settings.extended else "std",
-        "reads_back_id": reads_back,
-    }
-    return Identity(node.node, node.profile.title, firmware, node.profile.name, details)
+    name, id_format = node.profile.name, "ext" if node.settings.extended else "std"
+    details = {"profile": name, "id_format": id_format, "reads_back_id": reads_back}
+    return Identity(node.node, node.profile.title, firmware, name, details)
 
 
 async def version(node: Node) -> str:
@@ -81,9 +77,6 @@ async def _read_id(node: Node) -> int | None:
         return await node_id(node)
     except DeviceError:
         return None
-
-
-# -- node id ---------------------------------------------------------------------------------------------------
 
 
 def node_id(node: Node) -> Request[int]:
@@ -110,7 +103,6 @@ def id_taken(old: int, new: int) -> RequestError:
     """The error for a new id at which a servo answers."""
     return RequestError(
         f"the id {hexadecimal(new)} is taken: a servo answers as it beside {hexadecimal(old)}",
-        cause="after a restart both would answer to one id, and neither could be addressed alone",
         advice="choose a free id, or take that servo off the bus",
         node=new,
     )
@@ -131,20 +123,16 @@ async def write_node_id(node: Node, new: int) -> None:
         )
 
 
-# -- bit rate --------------------------------------------------------------------------------------------------
-
-
 async def bit_rate(node: Node) -> int | None:
     """The rate (bit/s) after the next restart; None where the servo does not report it: the manual has no read."""
-    code = await catch(read_register(node, node.table["bit_rate_code"], int))
-    if isinstance(code, NoReply):
+    try:
+        return BIT_RATES.get(await read_register(node, node.table["bit_rate_code"], int))
+    except NoReply:
         await ask_presence(node)  # raises NoReply when there is no servo
-        return None
-    if isinstance(code, MotorbusError):
-        if not is_absent(code):
-            raise code
-        return None
-    return BIT_RATES.get(code)
+    except DeviceError as error:
+        if not is_absent(error):
+            raise
+    return None
 
 
 def set_bit_rate(node: Node, rate: int) -> Request[None]:
@@ -180,15 +168,8 @@ def look(node: Node, name: str = "node_id") -> Request[Look]:
     return Request(node.settings.upload(node.node, row), ANY, decode, lane=node.node)
 
 
-class Survey(NamedTuple):
-    """Whether a servo answers, and the evidence that a second one does ("": none)."""
-
-    answered: bool
-    second: str
-
-
-async def survey(node: Node) -> Survey:
-    """Read several objects several times and watch for bus errors. Run it with the bus reserved."""
+async def survey(node: Node) -> tuple[bool, str]:
+    """Whether a servo answers, and the evidence that a second one does ("": none). Run it with the bus reserved."""
 
     async def read_often() -> dict[str, list[int]]:
         counts: dict[str, list[int]] = {name: [] for name in OBJECTS}
@@ -205,20 +186,20 @@ async def survey(node: Node) -> Survey:
         second = "bus errors whenever it is read"
     elif all(counts["node_id"]) and not any(counts["present_position"]):
         second = "its id comes every time, its position never"
-    return Survey(most > 0, second)
+    return most > 0, second
 
 
 async def answers_alone(node: Node) -> bool:
     """Whether a servo answers to this id. Raises RequestError when two do. Run it with the bus reserved."""
-    found = await survey(node)
-    if not found.second:
-        return found.answered
-    raise RequestError(
-        f"two servos answer as {hexadecimal(node.node)}: {found.second}",
-        cause="servos are shipped with one id, and both obey what is sent to it; or the bus is disturbed",
-        advice="connect one servo at a time, provision it, then the next",
-        node=node.node,
-    )
+    answered, second = await survey(node)
+    if second:
+        raise RequestError(
+            f"two servos answer as {hexadecimal(node.node)}: {second}",
+            cause="servos are shipped with one id, and both obey what is sent to it; or the bus is disturbed",
+            advice="connect one servo at a time, provision it, then the next",
+            node=node.node,
+        )
+    return answered
 
 
 def is_bus_error(notification: Notification) -> bool:

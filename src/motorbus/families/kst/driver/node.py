@@ -25,7 +25,8 @@ class BusSettings:
     `profile`   a name of `PROFILES`: scale, range, objects and start rule of the maker
     `extended`  29-bit identifiers (id_format=ext); else 11-bit
     `sized`     writes state their length (CiA 301); else specifier 0x22, as in the manual
-    `nmt`       form of start and stop: "none", "vendor" or "standard"
+    `nmt`       form of start and stop: "none", "vendor" or "standard"; with the last, servos must be started
+                before they accept positions (`must_start`)
     `state`     what the open bus has received; None before it is opened
     """
 
@@ -44,17 +45,13 @@ class BusSettings:
         self.sized: Final = _choice("sized", sized, SIZED) == "yes"
         form = _choice("nmt", nmt, NMT)
         self.nmt: Final = self.profile.nmt if form == "profile" else form
+        self.must_start: Final = self.nmt == "standard"
         self.state: Final = state
         self._given: Final = {"profile": profile, "id_format": id_format, "sized": sized, "nmt": nmt}
 
     def replace(self, **changed: Any) -> BusSettings:
         """These settings with some replaced; the state is shared unless it is replaced."""
         return BusSettings(**{**self._given, "state": self.state, **changed})
-
-    @property
-    def must_start(self) -> bool:
-        """Servos ignore positions until they are started."""
-        return self.nmt == "standard"
 
     def upload(self, node: int, row: Register) -> CanFrame:
         """The request that reads this object of one servo or of all (0)."""
@@ -75,8 +72,7 @@ def _choice(name: str, value: object, choices: Iterable[str]) -> str:
     raise RequestError(f"{name}={value} is not possible", expected=f"one of {', '.join(choices)}")
 
 
-DEFAULT: Final = BusSettings()
-"""The settings of the manual."""
+DEFAULT: Final = BusSettings()  # the settings of the manual
 
 
 class Node:
@@ -84,9 +80,9 @@ class Node:
 
     `at`         arrival time of its last reply (s, link clock)
     `limits`     travel limits (rad) as last read; None: not read yet
-    `unsaved`    names of rows that were written here and may not be saved
+    `unsaved`    names of objects that were written here and may not be saved
     `last_move`  identifies its latest move
-    `reading`    the request of its position, which is made once
+    `reading`    the request for its position, which is made once
     """
 
     def __init__(self, node: int, settings: BusSettings = DEFAULT) -> None:
@@ -129,17 +125,13 @@ class Node:
 
 
 def feature_row(node: Node, name: str, feature: str) -> Register:
-    """The object that this feature needs.
-
-    Raises RequestError, with the profiles that have it, where the profile of this servo has not.
-    """
+    """The object that this feature needs. Raises RequestError, with the profiles that have it, where it is missing."""
     if name in node.table:
         return node.table[name]
-    having = [profile.name for profile in PROFILES.values() if name in profile.table]
+    profiles = [profile.name for profile in PROFILES.values() if name in profile.table]
     raise RequestError(
         f"node {node.node}: the profile {node.profile.name} has no {feature}",
-        expected=f"a servo of the profile {' or '.join(having)}",
-        advice=f"if this servo has it, choose its profile, as in kst:PORT,profile={having[0]}",
+        expected=f"a servo of the profile {' or '.join(profiles)}, as in kst:PORT,profile={profiles[0]}",
         node=node.node,
     )
 
@@ -148,11 +140,7 @@ def checked_id(node: int) -> int:
     """The id of one servo. Raises RequestError for anything else, also for 0 (all servos)."""
     if isinstance(node, int) and not isinstance(node, bool) and node in sdo.NODES:
         return node
-    raise RequestError(
-        f"{shown(node)} is not the id of a servo",
-        expected="1 to 127 (0 addresses all servos)",
-        advice="`motorbus scan BUS` lists the servos",
-    )
+    raise RequestError(f"{shown(node)} is not the id of a servo", expected="1 to 127; 0 addresses all servos")
 
 
 def checked_ids(nodes: Iterable[int]) -> list[int]:

@@ -8,12 +8,13 @@ servo has come back with the new values. Source: KST CAN protocol manual, comman
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Final, NamedTuple
 
 from motorbus.core.request import Priority
 from motorbus.core.scan import BitrateRestored
 from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate, Sleep
-from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown, RequestError, VerificationFailed
+from motorbus.errors import NoReply, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.kst.driver.identity import (
     Look,
     answers_alone,
@@ -26,13 +27,11 @@ from motorbus.families.kst.driver.identity import (
 )
 from motorbus.families.kst.driver.node import Node, check_above_zero, checked_id, hexadecimal
 from motorbus.families.kst.driver.scan import broadcast_ids, set_named_rate
-from motorbus.families.kst.driver.storage import save
+from motorbus.families.kst.driver.settings import save
 from motorbus.families.kst.profiles import bit_rate_code
 
-TIMEOUT: Final = 120.0
-"""s to wait for the power cycle."""
-PERIOD: Final = 0.1
-"""s between two reads while waiting."""
+TIMEOUT: Final = 120.0  # s to wait for the power cycle
+PERIOD: Final = 0.1  # s between two reads while waiting
 SILENT_READS: Final = 3
 """Reads without a reply in a row that count as a loss of power; a single one may be a lost frame."""
 STEPS: Final = 4
@@ -116,92 +115,95 @@ class Change:
         self.rate = rate
         self.new_rate = new_rate
 
-    # -- write ---------------------------------------------------------------------------------------------------
-
     async def write(self) -> Place | None:
         """Find the servo, write what is missing, save. None: it has everything already, nothing was written."""
         async with BitrateRestored():
             await Emit(Progress(0, STEPS, "looking for the servo"))
-            place = await self._find()
-            node, new = place.node, self.new.node
+            node, rate, _ = await self._find()
             before = await look(node)
-            if (node.node, place.rate) == (new, self.new_rate):
+            if (node, rate) == (self.new, self.new_rate):
                 return None
-            if place.rate != self.new_rate:
-                await self._check_alone(place)
+            if rate != self.new_rate:
+                await self._check_no_other(rate)
             await Emit(Progress(1, STEPS, f"writing to {hexadecimal(node.node)}"))
-            if node.node != new or before.reads_back not in (None, new):
-                await write_node_id(node, new)
-            if place.rate != self.new_rate:
+            if node is not self.new or before.reads_back not in (None, node.node):
+                await write_node_id(node, self.new.node)
+            if rate != self.new_rate:
                 await set_bit_rate(node, self.new_rate)
             written = await look(node)
             await Emit(Progress(2, STEPS, "saving"))
             await save(node)
-            return place._replace(reads_back=written.reads_back)
+            return Place(node, rate, written.reads_back)
 
     async def _find(self) -> Place:
         """The id and rate, of the old and the new ones, at which the servo answers now."""
-        old, new = self.old, self.new
+        nodes = dict.fromkeys((self.old, self.new))
         rates = dict.fromkeys((self.rate, self.new_rate))
         for rate in rates:
             if rate != self.rate:
-                await set_named_rate(old.settings, rate)
-            found = [node for node in dict.fromkeys((old, new)) if await answers_alone(node)]
+                await set_named_rate(self.old.settings, rate)
+            found = [node for node in nodes if await answers_alone(node)]
             if len(found) == 2:
-                raise id_taken(old.node, new.node)
+                raise id_taken(self.old.node, self.new.node)
             if found:
                 return Place(found[0], rate)
-        ids = dict.fromkeys((old.node, new.node))
         raise NoReply(
-            f"no servo answers as {' or '.join(map(hexadecimal, ids))}",
+            f"no servo answers as {' or '.join(hexadecimal(node.node) for node in nodes)}",
             expected=f"one servo at {' or '.join(map(str, rates))} bit/s",
             cause="no power, a loose cable, another id, or another bit rate",
             advice="`motorbus scan BUS` lists the servos",
-            node=old.node,
+            node=self.old.node,
         )
 
-    async def _check_alone(self, place: Place) -> None:
+    async def _check_no_other(self, rate: int) -> None:
         """A servo at another rate breaks the frames of the others."""
         answer = await broadcast_ids(self.old.settings, Priority.POLL)
         others = sorted({reply.lane for reply in answer.replies} - {self.old.node, self.new.node})
         if others:
             raise RequestError(
-                f"{hexadecimal(place.node.node)} is not alone: {', '.join(map(hexadecimal, others))} would stay at "
-                f"{place.rate} bit/s",
+                f"the servo is not alone: {', '.join(map(hexadecimal, others))} would stay at {rate} bit/s",
                 cause="servos at two rates on one bus break each other's frames",
                 advice="connect it alone; broadcast_bit_rate() and broadcast_save() change all at once",
-                node=place.node.node,
+                node=self.old.node,
             )
 
-    # -- wait for the power cycle --------------------------------------------------------------------------------
-
     async def wait(self, place: Place, timeout: float) -> None:
-        """Read at the old place and the new one in turn until the servo answers at the new one only."""
+        """Read at the old place and the new one in turn until the servo answers at the new one only.
+
+        Another rate is tried only while the servo is silent at the old one.
+        """
         old, new = place.node.node, self.new.node
         begun = await Sleep(0)
         silent = 0
         while True:
             now = await self._look(place.node, place.rate)
-            arrived = await self._has_arrived(place, now)
+            arrived = False
+            if not now.replies or place.rate == self.new_rate:
+                with suppress(RequestError):  # the bus is in use at the old rate
+                    arrived = (await self._look(self.new, self.new_rate)).replies > 0
             if arrived and not now.replies:
                 return
             pending = now.reads_back == new != old  # it has not restarted
             forgotten = place.reads_back == new != old == now.reads_back
             if now.replies and (forgotten or (silent >= SILENT_READS and not pending)):
-                raise self._answers_at_both(place) if arrived else self._unchanged(place)
+                if arrived:
+                    raise self._answers_at_both(old)
+                raise VerificationFailed(
+                    f"{hexadecimal(old)} came back as it was, at {place.rate} bit/s: the change was not saved",
+                    cause="its supply went before its flash was written, or it did not receive the save",
+                    advice="call provision again, and keep its supply on until the power cycle is needed",
+                    node=old,
+                )
             silent = 0 if now.replies else silent + 1
             if now.at - begun > timeout:
-                raise self._not_back(timeout)
+                raise OutcomeUnknown(
+                    f"{hexadecimal(self.old.node)} was set to {hexadecimal(new)} at {self.new_rate} bit/s and saved; "
+                    f"it did not come back within {timeout:g} s",
+                    cause="its supply has not been taken away and given back yet",
+                    advice="power-cycle it, then call provision again: it continues from the present state",
+                    node=self.old.node,
+                )
             await Sleep(PERIOD)
-
-    async def _has_arrived(self, place: Place, now: Look) -> bool:
-        """Whether it answers at the new place. Another rate is tried only while it is silent at the old one."""
-        if now.replies and place.rate != self.new_rate:
-            return False
-        try:
-            return (await self._look(self.new, self.new_rate)).replies > 0
-        except RequestError:  # the bus is in use at the old rate
-            return False
 
     async def _look(self, node: Node, rate: int) -> Look:
         """Read the id once; at another rate than that of the bus with the bus reserved."""
@@ -213,58 +215,40 @@ class Change:
 
         return await (look(node) if rate == self.rate else Exclusive(at_other_rate()))
 
-    # -- verify --------------------------------------------------------------------------------------------------
-
     async def verify(self, place: Place | None) -> str:
         """Check that one servo answers at the new place, and none at the old one. Returns its firmware version."""
+        new = self.new.node
         async with BitrateRestored():
             if self.new_rate != self.rate:
                 await SetBitrate(self.new_rate)
             moved = place is not None and place.rate == self.new_rate and place.node is not self.new
             if place is not None and moved and (await look(place.node)).replies:
-                raise self._answers_at_both(place)
-            if second := (await survey(self.new)).second:
+                raise self._answers_at_both(place.node.node)
+            _, second = await survey(self.new)
+            if second:
                 raise VerificationFailed(
-                    f"two servos answer as {hexadecimal(self.new.node)} after the restart: {second}",
+                    f"two servos answer as {hexadecimal(new)} after the restart: {second}",
                     cause="a servo that had this id already has joined the bus, or the bus is disturbed",
                     advice="take one of them off the bus, then provision the other one to a free id",
-                    node=self.new.node,
+                    node=new,
                 )
             identity = await identify(self.new)
             found = identity.details["reads_back_id"]
-            if found not in (None, self.new.node):
+            if found not in (None, new):
                 raise VerificationFailed(
-                    f"it answers as {hexadecimal(self.new.node)} and reads back the id {found}",
+                    f"it answers as {hexadecimal(new)} and reads back the id {found}",
                     cause="another id was written to it since, which the next restart may bring into force",
-                    advice=f"set_node_id({self.new.node}) and save(), power-cycle it, then call this again",
-                    node=self.new.node,
+                    advice=f"set_node_id({new}) and save(), power-cycle it, then call this again",
+                    node=new,
                 )
             return identity.firmware
 
-    # -- errors --------------------------------------------------------------------------------------------------
-
-    def _answers_at_both(self, place: Place) -> MotorbusError:
+    def _answers_at_both(self, old: int) -> OutcomeUnknown:
+        new = hexadecimal(self.new.node)
         return OutcomeUnknown(
-            f"{hexadecimal(self.new.node)} answers, and {hexadecimal(place.node.node)} does too: which of them is the "
-            "servo that was provisioned is not known",
+            f"{new} answers, and {hexadecimal(old)} does too: which of them is the servo that was provisioned is not "
+            "known",
             cause="another servo has joined the bus meanwhile, or this one has not restarted",
             advice="take one of them off the bus, then call provision again: it continues from the present state",
             node=self.new.node,
-        )
-
-    def _unchanged(self, place: Place) -> MotorbusError:
-        return VerificationFailed(
-            f"{hexadecimal(place.node.node)} came back as it was, at {place.rate} bit/s: the change was not saved",
-            cause="its supply went before its flash was written, or it did not receive the save, which has no reply",
-            advice="call provision again, and keep its supply on until the power cycle is asked for",
-            node=place.node.node,
-        )
-
-    def _not_back(self, timeout: float) -> MotorbusError:
-        return OutcomeUnknown(
-            f"{hexadecimal(self.old.node)} was set to {hexadecimal(self.new.node)} at {self.new_rate} bit/s "
-            f"and saved; it did not come back within {timeout:g} s",
-            cause="its supply has not been taken away and given back yet",
-            advice="power-cycle it, then call provision again: it continues from the present state",
-            node=self.old.node,
         )

@@ -27,12 +27,8 @@ UNSIZED_REFUSED: Final = frozenset((0x0504_0001, 0x0607_0010, 0x0607_0012, 0x060
 """Abort codes that may mean "state the length"."""
 ABSENT: Final = frozenset((0x0601_0000, 0x0601_0001, 0x0602_0000, 0x0609_0011))
 """Abort codes of an object that cannot be read."""
-SEGMENTS: Final = 40
-"""Maximum segments, of 7 bytes, of a value; a version has a few."""
+SEGMENTS: Final = 40  # maximum segments, of 7 bytes, of a value; a version has a few
 GENERAL_ERROR: Final = 0x0800_0000
-
-
-# -- read ------------------------------------------------------------------------------------------------------
 
 
 def upload(
@@ -60,10 +56,7 @@ def upload(
 def read_register(
     node: Node, row: Register, take: Callable[[int], T], *, reports_position: bool = False
 ) -> Request[T]:
-    """Read an object; `take` makes the value of its raw value.
-
-    Raises DeviceError for an abort, UnexpectedReply for a reply of another size.
-    """
+    """Read an object; `take` gets its raw value. Raises DeviceError for an abort, UnexpectedReply for another size."""
 
     def decode(answer: Response) -> T:
         return take(row.decode(value_bytes(node, row, accepted(node, row, answer))))
@@ -78,10 +71,7 @@ def read_register(
 
 
 def value_bytes(node: Node, row: Register, reply: SdoReply) -> bytes:
-    """The bytes of this object in a reply; further bytes may only repeat its sign, or be of no stated length.
-
-    Raises UnexpectedReply for a value of another size, or in segments.
-    """
+    """The bytes of this object in a reply. Raises UnexpectedReply for another size, save for an extended sign."""
     own, more = reply.data[: row.size], reply.data[row.size :]
     extended = more in (bytes(len(more)), b"\xff" * len(more) if own[-1:] > b"\x7f" else b"")
     if reply.kind == "upload" and len(own) == row.size and (reply.size is None or extended):
@@ -104,9 +94,6 @@ def ask_presence(node: Node) -> Request[None]:
     return upload(node, node.table["node_id"], decode)
 
 
-# -- write -----------------------------------------------------------------------------------------------------
-
-
 def write_register(
     node: Node,
     row: Register,
@@ -118,7 +105,7 @@ def write_register(
 ) -> Request[None]:
     """Write an object. Raises RequestError outside its range, DeviceError for an abort, OutcomeUnknown without a reply.
 
-    The acknowledgement proves receipt only. A mid point is not repeated: the servo may have moved by then.
+    A mid point is not repeated: the servo may have moved by then.
     """
 
     def decode(answer: Response) -> None:
@@ -135,9 +122,6 @@ def write_register(
         repeatable=row.name != "mid_point",
         precondition=precondition,
     )
-
-
-# -- replies ---------------------------------------------------------------------------------------------------
 
 
 def accepted(node: Node, row: Register, answer: Response) -> SdoReply:
@@ -189,14 +173,8 @@ def is_absent(error: object) -> bool:
     return isinstance(error, DeviceError) and sdo.meant_code(error.code) in ABSENT
 
 
-# -- values of more than four bytes ----------------------------------------------------------------------------
-
-
 async def read_all_bytes(node: Node, row: Register) -> bytes:
-    """All bytes of a value: from one reply, or segment by segment with the bus reserved.
-
-    Raises DeviceError for an abort, UnexpectedReply for invalid segments.
-    """
+    """All bytes of a value, from one reply or in segments. Raises UnexpectedReply for invalid segments."""
 
     def take(answer: Response) -> SdoReply:
         return accepted(node, row, answer)

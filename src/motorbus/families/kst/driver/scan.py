@@ -13,14 +13,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from enum import Enum
-from functools import partial
 from typing import Final, NamedTuple
 
 from motorbus.core.family import Found, Identity
 from motorbus.core.request import ANY, EVERY_LANE, Priority, Request, Response, TimeoutClass
-from motorbus.core.scan import BitrateRestored, Skipped, scan_rates
+from motorbus.core.scan import BitrateRestored, Skipped
 from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate, WaitFor, catch, gather
-from motorbus.errors import LinkError, LinkLost, NoReply, RequestError, WireError
+from motorbus.errors import LinkError, LinkLost, MotorbusError, NoReply, RequestError, WireError
 from motorbus.families.kst import sdo
 from motorbus.families.kst.driver.feedback import position
 from motorbus.families.kst.driver.identity import identify, is_bus_error, look
@@ -29,22 +28,15 @@ from motorbus.families.kst.driver.requests import decoded, upload
 from motorbus.families.kst.notifications import BusState
 from motorbus.families.kst.profiles import RATES, bit_rate_code
 
-PASSES: Final = 2
-"""A silent id is read twice: a servo may miss the first frame after power-up."""
-BATCH: Final = 16
-"""Ids that are read at the same time."""
+PASSES: Final = 2  # a silent id is read twice: a servo may miss the first frame after power-up
+BATCH: Final = 16  # ids that are read at the same time
 SHORT_LISTEN: Final = 0.25
 """s to listen at a rate that the caller has named; two periods of traffic at 10 Hz."""
-LISTEN: Final = 1.0
-"""s to listen at each rate of `scan_bit_rates`."""
-WRONG_RATE: Final = (
-    "the first frame caused a bus error and had no reply, so no more were sent: this bus uses another rate"
-)
+LISTEN: Final = 1.0  # s to listen at each rate of `scan_bit_rates`
+WRONG_RATE: Final = "the first frame caused a bus error and had no reply: this bus uses another rate"
 OTHER_FORMAT: Final = "no reply; servos with 29-bit identifiers need id_format=ext, others id_format=std"
 ERRORS: Final = "two servos with one id, another rate on the bus, bad wiring, or a missing terminator"
-TWICE: Final = (
-    "two answers to one request: two servos with one id; connect them one at a time, and provision one"
-)
+TWICE: Final = "two answers to one request: two servos with one id; connect and provision them one at a time"
 TORN: Final = "its id comes, its position never: two servos with one id, whose answers break each other"
 
 
@@ -84,22 +76,17 @@ async def scan(
     asked = checked_ids(ids or sdo.NODES)
     present = await SetBitrate(0)
 
-    async def scan_one(rate: int) -> list[Found]:
-        careful = rate != present
-        return await _scan_at(settings, asked, rate, broadcast=not ids or careful, careful=careful)
-
     async def scan_each() -> list[Found]:
+        found: list[Found] = []
         async with BitrateRestored():
-            usable = []
             for rate in rates:
-                if rate != present and await _is_in_use(settings, rate):
-                    await Emit(Skipped(rate, LineActivity.ERRORS.value))
-                else:
-                    usable.append(rate)
-            return await scan_rates(usable, scan_one)
+                other = rate != present
+                if await _use(settings, rate, listens=other):
+                    found += await _scan_at(settings, asked, rate, broadcast=other or not ids, careful=other)
+        return found
 
-    if tuple(rates) in ((), (present,)):
-        return await scan_one(present)
+    if not rates:
+        return await _scan_at(settings, asked, present, broadcast=not ids)
     return await Exclusive(scan_each())
 
 
@@ -121,48 +108,36 @@ async def scan_bit_rates(
     check_above_zero("seconds", seconds, "s")
 
     async def search() -> BitRates:
+        activity: dict[int, LineActivity] = {}
         async with BitrateRestored():
-            activity = await _listen_at_each(settings, rates, seconds)
-            for rate, what in activity.items():
-                if what is LineActivity.TRAFFIC:
-                    return BitRates(rate, activity)
+            for number, rate in enumerate(rates, 1):
+                what = await catch(listen(settings, rate, seconds))
+                if isinstance(what, LineActivity):
+                    activity[rate] = what
+                    if what is LineActivity.TRAFFIC:
+                        return BitRates(rate, activity)
+                    await Emit(Progress(number, len(rates), f"{rate} bit/s: {what.value}"))
+                elif isinstance(what, LinkError) and not isinstance(what, LinkLost):
+                    await Emit(Skipped(rate, what.summary))  # the adapter cannot listen, or lacks this rate
+                else:
+                    raise what
             if not activity and not isolated:
                 raise RequestError(
                     "this adapter cannot listen without taking part, so its bit rate is not searched for",
-                    expected="an adapter with a listen-only mode",
-                    advice="if nothing depends on this bus, say isolated=True",
+                    expected="an adapter with a listen-only mode, or isolated=True if nothing depends on this bus",
                 )
             activity = activity or dict.fromkeys(rates, LineActivity.SILENCE)
-            silent = [rate for rate in rates if activity.get(rate) is LineActivity.SILENCE]
-            scan_one = partial(_scan_at, settings, sdo.NODES, broadcast=True, careful=True)
-            for rate in silent if isolated else ():
-                if found := await scan_rates([rate], scan_one):
-                    return BitRates(rate, activity, tuple(found))
-            return BitRates(None, activity)
+            for rate in activity if isolated else ():
+                if activity[rate] is LineActivity.SILENCE and await _use(settings, rate, listens=False):
+                    found = await _scan_at(settings, sdo.NODES, rate, broadcast=True, careful=True)
+                    if found:
+                        return BitRates(rate, activity, tuple(found))
+        return BitRates(None, activity)
 
     return await Exclusive(search())
 
 
-# -- listen ----------------------------------------------------------------------------------------------------
-
-
-async def _listen_at_each(
-    settings: BusSettings, rates: Sequence[int], seconds: float
-) -> dict[int, LineActivity]:
-    """What is received at each rate that the adapter can listen at, up to the first with a whole frame."""
-    activity: dict[int, LineActivity] = {}
-    for number, rate in enumerate(rates, 1):
-        try:
-            activity[rate] = await listen(settings, rate, seconds)
-        except LinkLost:
-            raise
-        except LinkError as error:  # it cannot listen, or lacks this rate
-            await Emit(Skipped(rate, error.summary))
-            continue
-        if activity[rate] is LineActivity.TRAFFIC:
-            break
-        await Emit(Progress(number, len(rates), f"{rate} bit/s: {activity[rate].value}"))
-    return activity
+# -- rates -----------------------------------------------------------------------------------------------------
 
 
 async def listen(settings: BusSettings, rate: int, seconds: float) -> LineActivity:
@@ -183,30 +158,34 @@ async def set_named_rate(settings: BusSettings, rate: int) -> None:
 
     Raises RequestError when errors show that the bus is in use at another rate.
     """
-    if await _is_in_use(settings, rate):
+    activity = await catch(listen(settings, rate, SHORT_LISTEN))
+    if isinstance(activity, LinkLost):
+        raise activity
+    if activity is LineActivity.ERRORS:
         raise RequestError(
-            f"nothing is sent at {rate} bit/s: {LineActivity.ERRORS.value}",
+            f"nothing is sent at {rate} bit/s: {activity.value}",
             cause="a frame at a wrong rate breaks the frames of other devices",
             advice="connect this servo alone, and call again",
         )
     await SetBitrate(rate)
 
 
-async def _is_in_use(settings: BusSettings, rate: int) -> bool:
-    """Whether errors show that the bus is in use at another rate; False with an adapter that cannot listen."""
-    try:
-        return await listen(settings, rate, SHORT_LISTEN) is LineActivity.ERRORS
-    except LinkLost:
-        raise
-    except LinkError:
-        return False
+async def _use(settings: BusSettings, rate: int, *, listens: bool) -> bool:
+    """Set this rate, or report why it is left out."""
+    error = await catch(set_named_rate(settings, rate) if listens else SetBitrate(rate))
+    if isinstance(error, LinkLost):
+        raise error
+    if isinstance(error, MotorbusError):
+        in_use = isinstance(error, RequestError)
+        await Emit(Skipped(rate, LineActivity.ERRORS.value if in_use else error.summary))
+    return not isinstance(error, MotorbusError)
 
 
 # -- one rate --------------------------------------------------------------------------------------------------
 
 
 async def _scan_at(
-    settings: BusSettings, asked: Sequence[int], rate: int, *, broadcast: bool, careful: bool
+    settings: BusSettings, asked: Sequence[int], rate: int, *, broadcast: bool, careful: bool = False
 ) -> list[Found]:
     """The servos that answer at the present rate. With `careful` nothing follows a first frame that is broken."""
     state = settings.state or BusState()
@@ -236,7 +215,12 @@ async def _scan_at(
         await Emit(Suspicion(0, rate, OTHER_FORMAT))
     found: list[Found] = []
     for batch in _batches(sorted(there)):
-        found += await _identify(settings, batch, rate, count=not broadcast)
+        nodes = [Node(node, settings) for node in batch]
+        if not broadcast:
+            for seen in await gather(*map(look, nodes)):
+                if seen.replies > 1:
+                    await Emit(Suspicion(seen.node, rate, TWICE))
+        found += await _identify(nodes, rate)
     return found
 
 
@@ -253,16 +237,14 @@ def broadcast_ids(settings: BusSettings, priority: Priority = Priority.CONFIGURA
         mine = tuple(reply for reply, one in pairs if one.index in (row.address, 0))
         return answer._replace(replies=mine)  # without late replies to other requests
 
-    frame = settings.upload(sdo.BROADCAST, row)
-    return Request(frame, ANY, decode, lane=EVERY_LANE, priority=priority)
+    return Request(settings.upload(sdo.BROADCAST, row), ANY, decode, lane=EVERY_LANE, priority=priority)
 
 
 async def _answers(node: Node, rate: int) -> bool:
     """Whether a servo answers, also with an invalid reply."""
-    scan = TimeoutClass.SCAN
-    row = node.table["node_id"]
+    row, within = node.table["node_id"], TimeoutClass.SCAN
     try:
-        await upload(node, row, lambda _: None, priority=Priority.CONFIGURATION, reply_within=scan)
+        await upload(node, row, lambda _: None, priority=Priority.CONFIGURATION, reply_within=within)
     except NoReply:
         return False
     except WireError as error:
@@ -271,16 +253,11 @@ async def _answers(node: Node, rate: int) -> bool:
     return True
 
 
-async def _identify(settings: BusSettings, batch: Sequence[int], rate: int, *, count: bool) -> list[Found]:
-    """Identify these servos. Reports those that two servos seem to be; `count`: by counting replies, too."""
-    nodes = [Node(node, settings) for node in batch]
-    for seen in await gather(*map(look, nodes)) if count else ():
-        if seen.replies > 1:
-            await Emit(Suspicion(seen.node, rate, TWICE))
+async def _identify(nodes: Sequence[Node], rate: int) -> list[Found]:
     identities = await gather(*[catch(identify(node)) for node in nodes])
     positions = await gather(*[catch(position(node)) for node in nodes])
     found: list[Found] = []
-    for node, identity, place in zip(batch, identities, positions, strict=True):
+    for node, identity, place in zip((one.node for one in nodes), identities, positions, strict=True):
         if not isinstance(identity, Identity):
             found.append(Found(node, rate, None))
             continue

@@ -13,7 +13,6 @@ from motorbus.families.kst.driver import (
     motion,
     provisioning,
     settings,
-    storage,
 )
 from motorbus.families.kst.driver.node import DEFAULT, BusSettings, Node
 
@@ -42,7 +41,7 @@ class ServoMethods(Node):
     temperature = device_method(feedback.temperature)
     move = device_method(motion.move)
     stop = device_method(motion.stop)
-    save = device_method(storage.save)
+    save = device_method(settings.save)
     provision = device_method(provisioning.provision)
     set_id = device_method(provisioning.set_id)
     set_baud = device_method(provisioning.set_baud)

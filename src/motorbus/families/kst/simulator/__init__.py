@@ -26,8 +26,7 @@ OPTIONS = (
     *quirk_options(Quirks),
 )
 """Options of a simulated bus, beside its ids."""
-SHORTEST_REPORT = 0.1
-"""ms between reports; a bus of 1 Mbit/s has no room for more."""
+SHORTEST_REPORT = 0.1  # ms between reports; a bus of 1 Mbit/s has no room for more
 
 
 def simulate(ids: Iterable[int], model: str = "", /, **options: object) -> KstBus:

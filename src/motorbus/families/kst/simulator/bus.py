@@ -28,8 +28,7 @@ ERROR: Final = CanFrame(ERROR_FLAG | 0x88, bytes(8))
 """An adapter's report of a broken frame: protocol violation and bus error, the classes of SocketCAN."""
 PASSIVE: Final = 16
 """Errors (of 8 points each) after which a transmitter is error passive, at 128 points (ISO 11898)."""
-DUPLICATE: Final = 1000
-"""The key of a servo whose id another one has is its unit number plus this."""
+DUPLICATE: Final = 1000  # the key of a servo whose id another one has is its unit number plus this
 RETRY_BITS: Final = 100
 """Bits from the start of a broken frame to the next attempt; it depends on the bit that differs. # assumption"""
 

@@ -24,10 +24,8 @@ OTHER_LENGTH: Final = 0x0607_0010
 TOO_LONG: Final = 0x0607_0012
 TOO_SHORT: Final = 0x0607_0013
 NO_SUBINDEX: Final = 0x0609_0011
-TURNAROUND: Final = 0.0001
-"""s from the end of a request to the start of its reply. # assumption"""
-MAILBOX: Final = 16
-"""Requests that may wait for a servo. # assumption"""
+TURNAROUND: Final = 0.0001  # s from the end of a request to the start of its reply # assumption
+MAILBOX: Final = 16  # requests that may wait for a servo # assumption
 
 
 class SdoServer:

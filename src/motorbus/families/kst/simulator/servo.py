@@ -7,43 +7,25 @@ from math import pi
 from typing import Final
 
 from motorbus.core.can_frame import CanFrame
-from motorbus.core.plant import Drive, rest
-from motorbus.core.register import Register
+from motorbus.core.plant import Drive, move, rest
+from motorbus.core.register import Register, Storage
 from motorbus.errors import RequestError
 from motorbus.families.kst import notifications
 from motorbus.families.kst.profiles import BIT_RATES, REVERSED, SAVE, Profile, bit_rate_code
-from motorbus.families.kst.simulator.motor import Flash, Shaft
+from motorbus.families.kst.simulator.flash import Flash
 from motorbus.families.kst.simulator.quirks import Quirks
 
 OUT_OF_RANGE: Final = 0x0609_0030
 TOO_HIGH: Final = 0x0609_0031
 TOO_LOW: Final = 0x0609_0032
-NOT_STORED: Final = 0x0800_0020
-"""CiA 301, object 1010h: the reply to a wrong signature."""
-STORED: Final = (
-    "node_id",
-    "bit_rate_code",
-    "mid_point",
-    "negative_limit",
-    "positive_limit",
-    "function_enable",
-    "zero",
-)
-"""What a save keeps: "node id, bit rate, etc." (manual, command 3); travel limits and function byte by a public
-flight-controller driver, the mid point by a public demo of a newer protocol; never the target position. `zero` is the
-place of the shaft that a mid point sets."""
-SOFTWARE: Final = "1.00"
-"""Version in 0x100B. # assumption"""
+NOT_STORED: Final = 0x0800_0020  # CiA 301, object 1010h: the reply to a wrong signature
+SOFTWARE: Final = "1.00"  # version in 0x100B # assumption
 INTERVAL: Final = 20
 """ms between reports as shipped; the public drivers expect 50 a second. # assumption"""
-LOW_VOLTAGE: Final = 6.0
-"""V; below it the servo sends the alarm. # assumption"""
-SPEED: Final = 7.0
-"""rad/s; 0.15 s for 60 degrees. # assumption"""
-ACCELERATION: Final = 100.0
-"""rad/s². # assumption"""
-DRIVE: Final = Drive(top_speed=1.0, idle_current=0.2, stall_current=2.5)
-"""Currents in A. # assumption"""
+LOW_VOLTAGE: Final = 6.0  # V; below it the servo sends the alarm # assumption
+SPEED: Final = 7.0  # rad/s; 0.15 s for 60 degrees # assumption
+ACCELERATION: Final = 100.0  # rad/s² # assumption
+DRIVE: Final = Drive(top_speed=1.0, idle_current=0.2, stall_current=2.5)  # currents in A # assumption
 
 
 class Servo:
@@ -51,7 +33,8 @@ class Servo:
 
     `unit`      its number on this bus, from 1, whatever its id becomes
     `node`      the id it answers to; `bit_rate` its rate (bit/s)
-    `values`    raw values by name, in force until the next restart
+    `values`    raw values by name, in force until the next restart; "zero" is the place of the shaft that reads 0
+    `motion`    of the shaft, in raw counts
     `errors`    bus errors since its restart
     `started`   a start was received
     `lives`     number of restarts; what was to be sent before is not sent
@@ -85,20 +68,18 @@ class Servo:
         self._now = now
         self._send = send
         self._voltage = 7.4
-        per_radian = 180 / pi * profile.counts_per_degree
-        self.shaft = Shaft(
-            now(), quirks.position, speed=SPEED * per_radian, acceleration=ACCELERATION * per_radian
-        )
-        self._shipped = {row.name: row.default or 0 for row in profile.table.values()}
-        shipped = {
+        self.motion = rest(now(), quirks.position)
+        self._shipped = {row.name: row.default or 0 for row in profile.table.values()} | {
             "node_id": node,
             "bit_rate_code": bit_rate_code(quirks.bit_rate),
             "report_interval": INTERVAL,
             "negative_limit": -profile.limit,
             "positive_limit": profile.limit,
+            "function_enable": 0,
+            "zero": 0,
         }
-        self._shipped |= {name: raw for name, raw in shipped.items() if name in profile.table} | {"zero": 0}
-        self.flash = Flash({name: raw for name, raw in self._shipped.items() if name in STORED})
+        kept = [row.name for row in profile.table.values() if row.storage is Storage.EEPROM]
+        self.flash = Flash({name: self._shipped[name] for name in (*kept, "zero")})
         self._power_up(now())
         self.values["goal_position"] = quirks.position
 
@@ -112,7 +93,7 @@ class Servo:
     def unplug(self) -> None:
         """Disconnect bus and supply. The shaft stays."""
         now = self._now()
-        self.shaft.halt(now)
+        self.motion = rest(now, self.motion.position(now))
         self.flash.load(now, cut=self.quirks.flash_cut)
         self.lives += 1
         self.set_reporting(False, now)
@@ -154,7 +135,7 @@ class Servo:
             "saved": self.flash.stored(now).items() <= self.values.items(),
             "raw_position": self.raw_position,
             "raw_target": self.values["goal_position"],
-            "moving": self.shaft.motion.moving(now),
+            "moving": self.motion.moving(now),
             "started": self.started,
             "reporting": self.reporting and self._interval > 0,
             "errors": self.errors,
@@ -166,11 +147,11 @@ class Servo:
     @property
     def raw_position(self) -> int:
         """Present position in raw counts; setting it turns the shaft by hand."""
-        return self.shaft.reading(self._now())
+        return self._reading(self._now())
 
     @raw_position.setter
     def raw_position(self, raw: int) -> None:
-        self.shaft.motion = rest(self._now(), self.shaft.place(raw))
+        self.motion = rest(self._now(), self._place(raw))
 
     @property
     def voltage(self) -> float:
@@ -195,7 +176,7 @@ class Servo:
 
     def current(self, at: float) -> float:
         """Supply current, A."""
-        return DRIVE.current(self.shaft.motion.velocity(at), self.load) if self.plugged else 0.0
+        return DRIVE.current(self.motion.velocity(at), self.load) if self.plugged else 0.0
 
     # -- objects -------------------------------------------------------------------------------------------------
 
@@ -205,7 +186,7 @@ class Servo:
             case "node_id" if self.quirks.pending_id == "active":
                 return self.node
             case "present_position":
-                return self.shaft.reading(at)
+                return self._reading(at)
             case "status":  # current (16 bits), temperature (8 bits, signed), one unused byte
                 current = min(0xFFFF, round(abs(self.current(at)) / self.profile.current_scale))
                 return current | (max(-128, min(127, round(self.temperature))) & 0xFF) << 16
@@ -234,9 +215,7 @@ class Servo:
                     self._move(clamped, at)
                 else:
                     values[name] = clamped
-                    if (
-                        self.shaft.reversed
-                    ):  # a change of one limit changes the other (flight-controller driver)
+                    if self._reversed:  # a change of one limit changes the other (flight-controller driver)
                         other = "positive_limit" if name == "negative_limit" else "negative_limit"
                         values[other] = -clamped  # as its mirror image # assumption
             case "report_interval":  # XQPOWER raises a short interval; 0 means none # assumption
@@ -244,14 +223,15 @@ class Servo:
                 self._interval = values[name] / 1000
                 self.set_reporting(self.reporting, at)
             case "mid_point":  # one source writes 0 and one 1, so any value sets it
-                self.shaft.set_zero(at)
-                values |= {name: raw, "zero": self.shaft.zero, "goal_position": 0}  # it stays # assumption
+                place = round(self.motion.position(at))
+                self.motion = rest(at, place)
+                values |= {name: raw, "zero": place, "goal_position": 0}  # it stays # assumption
             case "function_enable":  # bit 5 reverses at once and the shaft stays # assumption
+                turned = (raw ^ values[name]) >> REVERSED & 1
                 values[name] = raw
-                if bool(raw >> REVERSED & 1) != self.shaft.reversed:
-                    self.shaft.halt(at)
-                    self.shaft.reversed = not self.shaft.reversed
-                    values["goal_position"] = self.shaft.reading(at)
+                if turned:
+                    self.motion = rest(at, self.motion.position(at))
+                    values["goal_position"] = self._reading(at)
             case _:
                 if not row.low <= raw <= row.high:
                     return OUT_OF_RANGE
@@ -261,10 +241,25 @@ class Servo:
     def _move(self, raw: int, at: float) -> None:
         """Move at once (manual, command 5); before a start XQPOWER acknowledges a target and ignores it."""
         if self.started or self.profile.nmt != "standard":
-            limit = self.profile.limit  # clamped to the travel limits # assumption
-            low, high = self.values.get("negative_limit", -limit), self.values.get("positive_limit", limit)
-            self.values["goal_position"] = max(low, min(high, raw))
-            self.shaft.move(self.values["goal_position"], at)
+            low, high = self.values["negative_limit"], self.values["positive_limit"]
+            goal = self.values["goal_position"] = max(low, min(high, raw))  # clamped # assumption
+            position, velocity, _ = self.motion.state(at)
+            unit = 180 / pi * self.profile.counts_per_degree  # counts per rad
+            limits = {"speed": SPEED * unit, "acceleration": ACCELERATION * unit}
+            self.motion = move(at, position, self._place(goal), velocity=velocity, **limits)
+
+    @property
+    def _reversed(self) -> bool:
+        return bool(self.values["function_enable"] >> REVERSED & 1)
+
+    def _reading(self, at: float) -> int:
+        """Present position: a whole number of counts that fits 16 bits."""
+        counts = round(self.motion.position(at)) - self.values["zero"]
+        return max(-32768, min(32767, -counts if self._reversed else counts))
+
+    def _place(self, raw: int) -> int:
+        """The place of the shaft with this reading."""
+        return self.values["zero"] + (-raw if self._reversed else raw)
 
     # -- supply, start and reports -------------------------------------------------------------------------------
 
@@ -275,10 +270,8 @@ class Servo:
         self.node = self.values["node_id"]
         self.bit_rate = BIT_RATES[self.values["bit_rate_code"]]
         self.errors, self.started = 0, False
-        self.shaft.halt(at)
-        self.shaft.zero = self.values["zero"]
-        self.shaft.reversed = bool(self.values.get("function_enable", 0) >> REVERSED & 1)
-        self._interval = (self.quirks.reports_ms or self.values.get("report_interval", INTERVAL)) / 1000
+        self.motion = rest(at, self.motion.position(at))
+        self._interval = (self.quirks.reports_ms or self.values["report_interval"]) / 1000
         self.set_reporting(self.quirks.reports_ms > 0, at)
         if self.quirks.boot_notice and self.lives > 1:
             self._send(self, at, notifications.encode_boot(self.node, extended=self.extended))
@@ -302,7 +295,7 @@ class Servo:
     def report(self, at: float) -> CanFrame:
         """The report that is due, under 0x580 + id; XQPOWER sends another one under 0x180 + id, which is left out."""
         self._send(self, at + self._interval, None)
-        return notifications.encode_report(self.node, self.shaft.reading(at), extended=self.extended)
+        return notifications.encode_report(self.node, self._reading(at), extended=self.extended)
 
     def send(self, frame: CanFrame, at: float) -> None:
         """Send a frame that starts at this time."""
