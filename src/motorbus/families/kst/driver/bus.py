@@ -88,7 +88,7 @@ def stop(nodes: Mapping[int, Response | None], settings: BusSettings) -> Stop:
         here = [reply.data[:2] for reply in replies if reply.kind == "upload" and reply.index == row.address]
         if here:
             requests += hold(node, row.decode(here[0]), Priority.STOP)
-        else:
-            decode = acknowledged(node, row)
-            requests.append(upload(node, row, decode, priority=Priority.STOP, reports_position=True))
+            continue
+        decode = acknowledged(node, row)
+        requests.append(upload(node, row, decode, priority=Priority.STOP, reports_position=True))
     return Stop(tuple(requests), Promise.HOLD_REQUESTED.value)
