@@ -54,7 +54,9 @@ async def broadcast_position(
     """
     checked = checked_ids(nodes)
     if not checked:
-        raise RequestError("a broadcast moves all servos on the bus", expected="their ids; scan() lists them")
+        raise RequestError(
+            "a broadcast moves all servos, and none is named", expected="the ids of all servos"
+        )
     row = settings.profile.table["goal_position"]
     raw = target(Node(checked[0], settings), to)
     value, low, high = (float(row.to_value(one)) for one in (raw, row.low, row.high))

@@ -116,7 +116,6 @@ async def write_node_id(node: Node, new: int) -> None:
     if found not in (None, new, node.node):  # some servos read back the id in force
         raise VerificationFailed(
             f"node {node.node} was set to {new} and reads back {found}",
-            expected=f"{new}, or {node.node} until the restart",
             cause="two servos with one id, or another program",
             advice="do not save; restart it, and the old id is in force again",
             node=node.node,

@@ -18,9 +18,8 @@ from motorbus.core.interrupted import Moving, stopped_if_interrupted
 from motorbus.core.register import Register, changed
 from motorbus.core.request import Effect, Priority, Request, Response
 from motorbus.core.setpoint import Setpoint, Stays, torque_on
-from motorbus.core.steps import Emit
-from motorbus.errors import DeviceError, LimitExceeded, RequestError, Stalled
-from motorbus.families.kst import sdo
+from motorbus.core.steps import Emit, catch
+from motorbus.errors import DeviceError, LimitExceeded, MotorbusError, RequestError, Stalled
 from motorbus.families.kst.driver.feedback import position
 from motorbus.families.kst.driver.node import Node, check_above_zero
 from motorbus.families.kst.driver.requests import acknowledged, is_absent, read_register, write_register
@@ -57,11 +56,9 @@ async def move(
 ) -> None:
     """Move to `to` rad at the servo's own speed; return when it is in position, at once with `wait=False`.
 
-    In position: two readings in a row within `tolerance` rad. Raises LimitExceeded when `to` is not finite, outside
-    the range of the profile (nothing is sent) or outside the travel limits of the servo; Stalled; MotionError after
-    `timeout` s (None: from the distance). Where the profile has a start rule, the start is sent first and reported as
-    `Started`. If the wait is interrupted or cancelled, the servo stops and holds, and a note of the interrupt says
-    where.
+    In position: two readings in a row within `tolerance` rad. Raises LimitExceeded outside the range of the profile
+    or the travel limits of the servo; Stalled; MotionError after `timeout` s (None: from the distance). Where the
+    profile has a start rule, a start is sent first (`Started`). An interrupt of the wait stops the servo.
     """
     raw = target(node, to)
     check_above_zero("tolerance", tolerance, "rad", node=node.node)
@@ -93,9 +90,8 @@ async def wait_arrival(node: Node, goal: float, tolerance: float, timeout: float
         return Stalled(
             f"node {node.node} stands at {here:.4g} rad, {abs(here - goal):.4g} rad off its goal{alarm}",
             expected=f"within {tolerance:.4g} rad",
-            cause="something blocks it, its load is too heavy, its supply is weak, or its make must be started first",
-            advice="clear the way, or give a wider tolerance; it still pushes: stop() ends that. A servo that never "
-            "moves may need profile=xqpower or nmt=standard",
+            cause="an obstacle, a heavy load, a weak supply, or a make that must be started first",
+            advice="clear the way, or start it (profile=xqpower, nmt=standard); it still pushes: stop() ends that",
             node=node.node,
         )
 
@@ -112,9 +108,8 @@ def target(node: Node, to: float) -> int:
     try:
         return node.raw(node.table["goal_position"], to)
     except RequestError as error:
-        raise LimitExceeded(
-            f"node {node.node}: {error.summary}", expected=error.expected, advice=error.advice, node=node.node
-        ) from None
+        summary = f"node {node.node}: {error.summary}"
+        raise LimitExceeded(summary, expected=error.expected, node=node.node) from None
 
 
 async def setpoint(node: Node, raw: int) -> Setpoint:
@@ -168,25 +163,18 @@ async def stop(node: Node) -> Promise:
 
 
 def hold(node: Node, here: int, priority: Priority = Priority.CONTROL) -> list[Request[Response]]:
-    """The requests that make this position (raw) the target; outside the range, where a servo may refuse it, the end
-    of the range comes first.
+    """The requests that make this position (raw) the target.
+
+    A servo may refuse a position outside its range, so there the end of the range comes first.
     """
     limit, row = node.profile.limit, node.table["goal_position"]
     unlimited = changed(row, low=-0x8000, high=0x7FFF)
     requests = []
     for raw in dict.fromkeys((max(-limit, min(here, limit)), here)):
         value = float(row.to_value(raw))
-        request = Request(
-            node.settings.download(node.node, unlimited, raw),
-            (sdo.download_due(node.node, row.address),),
-            acknowledged(node, row),
-            lane=node.node,
-            priority=priority,
-            effect=Effect.MOTION,
-            setpoints=(Setpoint(node.node, "position", value, value, value, Stays.STILL),),
-            repeatable=True,
-        )
-        requests.append(request)
+        still = Setpoint(node.node, "position", value, value, value, Stays.STILL)
+        request = write_register(node, unlimited, raw, (still,), priority=priority)
+        requests.append(request.with_decoder(acknowledged(node, row)))
     return requests
 
 
@@ -196,20 +184,17 @@ async def limits(node: Node) -> tuple[float, float]:
         goal = node.table["goal_position"]
         low, high = goal.low, goal.high
         if "negative_limit" in node.table:
-            low = max(low, await _limit(node, node.table["negative_limit"]))
-            high = min(high, await _limit(node, node.table["positive_limit"]))
+            low = max(low, await _limit(node, node.table["negative_limit"], low))
+            high = min(high, await _limit(node, node.table["positive_limit"], high))
         node.limits = float(goal.to_value(low)), float(goal.to_value(high))
     return node.limits
 
 
-async def _limit(node: Node, row: Register) -> int:
-    """The raw travel limit; where the servo lacks the object, the outer bound of the row."""
-    try:
-        return await read_register(node, row, int)
-    except DeviceError as error:
-        if not is_absent(error):
-            raise
-        return row.low or row.high
+async def _limit(node: Node, row: Register, absent: int) -> int:
+    found = await catch(read_register(node, row, int))
+    if isinstance(found, MotorbusError) and not is_absent(found):
+        raise found
+    return found if isinstance(found, int) else absent
 
 
 async def travel(node: Node) -> tuple[float, float]:

@@ -88,21 +88,13 @@ class Node:
     def __init__(self, node: int, settings: BusSettings = DEFAULT) -> None:
         self.node: Final = checked_id(node)
         self.settings: Final = settings
+        self.profile: Final[Profile] = settings.profile
+        self.table: Final[RegisterMap] = settings.profile.table
         self.limits: tuple[float, float] | None = None
         self.at = -inf
         self.unsaved: set[str] = set()
         self.last_move: object = None
         self.reading: Request[float] | None = None
-
-    @property
-    def profile(self) -> Profile:
-        """The profile of its bus."""
-        return self.settings.profile
-
-    @property
-    def table(self) -> RegisterMap:
-        """Its objects."""
-        return self.settings.profile.table
 
     @property
     def alarm(self) -> tuple[str, ...]:
@@ -115,10 +107,7 @@ class Node:
         return row.to_value(raw)
 
     def raw(self, row: Register, value: Value) -> int:
-        """Value in the unit of the row -> raw value; half a count of an angle rounds away from zero.
-
-        Raises RequestError for a value that is not finite, or an angle outside the range of the row.
-        """
+        """Value in the unit of the row -> raw value. Raises RequestError if not finite, or an angle out of range."""
         if row.unit == "rad" and is_number(value):
             return to_raw(self.profile, value, row.name)
         return row.to_raw(value)
@@ -131,7 +120,8 @@ def feature_row(node: Node, name: str, feature: str) -> Register:
     profiles = [profile.name for profile in PROFILES.values() if name in profile.table]
     raise RequestError(
         f"node {node.node}: the profile {node.profile.name} has no {feature}",
-        expected=f"a servo of the profile {' or '.join(profiles)}, as in kst:PORT,profile={profiles[0]}",
+        expected=f"a servo of the profile {' or '.join(profiles)}",
+        advice=f"if this servo has it, choose its profile, as in kst:PORT,profile={profiles[0]}",
         node=node.node,
     )
 

@@ -79,8 +79,7 @@ def value_bytes(node: Node, row: Register, reply: SdoReply) -> bytes:
     raise UnexpectedReply(
         f"node {node.node} sends {row.name} in {reply.size} bytes, not in {row.size}",
         received=reply.data,
-        cause=f"its firmware is not of the profile {node.profile.name}",
-        advice="choose the profile of its maker, as in kst:PORT,profile=kst-ext",
+        cause=f"its maker is not that of the profile {node.profile.name}, as in kst:PORT,profile=kst-ext",
         node=node.node,
     )
 
@@ -151,18 +150,17 @@ def decoded(answer: Response) -> list[SdoReply]:
 
 def refused(node: Node, row: Register, reply: SdoReply) -> DeviceError:
     """The error for an abort of a request for this object."""
-    code = sdo.meant_code(reply.code)
-    cause = advice = ""
+    code, advice = sdo.meant_code(reply.code), ""
     if code in ABSENT:
-        cause = f"this servo lacks what the profile {node.profile.name} has: older firmware, or another maker"
+        advice = (
+            f"choose another profile than {node.profile.name}: older firmware or another maker lacks this"
+        )
     elif code in UNSIZED_REFUSED and not node.settings.sized:
-        cause = "some servos accept only writes that state their length"
-        advice = "open the bus with sized=yes, as in kst:PORT,sized=yes"
+        advice = "let writes state their length, as in kst:PORT,sized=yes"
     return DeviceError(
         f"node {node.node} refused {row.name}: {sdo.abort_text(reply.code)}",
         code=reply.code,
         register=row.name,
-        cause=cause,
         advice=advice,
         node=node.node,
     )
@@ -188,15 +186,14 @@ async def read_all_bytes(node: Node, row: Register) -> bytes:
             frame = sdo.encode_segment(node.node, number % 2, extended=extended)
             segment = await Request(frame, (sdo.segment_due(node.node, number % 2),), take, lane=node.node)
             data += segment.data
-            if segment.last and first.size in (None, len(data)):
-                return data
             if segment.last:
                 break
         else:
-            abort = sdo.encode_abort(
-                node.node, row.address, row.subindex or 0, GENERAL_ERROR, extended=extended
-            )
-            await Request(abort, (), lane=node.node)
+            index, subindex = row.address, row.subindex or 0
+            abort = sdo.encode_abort(node.node, index, subindex, GENERAL_ERROR, extended=extended)
+            await Request(abort, lane=node.node)
+        if segment.last and first.size in (None, len(data)):
+            return data
         raise UnexpectedReply(
             f"node {node.node} announced {first.size} bytes of {row.name} and sent {len(data)}",
             received=data[:32],
