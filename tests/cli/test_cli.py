@@ -128,6 +128,17 @@ def test_what_needs_no_bus_loads_no_family_and_no_heavy_library(words: list[str]
     assert ended.stderr.strip() == ""
 
 
+def test_a_command_imports_no_other_family() -> None:
+    code = (
+        "import sys; from motorbus.cli import main; assert main(['ping', 'feetech:sim,ids=1#1']) == 0;"
+        "print([name for name in sys.modules if 'families.kst' in name or 'families.stepper' in name])"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert ended.stdout.splitlines()[-1] == "[]"
+
+
 @pytest.mark.parametrize(
     "words",
     [["mvoe"], ["scan"], ["scan", "--ids"], ["torque", "sideways", "feetech:sim"], ["ports", "--sideways"]],

@@ -294,6 +294,12 @@ def test_an_option_that_a_family_lacks_is_no_order(run: Run) -> None:
     assert "has no acceleration" in ran.err
 
 
+def test_a_family_without_commands_is_refused(run: Run) -> None:
+    ran = run("template")
+    assert (ran.code, ran.out) == (2, "")
+    assert "template devices have no commands of their own" in ran.err
+
+
 def test_who_was_named_confirms_the_stop_of_its_own_family(run: Run) -> None:
     (stop,) = run("estop", "template:sim,ids=1-3#1-3", "--json").document["buses"]
     assert (stop["acknowledged"], stop["silent"]) == ([1, 2, 3], [])

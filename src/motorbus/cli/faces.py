@@ -27,7 +27,8 @@ common commands it may offer
                                                                for the question before it, "" if nothing
     torque_told(event)                                         what an event of `write` says of the torque after it:
                                                                {"on", "why", "text"}, None if nothing
-    bit_rate_heard(bus, seconds, report)                       the rate of a bus by listening alone, and what was heard
+    detect_bit_rate(bus, seconds, report)                      the rate of a bus by listening alone, and the activity
+                                                               at each rate
     CUT_OFF                                                    what to do about a change that was cut off, where no
                                                                journal is kept
     COMMANDS                                                   what errors call -> the command that does the same
@@ -40,9 +41,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from cyclopts import App
-
 from motorbus import families
+from motorbus.errors import RequestError
 
 
 def names() -> list[str]:
@@ -50,12 +50,15 @@ def names() -> list[str]:
     return families.names()
 
 
-def __getattr__(family: str) -> App:
+def __getattr__(family: str) -> Any:
     """The commands of a family; the parser imports them by this name when one is called."""
-    if family not in families.names():
+    if family not in names():
         raise AttributeError(f"no family {family!r}")
-    app: App | None = offer(family, "app")
-    return app or App(name=family, help=f"{family} devices have no commands of their own.")
+
+    def refuse() -> None:
+        raise RequestError(f"{family} devices have no commands of their own", advice="nothing was sent")
+
+    return offer(family, "app") or refuse
 
 
 def offer(family: str, what: str) -> Any:

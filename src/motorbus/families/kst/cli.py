@@ -9,10 +9,9 @@ from typing import Annotated, Any, Final, Literal
 
 from cyclopts import App, Group, Parameter
 
-from motorbus.cli import consent, dry, files, quantity, several, target
+from motorbus.cli import consent, dry, files, identity, quantity, several, target
 from motorbus.cli.device_command import DeviceCommand
 from motorbus.cli.exits import Exit
-from motorbus.cli.identity import id_said
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.core import units
 from motorbus.core.can_frame import CanFrame
@@ -146,7 +145,7 @@ def node_id(
         found = run.read(lambda servo: servo.node_id())
         pending = "" if found == run.node else f"; it answers as {run.label} until it is restarted"
         return run.show({"reads_back": found}, f"{label(found)}{pending}")
-    wanted = checked_id(id_said(new))
+    wanted = checked_id(identity.id_said(new))
     run.write(lambda servo: servo.set_node_id(wanted), f"write the id {label(wanted)}")
     return show_pending(run, address, wanted, f"the id {label(wanted)}")
 
@@ -231,7 +230,7 @@ def provision(
     run = ServoCommand("provision", address, output, options, dry_run=dry_run, yes=yes)
     wanted: dict[str, int] = {}
     if new_id:
-        wanted["new_id"] = checked_id(id_said(new_id))
+        wanted["new_id"] = checked_id(identity.id_said(new_id))
     if new_bitrate:
         wanted["new_rate"] = parse_bit_rate(new_bitrate)
     if not wanted:
@@ -250,25 +249,22 @@ def provision(
         run.write(write)
         output.text("then: power cycle, and a check of the new values")
         return Exit.OK
-    values = " and ".join(f"{name.replace('_', ' ')} {value}" for name, value in wanted.items())
+    values = [f"the id {label(wanted['new_id'])}"] if new_id else []
+    values += [f"the bit rate {wanted['new_rate']} bit/s"] if new_bitrate else []
+
+    def show_step(event: object) -> None:
+        if isinstance(event, Progress):
+            output.document(run.schema, {"event": "progress", **event._asdict()})
+        if isinstance(event, provisioning.PowerCycleNeeded):
+            output.document(run.schema, {"event": "power-cycle", **event._asdict()})
+
     with target.opened(run.bus, options, output) as bus:
         rehearse = partial(write, Servo(dry.DryBus(bus), run.node))
-        consent.consent_to(f"{run.label}: write and save {values}", output, yes=yes, rehearse=rehearse)
-        with output.progress("provisioning") as bar:
-
-            def report(event: object) -> None:
-                if isinstance(event, Progress):
-                    bar.advance(event.done, event.total, event.what)
-                    output.document(run.schema, {"event": "progress", **event._asdict()})
-                if isinstance(event, provisioning.PowerCycleNeeded):
-                    output.document(run.schema, {"event": "power-cycle", **event._asdict()})
-                if text := say(event):
-                    bar.say(text)
-                    if not bar.shown:
-                        output.note(text)
-
-            procedure = provisioning.provision(Servo(bus, run.node), timeout=seconds, **wanted)
-            done = bus.run(procedure, report=report)
+        question = f"{run.label}: write and save {' and '.join(values)}"
+        consent.consent_to(question, output, yes=yes, rehearse=rehearse)
+        done: provisioning.Provisioned = identity.carried_out(
+            bus, run.node, "provision", output=output, report=show_step, timeout=seconds, **wanted
+        )
     result = "had these values already" if done.resumed else "came back after the power cycle"
     text = f"{label(done.node)} {result}: it answers at {done.rate} bit/s, firmware {done.firmware}"
     facts = {"bitrate": done.rate, "firmware": done.firmware, "resumed": done.resumed}
@@ -391,7 +387,7 @@ def eds(
 
     if profile not in PROFILES:
         raise RequestError(f"there is no profile {profile!r}", expected=f"one of {', '.join(PROFILES)}")
-    number = checked_id(id_said(node))
+    number = checked_id(identity.id_said(node))
     name = output_.name if output_ else ""
     text = sheets.eds(PROFILES[profile], node_id=number, with_mandatory=with_mandatory, file_name=name)
     if output_ is None:
@@ -453,7 +449,7 @@ def ping_everyone(bus: Any) -> list[int]:
     return sorted(bus.run(broadcast_read("node_id", settings_of(bus))))
 
 
-def bit_rate_heard(
+def detect_bit_rate(
     bus: Any, seconds: float, report: Callable[[object], None]
 ) -> tuple[int | None, dict[int, str]]:
     """Listen `seconds` at each bit rate; the rate of the bus, and the activity at each rate.
