@@ -67,11 +67,6 @@ REASONS: Final[dict[str, dict[str, str]]] = {
         "packets, while the SDK has the whole capture at hand; where ours has large blocks too, as of a "
         "file, it is the row beside this one",
     },
-    "9": {
-        "bulk": "numpy finds the packets and cuts them out, but the bytes of each are an object of their own, and "
-        "what is got anew from the kernel for them and for the columns takes a good part; the row of columns only "
-        "leaves the bytes out",
-    },
     "10": {
         "read request": "the first reading of a servo makes more than a packet: which packet is due, how long it may "
         "take, and what its bytes mean in SI units are found out, and kept for all further ones",

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, NamedTuple, Protocol
 
-from motorbus.core.capture import Captures
 from motorbus.core.guarantees import Guarantees
 from motorbus.core.register import RegisterMap, Value
 from motorbus.core.request import Data, Event, Request, Response
@@ -46,7 +45,6 @@ class LinkNeeds(NamedTuple):
     `both_ways` full duplex: a stop waits only for the request being sent, not for its reply
     `stops`     possible actions of an emergency stop on an axis, "torque_off" and "hold", the default first; () if
                 unknown. A family with both has a setting `estop_hold`: the ids that an emergency stop holds
-    `captures`  decoders of recordings; None: the receiver decodes them
     """
 
     kind: str
@@ -58,7 +56,6 @@ class LinkNeeds(NamedTuple):
     only: int | None = None
     both_ways: bool = False
     stops: tuple[str, ...] = ()
-    captures: Captures | None = None
 
 
 @dataclass(frozen=True, slots=True)

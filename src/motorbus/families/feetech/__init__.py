@@ -21,6 +21,7 @@ from motorbus.core.family import (
     Simulator,
     Stop,
 )
+from motorbus.core.recording import RecordingReceiver
 from motorbus.core.register import RegisterMap
 from motorbus.core.request import Request, Response
 from motorbus.core.steps import Procedure, Runnable
@@ -143,7 +144,6 @@ class Feetech:
     @cached_property
     def link(self) -> LinkNeeds:
         from motorbus.families.feetech.simulator import OPTIONS
-        from motorbus.families.feetech.wire.recording import CAPTURES
 
         usual = BAUD_CODES[0]
         options = (
@@ -160,7 +160,6 @@ class Feetech:
             (*options, *OPTIONS),
             _SETTINGS,
             stops=("torque_off", "hold"),
-            captures=CAPTURES,
         )
 
     def configured(self, **settings: object) -> Feetech:
@@ -195,6 +194,11 @@ class Feetech:
 
     def receiver(self) -> Receiver:
         return wire.StatusReceiver()
+
+    def recording_receiver(self, direction: str) -> RecordingReceiver:
+        from motorbus.families.feetech.wire.recording import Recording
+
+        return Recording(direction)
 
     def probe(self, node: int, attempt: int) -> Request[bool]:
         return line.probe(node, attempt)

@@ -22,6 +22,7 @@ from motorbus.core.family import (
     Stop,
 )
 from motorbus.core.guarantees import Guarantee, Guarantees, Level
+from motorbus.core.recording import RecordingReceiver
 from motorbus.core.register import RegisterMap
 from motorbus.core.request import Request, Response
 from motorbus.core.scan import Skipped
@@ -128,7 +129,6 @@ class Kst:
 
     @cached_property
     def link(self) -> LinkNeeds:
-        from motorbus.families.kst.recording import CAPTURES
         from motorbus.families.kst.simulator import OPTIONS
 
         return LinkNeeds(
@@ -139,7 +139,6 @@ class Kst:
             _SETTINGS,
             bus.WINDOW,
             stops=("hold",),
-            captures=CAPTURES,
         )
 
     def configured(self, **settings: object) -> Kst:
@@ -173,6 +172,11 @@ class Kst:
 
     def receiver(self) -> Receiver:
         return FrameReceiver(self._settings.extended, self._settings.state)
+
+    def recording_receiver(self, direction: str) -> RecordingReceiver:
+        from motorbus.families.kst.recording import Recording
+
+        return Recording()
 
     def probe(self, node: int, attempt: int) -> Request[bool]:
         return bus.probe(Node(node, self._settings), attempt)

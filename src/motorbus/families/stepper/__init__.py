@@ -37,6 +37,7 @@ from motorbus.core.family import (
     Simulator,
     Stop,
 )
+from motorbus.core.recording import RecordingReceiver
 from motorbus.core.register import RegisterMap
 from motorbus.core.request import Request, Response
 from motorbus.core.steps import Procedure, Runnable
@@ -150,11 +151,8 @@ class Stepper:
     @cached_property
     def link(self) -> LinkNeeds:
         from motorbus.families.stepper.simulator import OPTIONS
-        from motorbus.families.stepper.wire.recording import CAPTURES
 
-        return LinkNeeds(
-            "bytes", RATE, (RATE,), OPTIONS, _SETTINGS, only=wire.ONLY, both_ways=True, captures=CAPTURES
-        )
+        return LinkNeeds("bytes", RATE, (RATE,), OPTIONS, _SETTINGS, only=wire.ONLY, both_ways=True)
 
     def configured(self, **settings: object) -> Stepper:
         for name in settings.keys() - {"motor", "dump_order"}:
@@ -191,6 +189,11 @@ class Stepper:
 
     def receiver(self) -> Receiver:
         return wire.Receiver()
+
+    def recording_receiver(self, direction: str) -> RecordingReceiver:
+        from motorbus.families.stepper.wire.recording import Recording
+
+        return Recording(direction)
 
     def probe(self, node: int, attempt: int) -> Request[bool]:
         return presence.probe(self._node(node), attempt)
