@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from motorbus.core.family import Family
     from motorbus.recorder.can_log import Logged
 
-_CHUNK: Final = 1 << 16
+_CHUNK: Final = 1 << 14
 """Bytes that are decoded at a time."""
 _KINDS: Final = ("noise", "request", "reply", "either", "notice")
 _FAULTS: Final = ("", "checksum", "framing", "foreign")
@@ -77,13 +77,13 @@ def summary(
 
 def counted(packets: Iterable[Packet]) -> list[Group]:
     """Return the groups of these packets, noise last."""
-    times: Counter[tuple[str, int, int, str]] = Counter()
+    equal = Counter((kind, node, code, fault, len(data)) for _, data, kind, node, code, fault, _ in packets)
+    numbers: Counter[tuple[str, int, int, str]] = Counter()
     sizes: Counter[tuple[str, int, int, str]] = Counter()
-    for packet in packets:
-        key = packet[2:6]
-        times[key] += 1
-        sizes[key] += len(packet.data)
-    groups = [Group(*key, count, sizes[key]) for key, count in times.items()]
+    for (kind, node, code, fault, size), number in equal.items():
+        numbers[kind, node, code, fault] += number
+        sizes[kind, node, code, fault] += number * size
+    groups = [Group(*key, number, sizes[key]) for key, number in numbers.items()]
     return sorted(
         groups, key=lambda one: (_FAULTS.index(one.fault), _KINDS.index(one.kind), one.node, one.code)
     )

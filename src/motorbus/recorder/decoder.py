@@ -7,6 +7,7 @@ not depend on where the recording is cut.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterator
 from math import inf
 from typing import Final, NamedTuple
 
@@ -120,41 +121,44 @@ class _Stream:
         return self._packets(self._receiver.feed(data))
 
     def flush(self) -> list[Packet]:
-        packets = self._packets(self._receiver.flush())
-        self._end_noise(packets)
-        return packets
+        return self._packets(self._receiver.flush(), end=True)
 
-    def _packets(self, events: list[RecordedEvent]) -> list[Packet]:
+    def _packets(self, events: list[RecordedEvent], end: bool = False) -> list[Packet]:
         packets: list[Packet] = []
-        for event in events:
-            if isinstance(event, Noise):
-                if event.fault != self._fault:
-                    self._end_noise(packets)
-                self._fault = event.fault
-                self._noise += event.data
-                if self._frames:
-                    self._end_noise(packets)
-                while len(self._noise) >= NOISE_LENGTH:
-                    piece, self._noise = self._noise[:NOISE_LENGTH], self._noise[NOISE_LENGTH:]
-                    packets.append(self._packet(piece, "noise", ABSENT, ABSENT, self._fault))
-            else:
-                if self._noise:
-                    self._end_noise(packets)
-                packets.append(self._packet(*event, ""))
+        chunks, position = self._chunks, self._position
+        own, start, at = chunks[0]
+        limit = chunks[1].own if len(chunks) > 1 else inf
+        for data, kind, node, code, fault in self._merged(events, end):
+            while position >= limit:
+                chunks.popleft()
+                own, start, at = chunks[0]
+                limit = chunks[1].own if len(chunks) > 1 else inf
+            packets.append(Packet(start + position - own, data, kind, node, code, fault, at))
+            position += 1 if self._frames else len(data)
+        self._position = position
         return packets
 
-    def _end_noise(self, packets: list[Packet]) -> None:
-        if self._noise:
-            packets.append(self._packet(self._noise, "noise", ABSENT, ABSENT, self._fault))
+    def _merged(self, events: list[RecordedEvent], end: bool) -> Iterator[tuple[bytes, str, int, int, str]]:
+        """Yield data, kind, node, code and fault of each packet; consecutive noise with one fault is one packet."""
+        for event in events:
+            if not isinstance(event, Noise):
+                if self._noise:
+                    yield self._noise, "noise", ABSENT, ABSENT, self._fault
+                    self._noise = b""
+                data, kind, node, code = event
+                yield data, kind, node, code, ""
+                continue
+            if self._noise and (event.fault != self._fault or self._frames):
+                yield self._noise, "noise", ABSENT, ABSENT, self._fault
+                self._noise = b""
+            self._noise += event.data
+            self._fault = event.fault
+            while len(self._noise) >= NOISE_LENGTH:
+                yield self._noise[:NOISE_LENGTH], "noise", ABSENT, ABSENT, self._fault
+                self._noise = self._noise[NOISE_LENGTH:]
+        if self._noise and (end or self._frames):
+            yield self._noise, "noise", ABSENT, ABSENT, self._fault
             self._noise = b""
-
-    def _packet(self, data: bytes, kind: str, node: int, code: int, fault: str) -> Packet:
-        chunks, position = self._chunks, self._position
-        while len(chunks) > 1 and chunks[1].own <= position:
-            chunks.popleft()
-        own, start, at = chunks[0]
-        self._position = position + (1 if self._frames else len(data))
-        return Packet(start + position - own, data, kind, node, code, fault, at)
 
 
 def _receiver(family: Family, direction: str) -> RecordingReceiver:

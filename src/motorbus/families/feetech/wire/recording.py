@@ -35,18 +35,18 @@ class Recording:
         return self._stream.flush()
 
     def _frame(self, packet: bytes) -> RecordedFrame:
-        return RecordedFrame(packet, self._kind or self._kind_of(packet), packet[2], packet[4])
-
-    def _kind_of(self, packet: bytes) -> str:
-        id, code, parameters = packet[2], packet[4], packet[5:-1]
+        id, code = packet[2], packet[4]
+        if self._kind is not None:
+            return RecordedFrame(packet, self._kind, id, code)
         if packet == self._last and id != BROADCAST:
-            return "either"
+            return RecordedFrame(packet, "either", id, code)
+        parameters = packet[5:-1]
         expected = self._expected.pop(id, None)
         if id != BROADCAST and (expected == len(parameters) or not suits(code, parameters)):
-            return "reply"
+            return RecordedFrame(packet, "reply", id, code)
         self._last = packet
         if code == Instruction.SYNC_READ and (request := decode_sync_read(parameters)):
             self._expected.update(dict.fromkeys(request.ids, request.length))
         elif id != BROADCAST:
             self._expected[id] = parameters[1] if code == Instruction.READ else 0
-        return "request"
+        return RecordedFrame(packet, "request", id, code)
