@@ -63,14 +63,8 @@ REASONS: Final[dict[str, dict[str, str]]] = {
         "is what waking up costs on this machine, and what is done after it with cold caches",
     },
     "8": {
-        "streaming": "each piece costs a call and a result of its own, about as much as it takes to find its "
-        "packets, while the SDK has the whole capture at hand; where ours has large blocks too, as of a "
-        "file, it is the row beside this one",
-    },
-    "9": {
-        "bulk": "numpy finds the packets and cuts them out, but the bytes of each are an object of their own, and "
-        "what is got anew from the kernel for them and for the columns takes a good part; the row of columns only "
-        "leaves the bytes out",
+        "streaming": "the receiver tries each byte of a damaged packet as the first of the next one, and finds the "
+        "packets that the SDK drops; each packet becomes an object",
     },
     "10": {
         "read request": "the first reading of a servo makes more than a packet: which packet is due, how long it may "

@@ -1,12 +1,10 @@
-"""Rows 8 and 9: packets out of a noisy capture, by a streaming decoder and by a bulk one, against the vendor's SDK.
+"""Row 8: packets out of a noisy capture, by the receiver of a bus, against the vendor's SDK.
 
-One capture (`bench.noisy_stream`) for all, in memory. The streaming decoder gets it in pieces as a serial port hands
-them over, and gives lists of packets; what they say is not asked. The SDK has all of it at hand, so what ours needs
-for blocks as of a file is told beside it. The bulk decoder gets it whole, and gives arrays, and the bytes of packets
-once they are asked for: row 9 has them cut out, as the SDK does; what the arrays alone take is told beside it. The
-SDK's `rxPacket` reads from a port that hands over what it asks for and never makes it wait. The figure is the time that
-theirs needs for the whole capture by the time that ours needs. Ours must give exactly the packets that a search by
-brute force finds; how many of them the SDK finds is told, for it gives up what follows a damaged length.
+One capture (`bench.noisy_stream`) for both, in memory. The receiver gets it in pieces as a serial port returns them,
+and in large blocks; the SDK's `rxPacket` reads from a port that returns what it requests and never waits. The figure is
+the time that the SDK needs for the whole capture by the time that the receiver needs. The receiver must find exactly
+the packets of a search by brute force. The note says how many of them the SDK finds: it drops what follows a damaged
+length.
 """
 
 from __future__ import annotations
@@ -23,67 +21,50 @@ from bench.noisy_stream import capture, decodable, pieces
 from bench.rounds import Failed
 from bench.row import SAMPLES, Row, Say, pairs
 
-NUMBERS = ("8", "9")
+NUMBERS = ("8",)
 MODULE = "bench.rows.decoding"
 SDK = "feetech-servo-sdk"
-STREAM, BLOCKS, BULK, CUT = "streaming", "streaming, blocks", "bulk", "bulk, bytes too"
+STREAM, BLOCKS = "streaming", "streaming, blocks"
 BLOCK = 4096
 """Bytes of a block."""
 JOBS = (
     apart.Job(STREAM, MODULE, (STREAM,)),
     apart.Job(BLOCKS, MODULE, (BLOCKS,)),
-    apart.Job(BULK, MODULE, (BULK,)),
-    apart.Job(CUT, MODULE, (CUT,)),
     apart.Job(SDK, MODULE, (SDK,), (SDK, "pyserial")),
 )
 PASSES, AT_LEAST = 9, 0.5
-"""Of each sample: over the whole capture, and so long in all (s); the pass in the middle counts."""
-GOALS = {
-    STREAM: ("8", ">= 3.5", ">= 5"),
-    BLOCKS: ("8", "", ""),
-    CUT: ("9", ">= 15", ">= 25"),
-    BULK: ("9", "", ""),
-}
+"""Of each sample: the number of passes over the capture, and their minimum total time (s); the median pass counts."""
+GOALS = {STREAM: (">= 3.5", ">= 5"), BLOCKS: ("", "")}
 MEASURES = {
     STREAM: "streaming decoding of a noisy capture, in pieces as of a port",
     BLOCKS: f"streaming decoding of a noisy capture, in blocks of {BLOCK} bytes as of a file",
-    CUT: "bulk decoding of a noisy capture, the bytes of each packet cut out",
-    BULK: "bulk decoding of a noisy capture, columns only, which is less than theirs does",
 }
 
 
 def rows(rounds: int, say: Say) -> list[Row]:
-    """Rows 8 and 9, and what columns take alone. Raises Failed when ours misses a packet or finds one too many."""
+    """Row 8, for pieces and for blocks. Raises Failed if the receiver misses a packet or finds one too many."""
     if not all(job.there for job in JOBS):
-        say(f"{SDK} is not installed: rows 8 and 9 are not measured\n")
+        say(f"{SDK} is not installed: row 8 is not measured\n")
         return []
     found = apart.rounds(JOBS, max(rounds, SAMPLES), say)
     return [_row(name, found) for name in GOALS]
 
 
 def _row(name: str, found: Any) -> Row:
-    number, goal, stretch = GOALS[name]
     ours, theirs = ([one["seconds"] for one in found[who]] for who in (name, SDK))
-    ratio = pairs(theirs, ours)
     first = found[SDK][0]
     note = (
         f"per decodable packet {median(ours) / first['decodable'] * 1e6:.2f} µs of ours, "
         f"{median(theirs) / first['decodable'] * 1e6:.2f} µs of theirs; the SDK finds "
         f"{first['found'] / first['decodable']:.1%} of {first['decodable']} packets"
     )
-    if name in (BULK, CUT):
-        streamed = pairs([one["seconds"] for one in found[STREAM]], ours)
-        what = "as arrays, bytes as a list" if name == CUT else "as arrays"
-        times = f"{streamed.median:.1f} times as fast as our streaming decoder"
-        note += f"; places, nodes, codes and faults {what}: {times}"
     return Row(
-        number,
+        "8",
         f"{MEASURES[name]}; {first['bytes']} bytes",
         SDK,
         "x",
-        *ratio,
-        goal,
-        stretch,
+        *pairs(theirs, ours),
+        *GOALS[name],
         median(ours),
         median(theirs),
         len(ours),
@@ -95,10 +76,10 @@ def _row(name: str, found: Any) -> Row:
 
 
 def measured(name: str, packets: int | None = None) -> dict[str, Any]:
-    """One decoder over the capture, once to warm up and then by the clock. Raises Failed for a wrong result."""
+    """One decoder over the capture, once to warm up and then timed. Raises Failed for a wrong result."""
     stream = capture() if packets is None else capture(packets)
     truth = list(decodable(stream))
-    decode = {STREAM: _streaming, BLOCKS: _blocks, BULK: _bulk, CUT: _cut, SDK: _vendor}[name]()
+    decode = {STREAM: _streaming, BLOCKS: _blocks, SDK: _vendor}[name]()
     decode(stream)
     passes: list[float] = []
     while len(passes) < PASSES or sum(passes) < AT_LEAST:
@@ -122,37 +103,18 @@ def _blocks() -> Decoder:
 
 
 def _streaming(cutting: Callable[[bytes], list[bytes]] = pieces) -> Decoder:
-    from motorbus.recorder import Decoder
+    from motorbus.core.request import Reply
+    from motorbus.families.feetech import FAMILY
 
     def decode(stream: bytes) -> tuple[float, list[bytes]]:
-        cut, decoder = cutting(stream), Decoder("feetech", "rx")
+        cut, receiver = cutting(stream), FAMILY.open().receiver()
         began = process_time()
-        heard = [decoder.feed(piece) for piece in cut]
-        last = decoder.flush()
+        events = [event for piece in cut for event in receiver.feed(piece)]
+        events += receiver.flush()
         seconds = process_time() - began
-        found = [data for one in heard for data, fault in zip(one.data, one.fault, strict=True) if not fault]
-        return seconds, found + [packet.data for packet in last if not packet.fault]
+        return seconds, [event.data for event in events if isinstance(event, Reply)]
 
     return decode
-
-
-def _bulk(cut: bool = False) -> Decoder:
-    """The columns, as arrays; with `cut` the bytes of each packet as well."""
-    from motorbus.recorder import decode as at_once
-
-    def decode(stream: bytes) -> tuple[float, list[bytes]]:
-        began = process_time()
-        packets = at_once("feetech", stream, "rx")
-        if cut:
-            _ = packets.data
-        seconds = process_time() - began
-        return seconds, [data for data, fault in zip(packets.data, packets.fault, strict=True) if not fault]
-
-    return decode
-
-
-def _cut() -> Decoder:
-    return _bulk(cut=True)
 
 
 class MemoryPort:

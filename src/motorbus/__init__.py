@@ -5,7 +5,7 @@ The names a user needs are here and are loaded when first used, so that `import 
     Robot, AsyncRobot   a machine by its file motorbus.toml          motorbus.Robot.load("motorbus.toml")
     open, open_async    a bus by its address, blocking or async     motorbus.open("feetech:/dev/ttyACM0")
     simulate            a simulated bus in this process             motorbus.simulate("feetech", ids="1-6")
-    recorder            recordings taken apart                      motorbus.recorder.Decoder("feetech")
+    recorder            recordings of a bus, decoded                motorbus.recorder.Decoder("feetech")
     the errors          motorbus.NoReply and all others             see `motorbus.errors`
     the families        motorbus.feetech …                          device classes and driver functions
 """

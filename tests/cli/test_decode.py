@@ -218,6 +218,40 @@ def test_a_damaged_line_is_told_with_its_number_and_the_others_are_explained(
     assert [one["frame"] for one in records[1:3]] == [GOAL, TAKEN]
 
 
+def test_summary_counts_packets_by_kind_node_and_code(run: Run, tmp_path: Path) -> None:
+    file = tmp_path / "line.bin"
+    file.write_bytes(
+        bytes.fromhex(READ + READ) + bytes.fromhex(ANSWER) * 20_000 + bytes.fromhex("00" + ANSWER[:-2] + "00")
+    )
+    ran = run("decode", "--family", "feetech", "--summary", "--file", str(file))
+    assert ran.code == 1
+    assert ran.out.splitlines() == [
+        "20002 packets, 9 of 160025 bytes are noise",
+        "kind             node  code  packets   bytes",
+        "request             1  0x02        1       8",
+        "reply               1  0x00    20000  160000",
+        "either              1  0x02        1       8",
+        "noise: checksum                    1       8",
+        "noise: framing                     1       1",
+        "code: the fifth byte: the instruction of a request, the alarm bits of a reply",
+    ]
+    document = run("decode", "--family", "feetech", "--summary", "--direction", "rx", "--json", READ).document
+    assert document["groups"] == [
+        {"kind": "reply", "node": 1, "code": 2, "fault": "", "packets": 1, "bytes": 8}
+    ]
+
+
+def test_summary_of_can_log_counts_damaged_lines(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdin", io.StringIO(LOG + "(1436509053.0) can0 5A5#6\n"))
+    ran = run("decode", "--family", "kst", "--summary", "--json")
+    assert ran.code == 1
+    assert ran.document["damaged_lines"] == 1
+    assert [(one["kind"], one["node"], one["code"], one["bytes"]) for one in ran.document["groups"]] == [
+        ("request", 0x25, 0x22_6003_00, 13),
+        ("reply", 0x25, 0x60_6003_00, 13),
+    ]
+
+
 def test_a_file_without_lines_is_refused(run: Run, tmp_path: Path) -> None:
     (tmp_path / "zeros").write_bytes(bytes(100_000))
     for more in ([], ["--summary"]):

@@ -28,7 +28,6 @@ FORBIDDEN = {
     "multiprocessing",
     "os",
     "pathlib",
-    "random",
     "sched",
 }
 FORBIDDEN |= {"select", "selectors", "signal", "socket", "ssl", "subprocess", "tempfile", "threading", "time"}

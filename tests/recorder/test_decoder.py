@@ -1,143 +1,187 @@
-"""A line taken apart as it comes: places, times and ways of what is found, and noise told once it has ended."""
+"""`recorder.Decoder`: packets of a recording, with their offsets and times, wherever the recording is cut."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import motorbus
 from motorbus.core.can_frame import CanFrame
-from motorbus.core.capture import PIECE, Packet
 from motorbus.errors import RequestError
-from motorbus.recorder import Decoder
+from motorbus.recorder import Decoder, Packet
+from motorbus.recorder.decoder import NOISE_LENGTH
+from tests.support.subjects import FAMILIES
 
 READ = bytes.fromhex("ff ff 01 04 02 38 02 be")
-ANSWER = bytes.fromhex("ff ff 01 04 00 18 05 dd")
-ECHO = Packet(0, READ, "either", 1, 2, "", None)
+REPLY = bytes.fromhex("ff ff 01 04 00 18 05 dd")
+ALARM = bytes.fromhex("ff ff 01 04 01 18 05 dc")
+"""The alarm bits of this reply are the code of PING."""
+PING = bytes.fromhex("ff ff 01 02 01 fb")
+SYNC_READ = bytes.fromhex("ff ff fe 06 82 38 02 01 02 3c")
+DAMAGED = READ[:-1] + b"\x00"
+MOVE = bytes.fromhex("ff aa 5e 00 00 00 00 00 00 00 07")
+MOVE_REPLY = MOVE[:6]
+DUMP = bytes.fromhex("ff aa 3e 01 00 00") + bytes(range(220))
+NOTICE = bytes.fromhex("ee dd")
 
 
-def test_requests_and_answers_of_one_line_are_told_apart() -> None:
-    decoder = motorbus.recorder.Decoder("feetech")
-    found = decoder.feed(READ + ANSWER + READ + READ[:3])
-    assert list(found) == [
-        Packet(0, READ, "request", 1, 2, "", None),
-        Packet(8, ANSWER, "reply", 1, 0, "", None),
-        ECHO._replace(start=16),
-    ]
-    assert decoder.flush() == [Packet(24, READ[:3], "noise", -1, -1, "framing", None)]
-    assert decoder.flush() == []
-
-
-@pytest.mark.parametrize(("way", "kind"), [("rx", "reply"), ("tx", "request")])
-def test_a_known_way_decides(way: str, kind: str) -> None:
-    assert [packet.kind for packet in Decoder("feetech", way).feed(READ + ANSWER)] == [kind, kind]
-    assert [packet.kind for packet in Decoder("feetech").feed(READ + ANSWER, way=way)] == [kind, kind]
-
-
-def test_a_packet_has_the_time_and_the_place_of_its_first_byte() -> None:
-    decoder = Decoder("feetech")
-    assert list(decoder.feed(b"\x00" + READ[:3], 1.0)) == []
-    (noise, request) = decoder.feed(READ[3:] + ANSWER[:1], 2.0)
-    assert (noise.start, noise.at, noise.fault) == (0, 1.0, "framing")
-    assert (request.start, request.at) == (1, 1.0)
-    assert list(decoder.feed(ANSWER[1:4], 3.0)) == []
-    first, second = decoder.feed(ANSWER[4:] + ANSWER, 4.0)
-    assert [(one.start, one.at) for one in (first, second)] == [(9, 2.0), (17, 4.0)]
-
-
-def test_the_columns_tell_the_same() -> None:
-    decoder = Decoder("feetech")
-    decoder.feed(READ[:3], 1.0)
-    found = decoder.feed(READ[3:] + b"\x00" + ANSWER, 2.0)
-    assert (found.start, found.at) == ([0, 8, 9], [1.0, 2.0, 2.0])
-    assert (found.kind, found.node, found.code, found.fault) == ([1, 0, 2], [1, -1, 1], [2, -1, 0], [0, 2, 0])
-    assert found.data == [READ, b"\x00", ANSWER]
-    assert (len(found), found[1:], found[-1].kind) == (3, [found[1], found[2]], "reply")
-    assert Decoder("feetech").feed(READ).at is None
-
-
-def test_ways_are_kept_apart_and_places_counted_over_all() -> None:
-    decoder = Decoder("feetech")
-    assert list(decoder.feed(READ[:5], 1.0, "tx")) == []
-    assert list(decoder.feed(ANSWER[:4], 1.5, "rx")) == []
-    assert list(decoder.feed(READ[5:], 2.0, "tx")) == [Packet(0, READ, "request", 1, 2, "", 1.0)]
-    assert list(decoder.feed(ANSWER[4:] + ANSWER, 2.5, "rx")) == [
-        Packet(5, ANSWER, "reply", 1, 0, "", 1.5),
-        Packet(16, ANSWER, "reply", 1, 0, "", 2.5),
-    ]
-    decoder.feed(READ[:2], None, "tx")
-    decoder.feed(ANSWER[:2], 3.0, "rx")
-    assert [(packet.start, packet.at) for packet in decoder.flush()] == [(24, None), (26, 3.0)]
-    assert [list(rest) for rest in decoder.rest()] == [[], []]
-
-
-def test_places_are_those_of_the_recording_without_times_too() -> None:
-    decoder = Decoder("feetech")
-    decoder.feed(READ + READ[:2], way="tx")
-    decoder.feed(ANSWER, way="rx")
-    assert [packet.start for packet in decoder.feed(READ[2:] + READ, way="tx")] == [8, 24]
-
-
-def test_noise_is_told_when_it_ends() -> None:
-    decoder = Decoder("feetech")
-    assert [len(decoder.feed(b"\x00")) for _ in range(9)] == [0] * 9
-    noise, reply = decoder.feed(ANSWER)
-    assert (noise.data, noise.start, reply.start) == (b"\x00" * 9, 0, 9)
-    bad = ANSWER[:-1] + b"\x00"
-    assert [(one.data, one.fault) for one in decoder.feed(bad + bad + b"\x33" + ANSWER)] == [
-        (bad + bad, "checksum"),
-        (b"\x33", "framing"),
-        (ANSWER, ""),
-    ]
-
-
-def test_long_noise_is_not_hoarded() -> None:
-    decoder = Decoder("feetech")
-    assert [len(packet.data) for packet in decoder.feed(b"\x00" * (2 * PIECE + 1))] == [PIECE, PIECE]
-    assert [(packet.start, len(packet.data)) for packet in decoder.flush()] == [(2 * PIECE, 1)]
-    assert [len(packet.data) for packet in decoder.feed(b"\x00" * PIECE)] == [PIECE]
-    assert decoder.flush() == []
-
-
-def test_frames_are_numbered_and_stand_by_themselves() -> None:
-    decoder = Decoder("kst")
-    asked = CanFrame(0x625, bytes.fromhex("4003600000000000"))
-    other = CanFrame(0x123, b"\x01\x02")
-    told = [list(decoder.feed(frame, at)) for at, frame in enumerate((asked, other, other))]
-    assert told == [
-        [Packet(0, asked.flat(), "request", 0x25, 0x40_6003_00, "", 0)],
-        [Packet(1, other.flat(), "noise", -1, -1, "foreign", 1)],
-        [Packet(2, other.flat(), "noise", -1, -1, "foreign", 2)],
-    ]
-    assert decoder.flush() == []
+def decoded(decoder: Decoder, *pieces: bytes | CanFrame) -> list[tuple[str, int, int, str]]:
+    """Kind, node, code and fault of each packet."""
+    packets = [packet for piece in pieces for packet in decoder.feed(piece)] + decoder.flush()
+    assert b"".join(packet.data for packet in packets) == b"".join(
+        piece.flat() if isinstance(piece, CanFrame) else piece for piece in pieces
+    )
+    return [packet[2:6] for packet in packets]
 
 
 @pytest.mark.parametrize(
-    ("family", "data"), [("kst", b"\xff"), ("feetech", CanFrame(1, b"")), ("feetech", "FF"), ("kst", None)]
+    ("family", "direction", "data", "expected"),
+    [
+        ("feetech", "", READ + REPLY, [("request", 1, 2, ""), ("reply", 1, 0, "")]),
+        ("feetech", "", READ + READ, [("request", 1, 2, ""), ("either", 1, 2, "")]),
+        ("feetech", "", READ + ALARM, [("request", 1, 2, ""), ("reply", 1, 1, "")]),
+        ("feetech", "", REPLY + PING, [("reply", 1, 0, ""), ("request", 1, 1, "")]),
+        ("feetech", "", SYNC_READ + ALARM, [("request", 254, 0x82, ""), ("reply", 1, 1, "")]),
+        ("feetech", "rx", PING + REPLY, [("reply", 1, 1, ""), ("reply", 1, 0, "")]),
+        ("feetech", "rx", SYNC_READ, [("noise", -1, -1, "framing")]),
+        ("feetech", "tx", READ + PING, [("request", 1, 2, ""), ("request", 1, 1, "")]),
+        ("feetech", "", DAMAGED + b"\x33" + REPLY, [
+            ("noise", -1, -1, "checksum"), ("noise", -1, -1, "framing"), ("reply", 1, 0, ""),
+        ]),
+        ("stepper", "", MOVE + MOVE_REPLY + NOTICE, [
+            ("request", 1, 0x5E00, ""), ("reply", 1, 0x5E00, ""), ("notice", 1, 0xEEDD, ""),
+        ]),
+        ("stepper", "", DUMP, [("reply", 1, 0x3E01, "")]),
+        ("stepper", "", MOVE[:-1] + b"\x08", [("noise", -1, -1, "checksum")]),
+        ("stepper", "rx", MOVE, [("reply", 1, 0x5E00, ""), ("noise", -1, -1, "framing")]),
+        ("stepper", "tx", MOVE + NOTICE, [("request", 1, 0x5E00, ""), ("noise", -1, -1, "framing")]),
+        ("stepper", "", DUMP[:-1], [("noise", -1, -1, "framing")]),
+    ],
+)  # fmt: skip
+def test_decoder_identifies_frames_of_serial_line(
+    family: str, direction: str, data: bytes, expected: list[tuple[str, int, int, str]]
+) -> None:
+    assert decoded(Decoder(family, direction), data) == expected
+    single = [data[at : at + 1] for at in range(len(data))]
+    assert decoded(Decoder(family, direction), *single) == expected
+
+
+@pytest.mark.parametrize(
+    ("frame", "expected"),
+    [
+        (CanFrame(0x625, bytes.fromhex("4003600000000000")), ("request", 0x25, 0x40_6003_00, "")),
+        (CanFrame(0x5A5, bytes.fromhex("6003600000000000")), ("reply", 0x25, 0x60_6003_00, "")),
+        (CanFrame(0x5A5, bytes.fromhex("6003600000000000"), True), ("reply", 0x25, 0x60_6003_00, "")),
+        (CanFrame(0x725, b"\x05"), ("notice", 0x25, 0x700, "")),
+        (CanFrame(0, b"\x01\x25"), ("request", 0x25, 0, "")),
+        (CanFrame(0x123, b"\x01\x02"), ("noise", -1, -1, "foreign")),
+    ],
 )
-def test_what_does_not_fit_the_line_is_refused_and_changes_nothing(family: str, data: Any) -> None:
+def test_decoder_identifies_can_frame(frame: CanFrame, expected: tuple[str, int, int, str]) -> None:
+    assert decoded(Decoder("kst"), frame, frame) == [expected, expected]
+
+
+def test_decoder_uses_receiver_of_family_without_recording_receiver() -> None:
+    request, reply = bytes.fromhex("AA5500010330 51"), bytes.fromhex("AA5A020100D190")
+    decoder = Decoder(FAMILIES["template"])
+    assert decoder.code_meaning == ""
+    assert decoded(decoder, request, reply) == [("noise", -1, -1, "framing"), ("reply", -1, -1, "")]
+
+
+@given(
+    frames=st.lists(st.sampled_from([READ, REPLY, ALARM, PING, SYNC_READ, DAMAGED, b"\x00", b"\xff" * 3])),
+    cuts=st.lists(st.integers(0, 200), max_size=9),
+)
+def test_cuts_change_no_packet(frames: list[bytes], cuts: list[int]) -> None:
+    data = b"".join(frames)
+    places = sorted({0, len(data), *(cut % (len(data) + 1) for cut in cuts)})
+    pieces = [data[start:end] for start, end in pairwise(places)]
+    whole, cut = Decoder("feetech"), Decoder("feetech")
+    expected = [*whole.feed(data), *whole.flush()]
+    assert [*(packet for piece in pieces for packet in cut.feed(piece)), *cut.flush()] == expected
+    assert [packet.start for packet in expected] == [
+        sum(len(other.data) for other in expected[:index]) for index in range(len(expected))
+    ]
+
+
+def test_packet_has_offset_and_time_of_its_first_byte() -> None:
+    decoder = Decoder("feetech")
+    assert decoder.feed(b"\x00" + READ[:3], 1.0) == []
+    assert decoder.feed(READ[3:] + REPLY[:1], 2.0) == [
+        Packet(0, b"\x00", "noise", -1, -1, "framing", 1.0),
+        Packet(1, READ, "request", 1, 2, "", 1.0),
+    ]
+    assert decoder.feed(REPLY[1:4], 3.0) == []
+    packets = decoder.feed(REPLY[4:] + REPLY, 4.0)
+    assert [(one.start, one.at) for one in packets] == [(9, 2.0), (17, 4.0)]
+
+
+def test_decoder_separates_directions_and_counts_offsets_over_all() -> None:
+    decoder = motorbus.recorder.Decoder("feetech")
+    assert decoder.feed(READ[:5], 1.0, "tx") == []
+    assert decoder.feed(REPLY[:4], 1.5, "rx") == []
+    assert decoder.feed(READ[5:], 2.0, "tx") == [Packet(0, READ, "request", 1, 2, "", 1.0)]
+    assert decoder.feed(REPLY[4:] + REPLY, 2.5, "rx") == [
+        Packet(5, REPLY, "reply", 1, 0, "", 1.5),
+        Packet(16, REPLY, "reply", 1, 0, "", 2.5),
+    ]
+    decoder.feed(READ[:2], None, "tx")
+    decoder.feed(REPLY[:2], 3.0, "rx")
+    assert [(packet.start, packet.at) for packet in decoder.flush()] == [(24, None), (26, 3.0)]
+    assert decoder.flush() == []
+
+
+def test_noise_is_returned_at_its_end_or_in_pieces() -> None:
+    decoder = Decoder("feetech")
+    assert [len(decoder.feed(b"\x00")) for _ in range(9)] == [0] * 9
+    noise, reply = decoder.feed(REPLY)
+    assert (noise.data, noise.start, reply.start) == (b"\x00" * 9, 0, 9)
+    packets = decoder.feed(b"\x00" * (2 * NOISE_LENGTH + 1))
+    assert [len(packet.data) for packet in packets] == [NOISE_LENGTH, NOISE_LENGTH]
+    assert [len(packet.data) for packet in decoder.flush()] == [1]
+
+
+@pytest.mark.parametrize(
+    ("family", "arguments"),
+    [
+        ("kst", (b"\xff",)),
+        ("feetech", (CanFrame(1, b""),)),
+        ("feetech", ("FF",)),
+        ("kst", (None,)),
+        ("feetech", (READ, float("nan"))),
+        ("feetech", (READ, "now")),
+        ("feetech", (READ, None, "up")),
+    ],
+)
+def test_decoder_refuses_wrong_data_and_continues(family: str, arguments: tuple[Any, ...]) -> None:
     decoder = Decoder(family)
     with pytest.raises(RequestError):
-        decoder.feed(data)
-    assert decoder.rest() == []
+        decoder.feed(*arguments)
+    assert decoder.flush() == []
+    if family == "feetech":
+        assert [packet.start for packet in decoder.feed(READ)] == [0]
 
 
 @pytest.mark.parametrize("kind", [bytearray, memoryview])
-def test_bytes_may_be_any_buffer(kind: Any) -> None:
-    """Which is not held on to."""
+def test_decoder_copies_a_buffer(kind: Any) -> None:
     decoder, buffer = Decoder("feetech"), bytearray(b"\x00" + READ[:3])
     decoder.feed(kind(buffer))
     buffer[:] = bytes(len(buffer))
     assert [packet.data for packet in decoder.feed(kind(READ[3:]))] == [b"\x00", READ]
-    twice = bytes(byte for one in READ for byte in (one, 0x55))
-    assert [packet.data for packet in Decoder("feetech").feed(memoryview(twice)[::2])] == [READ]  # type: ignore[arg-type]
 
 
-def test_an_unknown_way_is_refused() -> None:
-    with pytest.raises(RequestError, match="'up'"):
-        Decoder("feetech", "up")
-    decoder = Decoder("feetech")
-    with pytest.raises(RequestError, match="'up'"):
-        decoder.feed(READ, way="up")
-    assert [packet.start for packet in decoder.feed(READ)] == [0]
+@pytest.mark.parametrize("family", [None, 5, [], b"feetech", motorbus.feetech, motorbus.kst.FAMILY.link])
+def test_decoder_refuses_what_is_no_family(family: Any) -> None:
+    with pytest.raises(RequestError, match="is no family of devices") as caught:
+        Decoder(family)
+    assert "feetech" in caught.value.expected
+
+
+@pytest.mark.parametrize("arguments", [("nobody",), ("feetech", "up")])
+def test_decoder_refuses_unknown_name_or_direction(arguments: tuple[Any, ...]) -> None:
+    with pytest.raises(RequestError):
+        Decoder(*arguments)

@@ -54,12 +54,14 @@ def request(
     operands: bytes = b"",
     *,
     size: int = 0,
+    refusal: int = protocol.OVERHEAD,
     decode: Callable[[bytes], T],
     **options: Any,
 ) -> Request[T]:
     """A request whose reply has `size` bytes of data, of which `decode` makes the value.
 
-    `options` are those of `Request`. A refusal raises DeviceError. Goals are absolute, so all requests are repeatable.
+    `refusal` is the length of a refusal, which raises DeviceError. `options` are those of `Request`. All requests are
+    repeatable, because goals are absolute.
     """
 
     def take(response: Response) -> T:
@@ -74,7 +76,7 @@ def request(
             )
         return decode(reply[5:-2])
 
-    expected = Expected(node.node, node.node, protocol.OVERHEAD + size)
+    expected = Expected(node.node, node.node, protocol.OVERHEAD + size, refusal)
     frame = protocol.encode_request(node.node, command, operands)
     return Request(frame, (expected,), take, repeatable=True, **options)
 
@@ -143,10 +145,11 @@ def disable_torque(node: Node) -> Request[None]:
 def probe(node: Node, attempt: int = 0) -> Request[bool]:
     """Read 7 to 22 bytes from the model on; True if the id among them is possible. No other read has these lengths."""
     size = 7 + attempt % 16
-    at = TABLE["node_id"].address
-    return request(
-        node, Command.READ, bytes((0, size)), size=size, decode=lambda data: data[at] in protocol.IDS
-    )
+
+    def decode(data: bytes) -> bool:
+        return data[TABLE["node_id"].address] in protocol.IDS
+
+    return request(node, Command.READ, bytes((0, size)), size=size, refusal=0, decode=decode)
 
 
 def _no_value(data: bytes) -> None:

@@ -152,8 +152,9 @@ class Attempt:
         if self.request.expected is ANY:
             self.replies[len(self.replies)] = reply
             return True
+        size = len(reply.data)
         for index, due in enumerate(self.dues):
-            if due.key == reply.key and due.length == len(reply.data) and index not in self.replies:
+            if due.key == reply.key and size in (due.length, due.refusal) and index not in self.replies:
                 self.replies[index] = reply
                 self._check_complete()
                 return True

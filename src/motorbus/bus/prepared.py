@@ -75,7 +75,7 @@ def split(request: Request[Any], data: Data) -> tuple[Reply, ...]:
     assert dues is not ANY
     content = data.data if isinstance(data, CanFrame) else data
     replies, start = [], 0
-    for _, key, length in dues:
-        replies.append(Reply(request.lane, key, content[start : start + length]))
-        start += length
+    for due in dues:
+        replies.append(Reply(request.lane, due.key, content[start : start + due.length]))
+        start += due.length
     return tuple(replies)

@@ -142,5 +142,5 @@ class SyncTable:
 
 def kind_of(probe: Request[bool]) -> Kind:
     """The kind of the only reply to a probe."""
-    ((_, key, length),) = probe.expected  # type: ignore[misc]  # a probe has one reply
-    return probe.lane, key, length
+    (due,) = probe.expected  # type: ignore[misc]  # a probe has one reply
+    return probe.lane, due.key, due.length

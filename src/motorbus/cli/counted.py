@@ -1,20 +1,16 @@
-"""What a whole recording holds, counted: who said what how often, and how much was broken.
-
-It is taken apart at once where numpy is there, else piece by piece, which takes longer and gives the same.
-"""
+"""The packets of a recording, counted by kind, node and code, and the noise by its fault."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from motorbus.cli.exits import Exit
-from motorbus.core.capture import ABSENT, FAULTS, KINDS
+from motorbus.core.recording import ABSENT
 from motorbus.errors import RequestError
-from motorbus.recorder import Decoder, Packets, decode
-from motorbus.recorder.bulk import can_decode
-from motorbus.recorder.heard import captures_of
+from motorbus.recorder import Decoder, Packet
 
 if TYPE_CHECKING:
     from motorbus.cli.output import Output
@@ -22,12 +18,15 @@ if TYPE_CHECKING:
     from motorbus.core.family import Family
     from motorbus.recorder.can_log import Logged
 
-_PIECE: Final = 1 << 16
-"""Bytes that are fed at a time where there is no numpy."""
+_CHUNK: Final = 1 << 14
+"""Bytes that are decoded at a time."""
+_KINDS: Final = ("noise", "request", "reply", "either", "notice")
+_FAULTS: Final = ("", "checksum", "framing", "foreign")
+"""Kinds and faults in the order in which they are shown."""
 
 
 class Group(NamedTuple):
-    """So many packets say the same kind of thing; `kind` and `fault` as in `Packet`."""
+    """The packets of one kind, node, code and fault, see `recorder.Packet`; their number and their bytes."""
 
     kind: str
     node: int
@@ -44,13 +43,14 @@ def summary(
     output: Output,
     damaged: Sequence[Logged] = (),
 ) -> Exit:
-    """Print what is in it; FAILURE if anything is broken or belongs to no packet.
+    """Print the groups of a recording; FAILURE if it contains noise or damaged lines.
 
-    `damaged` are the lines of a log of which nobody knows what was in them.
+    `damaged` are the lines of a log that could not be read.
     """
     if not recording and not damaged:
         raise RequestError("there is nothing to count", expected="bytes, or frames for a CAN family")
-    groups = counted(_taken_apart(family, recording, direction))
+    decoder = Decoder(family, direction)
+    groups = counted(_packets(decoder, recording))
     noise = [group for group in groups if group.fault]
     facts = {
         "family": family.name,
@@ -58,7 +58,7 @@ def summary(
         "bytes": sum(group.bytes for group in groups),
         "noise_bytes": sum(group.bytes for group in noise),
         "damaged_lines": len(damaged),
-        "code": captures_of(family).code,
+        "code": decoder.code_meaning,
         "groups": [_facts(group) for group in groups],
     }
     output.document("motorbus.decode.summary/1", facts)
@@ -75,40 +75,33 @@ def summary(
     return Exit.FAILURE if noise or damaged else Exit.OK
 
 
-def counted(found: Iterator[Packets]) -> list[Group]:
-    """Packets of one kind, node and code together, noise of one kind last."""
-    times: Counter[tuple[int, int, int, int]] = Counter()
-    sizes: Counter[tuple[int, int, int, int]] = Counter()
-    for packets in found:
-        columns = (packets.kind, packets.node, packets.code, packets.fault, packets.size)
-        rows = zip(*map(_plain, columns), strict=True)
-        for (kind, node, code, fault, size), count in Counter(rows).items():
-            times[kind, node, code, fault] += count
-            sizes[kind, node, code, fault] += count * size
-    order = sorted(times, key=lambda key: (key[3], key))
-    return [Group(KINDS[key[0]], key[1], key[2], FAULTS[key[3]], times[key], sizes[key]) for key in order]
+def counted(packets: Iterable[Packet]) -> list[Group]:
+    """Return the groups of these packets, noise last."""
+    equal = Counter((kind, node, code, fault, len(data)) for _, data, kind, node, code, fault, _ in packets)
+    numbers: Counter[tuple[str, int, int, str]] = Counter()
+    sizes: Counter[tuple[str, int, int, str]] = Counter()
+    for (kind, node, code, fault, size), number in equal.items():
+        numbers[kind, node, code, fault] += number
+        sizes[kind, node, code, fault] += number * size
+    groups = [Group(*key, number, sizes[key]) for key, number in numbers.items()]
+    return sorted(
+        groups, key=lambda one: (_FAULTS.index(one.fault), _KINDS.index(one.kind), one.node, one.code)
+    )
 
 
-def _taken_apart(family: Family, recording: bytes | Sequence[CanFrame], way: str) -> Iterator[Packets]:
-    if can_decode():
-        yield decode(family, recording, way)
-        return
-    decoder = Decoder(family, way)
+def _packets(decoder: Decoder, recording: bytes | Sequence[CanFrame]) -> Iterator[Packet]:
+    chunks: Iterable[bytes | CanFrame]
     if isinstance(recording, bytes):
-        for start in range(0, len(recording), _PIECE):
-            yield decoder.feed(recording[start : start + _PIECE])
+        chunks = (recording[start : start + _CHUNK] for start in range(0, len(recording), _CHUNK))
     else:
-        yield from map(decoder.feed, recording)
-    yield from decoder.rest()
-
-
-def _plain(column: Sequence[int]) -> Sequence[int]:
-    return column.tolist() if hasattr(column, "tolist") else column
+        chunks = recording
+    yield from chain.from_iterable(map(decoder.feed, chunks))
+    yield from decoder.flush()
 
 
 def _facts(group: Group) -> dict[str, object]:
-    nobody = {name: None for name in ("node", "code") if getattr(group, name) == ABSENT}
-    return {**group._asdict(), **nobody}
+    absent = {name: None for name in ("node", "code") if getattr(group, name) == ABSENT}
+    return {**group._asdict(), **absent}
 
 
 def _row(group: Group) -> tuple[object, ...]:

@@ -43,8 +43,8 @@ bus the text of candump (.log, .candump, .txt or no ending), and ASC, BLF and
 TRC files (with python-can). A line that is damaged is told and passed.
 Recordings give JSON Lines with --json, each with its start, in bytes or
 frames. Times that count from the beginning of a recording are shown with a +.
---summary counts instead of explaining, quickly where numpy is installed. Ends
-with exit code 1 if any frame is bad or any byte belongs to none.
+--summary counts instead of explaining. Ends with exit code 1 if any frame is
+bad or any byte belongs to none.
 
 Examples:
 

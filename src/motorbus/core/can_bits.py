@@ -79,12 +79,6 @@ def least(length: int, extended: bool = False) -> int:
     return _HEAD[extended] + 8 * length + _CRC + _TAIL
 
 
-def most(length: int, extended: bool = False) -> int:
-    """Maximum bits of a frame with `length` data bytes: a stuff bit after five bits, then after every four."""
-    size = _HEAD[extended] + 8 * length + _CRC
-    return size + (size - 1) // 4 + _TAIL
-
-
 def precedence(frame: CanFrame) -> tuple[int, ...]:
     """Sort key of arbitration: of frames that start together, the one with the lowest key wins.
 

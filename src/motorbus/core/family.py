@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, fields
 from enum import Enum
 from typing import Any, NamedTuple, Protocol
 
-from motorbus.core.capture import Captures
 from motorbus.core.guarantees import Guarantees
+from motorbus.core.recording import RecordingReceiver
 from motorbus.core.register import RegisterMap, Value
 from motorbus.core.request import Data, Event, Request, Response
 from motorbus.core.steps import Procedure, Runnable
@@ -45,7 +45,6 @@ class LinkSpec(NamedTuple):
     `only`      id of the only device on a line of this family; None: there may be several
     `stops`     possible actions of an emergency stop on an axis, "torque_off" and "hold", the default first; () if
                 unknown. A family with both has a setting `estop_hold`: the ids that an emergency stop holds
-    `captures`  decoders of recordings; None: the receiver decodes them
     """
 
     kind: str
@@ -54,7 +53,6 @@ class LinkSpec(NamedTuple):
     settings: tuple[Option, ...] = ()
     only: int | None = None
     stops: tuple[str, ...] = ()
-    captures: Captures | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -452,6 +450,8 @@ class Family:
     `simulator`  makes a simulated bus: simulator(ids, model, **options); model "" is the default model of the family.
                  Raises RequestError for bad ids, models and options
     `simulator_options`  the options of `simulator`; a function, so that the simulator is imported only when used
+    `recording`  makes the receiver for recordings of one direction, "rx" from the devices, "tx" to them, "" unknown or
+                 mixed; None: the receiver of the bus decodes them
     `cli`        module with the shell commands of this family; "" without
     """
 
@@ -462,6 +462,7 @@ class Family:
     driver: Callable[..., BusDriver]
     simulator: Callable[..., Simulator]
     simulator_options: Callable[[], tuple[Option, ...]] = tuple
+    recording: Callable[[str], RecordingReceiver] | None = None
     safety: Guarantees | None = None
     cli: str = ""
 

@@ -51,8 +51,8 @@ class HalfDuplexSerial:
         if request.expected is ANY:
             replies = self.broadcast_bytes
         else:
-            for _, _, length in request.expected:
-                replies += length
+            for expected in request.expected:
+                replies += expected.length
         return (len(request.wire) + replies) * BITS / rate
 
     def turnaround(self, request: Request[Any]) -> float:

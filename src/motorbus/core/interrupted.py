@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, Final, NamedTuple, Protocol, TypeVar
 
 from motorbus.core import units
-from motorbus.core.steps import Exclusive, Runnable, Sleep, catch, gather, with_cleanup
+from motorbus.core.steps import Exclusive, Guard, Runnable, Sleep, catch, gather
 from motorbus.errors import MotorbusError, RequestError
 
 T = TypeVar("T")
@@ -46,51 +46,31 @@ async def stopped_if_interrupted(move: Runnable[T], *devices: Moving) -> T:
 
     A device with a newer move is not stopped.
     """
-    wait = _Wait(devices)
-    try:
-        return await with_cleanup(wait.run(move), wait.stop)
-    except BaseException as error:
-        for note in wait.notes:
-            error.add_note(note)
-        raise
+    async with _Move(devices):
+        return await move
 
 
-class _Wait:
-    """The wait for one move; `notes` say what each device does after `stop`."""
-
+class _Move(Guard):
     def __init__(self, devices: tuple[Moving, ...]) -> None:
-        self.notes: list[str] = []
         self._devices = devices
-        self._move = object()
-        self._open = False
+        self._id = object()
 
-    async def run(self, move: Runnable[T]) -> T:
+    async def enter(self) -> None:
         for moving in self._devices:
-            moving.device.last_move = self._move
-        self._open = True
-        try:
-            value = await move
-        except (Exception, GeneratorExit) as error:
-            self._open = isinstance(error, MemoryError)  # an interruption: it says nothing of the move
-            raise
-        self._open = False
-        return value
+            moving.device.last_move = self._id
 
-    async def stop(self) -> None:
-        if not self._open:
-            return
-        interrupted = MotorbusError("its stop was interrupted")
-        self.notes = [_note(moving, interrupted) for moving in self._devices]
+    async def leave(self, error: BaseException | None) -> None:
+        if error is None or (isinstance(error, Exception) and not isinstance(error, MemoryError)):
+            return  # the move ended by itself
         results = await gather(*[catch(Exclusive(self._stop(moving))) for moving in self._devices])
-        self._open = False
         stopped = [pair for pair in zip(self._devices, results, strict=True) if pair[1]]
-        self.notes = [_note(moving, result) for moving, result in stopped]
-        places = await gather(*[_place(moving, result) for moving, result in stopped])
-        self.notes = [note + place for note, place in zip(self.notes, places, strict=True)]
+        places = await gather(*[catch(_place(moving, result)) for moving, result in stopped])
+        for (moving, result), place in zip(stopped, places, strict=True):
+            error.add_note(_note(moving.device.node, result, place))
 
     async def _stop(self, moving: Moving) -> str:
         """Run it inside `Exclusive`: a newer move is then ordered either before the check or after the stop."""
-        if moving.device.last_move is not self._move:
+        if moving.device.last_move is not self._id:
             return ""
         promise = await moving.stop()
         if promise is None:
@@ -98,12 +78,13 @@ class _Wait:
         return "holds" if promise.name.startswith("HOLD") else f"{promise.value};"
 
 
-def _note(moving: Moving, result: str | MotorbusError) -> str:
-    node = moving.device.node
-    if isinstance(result, str):
-        return f"#{node}: {result}"
-    fix = result.advice if isinstance(result, RequestError) else f"`motorbus stop BUS#{node}` stops it"
-    return f"#{node} may still be moving: {result.summary}; {fix}"
+def _note(node: int, result: str | MotorbusError, place: str | MotorbusError) -> str:
+    if isinstance(result, MotorbusError):
+        fix = result.advice if isinstance(result, RequestError) else f"`motorbus stop BUS#{node}` stops it"
+        return f"#{node} may still be moving: {result.summary}; {fix}"
+    if isinstance(place, MotorbusError):
+        return f"#{node}: {result}, and its position is not known: {place.summary}"
+    return f"#{node}: {result}{place}"
 
 
 async def _place(moving: Moving, result: str | MotorbusError) -> str:
@@ -113,9 +94,7 @@ async def _place(moving: Moving, result: str | MotorbusError) -> str:
     begin = since = await Sleep(0)
     rest: float | None = None
     while True:
-        position = await catch(moving.position())
-        if isinstance(position, MotorbusError):
-            return f", and its position is not known: {position.summary}"
+        position = await moving.position()
         now = await Sleep(PERIOD)
         if rest is None or abs(position - rest) > TOLERANCE:
             rest, since = position, now

@@ -9,13 +9,9 @@ differences matter.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from math import copysign, inf, isfinite, sqrt
-from typing import Final, NamedTuple
-
-_made: Final = tuple.__new__
-"""Makes a named tuple in half the time of its constructor; every goal of every axis makes four."""
+from typing import NamedTuple
 
 
 class Phase(NamedTuple):
@@ -35,22 +31,6 @@ class Phase(NamedTuple):
         return self.velocity + self.acceleration * elapsed
 
 
-class Stretch(NamedTuple):
-    """A part of a movement in one direction: begin and end (s), position and velocity at the begin, acceleration."""
-
-    begin: float
-    end: float
-    position: float
-    velocity: float
-    acceleration: float
-
-    @property
-    def way(self) -> float:
-        """Direction: 1.0 or -1.0, 0.0 at rest."""
-        direction = self.velocity or self.acceleration
-        return copysign(1.0, direction) if direction else 0.0
-
-
 class Motion(NamedTuple):
     """A movement from `start` (s) on. After its phases it stays at `goal`, or moves on from there at `cruise`.
 
@@ -63,15 +43,8 @@ class Motion(NamedTuple):
     cruise: float = 0.0
 
     def position(self, at: float) -> float:
-        """Position at this moment (s). Faster than `state`: most packets read only this, of every servo."""
-        elapsed = at - self.start
-        if elapsed < 0.0:
-            elapsed = 0.0
-        for duration, position, velocity, acceleration in self.phases:
-            if elapsed < duration:
-                return position + elapsed * (velocity + 0.5 * acceleration * elapsed)
-            elapsed -= duration
-        return self.goal + self.cruise * elapsed if self.cruise else self.goal
+        """Position at this moment (s)."""
+        return self.state(at)[0]
 
     def velocity(self, at: float) -> float:
         """Signed velocity at this moment (s)."""
@@ -83,24 +56,17 @@ class Motion(NamedTuple):
 
     def state(self, at: float) -> tuple[float, float, float]:
         """Position, velocity and acceleration at this moment (s)."""
-        elapsed = at - self.start
-        if elapsed < 0.0:
-            elapsed = 0.0
-        for duration, position, velocity, acceleration in self.phases:
-            if elapsed < duration:
-                place = position + elapsed * (velocity + 0.5 * acceleration * elapsed)
-                return place, velocity + acceleration * elapsed, acceleration
-            elapsed -= duration
+        elapsed = max(0.0, at - self.start)
+        for phase in self.phases:
+            if elapsed < phase.duration:
+                return phase.position_after(elapsed), phase.velocity_after(elapsed), phase.acceleration
+            elapsed -= phase.duration
         return self.goal + self.cruise * elapsed if self.cruise else self.goal, self.cruise, 0.0
 
     @property
     def peak(self) -> float:
         """The highest speed at the start of a phase or after the last one."""
-        highest = abs(self.cruise)
-        for _, _, velocity, _ in self.phases:
-            if abs(velocity) > highest:
-                highest = abs(velocity)
-        return highest
+        return max([abs(self.cruise), *(abs(phase.velocity) for phase in self.phases)])
 
     def moving(self, at: float) -> bool:
         """Whether the movement is not yet at its end at this moment (s)."""
@@ -110,22 +76,6 @@ class Motion(NamedTuple):
     def done_at(self) -> float:
         """Moment (s) at which it comes to rest at the goal; inf if it never does."""
         return inf if self.cruise else self.start + sum(phase.duration for phase in self.phases)
-
-    def stretches(self, since: float = -inf) -> Iterator[Stretch]:
-        """Yield the parts that end after `since` (s), in order; the last one, at rest or at `cruise`, ends at inf."""
-        begin = self.start
-        for phase in self.phases:
-            end = begin + phase.duration
-            turn = -phase.velocity / phase.acceleration if phase.acceleration else inf
-            if 0 < turn < phase.duration:
-                middle = begin + turn
-                first = Stretch(begin, middle, *phase[1:])
-                second = Stretch(middle, end, phase.position_after(turn), 0.0, phase.acceleration)
-                yield from (part for part in (first, second) if part.end > since)
-            elif end > since:
-                yield Stretch(begin, end, *phase[1:])
-            begin = end
-        yield Stretch(begin, inf, self.goal, self.cruise, 0.0)
 
 
 def rest(at: float, position: float) -> Motion:
@@ -185,13 +135,13 @@ def move(
     ramp, slope = abs(gain) / ramp_limit, copysign(ramp_limit, gain)
     reached = position + ramp * (velocity + 0.5 * slope * ramp)
     brakes_at = goal - peak * abs(peak) / (2 * braking)
-    phases: tuple[Phase, ...] = (_made(Phase, (ramp, position, velocity, slope)),) if ramp else ()
+    phases: tuple[Phase, ...] = (Phase(ramp, position, velocity, slope),) if ramp else ()
     # A triangle has no cruise: its difference is a rounding error, which a tiny peak would turn into a long time.
     if cruises and (cruise := (brakes_at - reached) / peak) > 0.0:
-        phases += (_made(Phase, (cruise, reached, peak, 0.0)),)
+        phases += (Phase(cruise, reached, peak, 0.0),)
     if brake := abs(peak) / braking:
-        phases += (_made(Phase, (brake, brakes_at, peak, -copysign(braking, peak))),)
-    return _made(Motion, (at, phases, goal, 0.0))
+        phases += (Phase(brake, brakes_at, peak, -copysign(braking, peak)),)
+    return Motion(at, phases, goal)
 
 
 def run(
@@ -204,36 +154,6 @@ def run(
         return Motion(at, (), position, velocity_goal)
     ramp = Phase(abs(change) / acceleration, position, velocity, copysign(acceleration, change))
     return Motion(at, (ramp,), ramp.position_after(ramp.duration), velocity_goal)
-
-
-def obstructed(motion: Motion, low: float, high: float) -> Motion:
-    """The same movement with obstacles at `low` and `high`: it ends at rest where it meets one.
-
-    Beyond an obstacle only the way back is free. A movement that meets none is returned unchanged.
-    """
-    phases: list[Phase] = []
-    for stretch in motion.stretches():
-        bound = high if stretch.way > 0 else low
-        ahead = (bound - stretch.position) * stretch.way if stretch.way else inf
-        time = _time_over(max(0.0, ahead), stretch)
-        if time is not None and stretch.begin + time < stretch.end:
-            if time:
-                phases.append(Phase(time, stretch.position, stretch.velocity, stretch.acceleration))
-            return Motion(motion.start, tuple(phases), bound if ahead > 0 else stretch.position)
-        if stretch.end < inf:
-            phases.append(Phase(stretch.end - stretch.begin, *stretch[2:]))
-    return motion
-
-
-def _time_over(distance: float, stretch: Stretch) -> float | None:
-    """Seconds in which a stretch covers this distance, even beyond its end; None if it never does."""
-    if distance == inf:
-        return None
-    speed, gain = abs(stretch.velocity), stretch.acceleration * stretch.way
-    square = speed**2 + 2 * gain * distance
-    if square < 0 or not (speed or gain):
-        return None
-    return 2 * distance / (speed + sqrt(square)) if distance else 0.0
 
 
 def _check(speed: float, acceleration: float, *finite: float) -> None:

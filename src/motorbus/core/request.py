@@ -51,12 +51,13 @@ class TimeoutClass(IntEnum):
 class Expected(NamedTuple):
     """An expected reply: its node, the key that identifies it, and its exact length in bytes.
 
-    A refusal is a reply, too; where it is shorter, the family pads it to this length, as CANopen does.
+    `refusal` is the length of a refusal where that differs; 0: none. A probe accepts no refusal.
     """
 
     node: int
     key: Key
     length: int
+    refusal: int = 0
 
 
 class Any_(Enum):  # noqa: N801 - typing.Any is taken

@@ -1,182 +1,193 @@
-"""Packets out of what is being heard on a line, however it is cut.
+"""Decode a recording of a bus into packets: requests, replies, notices, and the noise between them.
 
-What a family finds is numbered through, put in order and given its time here. Noise is held until it is known where
-it ends, so that the same bytes give the same packets in whatever pieces they come.
+The family finds the frames; a `Decoder` adds their offsets and times. Noise is held until it ends, so the result does
+not depend on where the recording is cut.
 """
 
 from __future__ import annotations
 
-from bisect import bisect_right
-from math import isfinite
-from operator import attrgetter
-from typing import Final
+from collections import deque
+from collections.abc import Iterator
+from math import inf
+from typing import Final, NamedTuple
 
+from motorbus import families
 from motorbus.core.can_frame import CanFrame
-from motorbus.core.capture import FAULTS, PIECE, WAYS, Captures, Cutter, Packet, Run
 from motorbus.core.family import Family
+from motorbus.core.recording import ABSENT, RecordedEvent, RecordedFrame, RecordingReceiver
 from motorbus.core.register import shown
-from motorbus.core.request import Data
+from motorbus.core.request import Data, Event, Noise, Notification
 from motorbus.errors import RequestError
-from motorbus.recorder.heard import captures_of, spoken
-from motorbus.recorder.packets import Heard, Mark
 
-_OWN: Final = attrgetter("own")
-_NUMBER: Final = {fault: number for number, fault in enumerate(FAULTS)}
+NOISE_LENGTH: Final = 1024
+"""Bytes; a longer run of noise is split into packets of this length."""
+
+
+class Packet(NamedTuple):
+    """One frame of a recording, or a run of noise.
+
+    `start`  offset in the recording, in bytes or CAN frames
+    `data`   the whole frame; a CAN frame as `CanFrame.flat()` serializes it
+    `kind`   "noise", or as in `RecordedFrame`
+    `node`   sender or receiver; -1 for noise, and where the frame does not tell
+    `code`   content as a number of the family; -1 for noise
+    `fault`  "" for a valid frame, else "checksum", "framing" or "foreign"
+    `at`     time (s) of its first byte; None where it was not recorded
+    """
+
+    start: int
+    data: bytes
+    kind: str
+    node: int
+    code: int
+    fault: str
+    at: float | None
 
 
 class Decoder:
-    """Takes a line of one family apart.
+    """Decodes a recording of one family.
 
-    `way` says which way the bytes went unless `feed` says it: "rx" from the devices, "tx" to them, "" both or unknown.
-    The ways are kept apart, and places are counted over all that is fed. Raises RequestError for an unknown family or
-    way.
+    `direction` of the data, unless `feed` gives another: "rx" from the devices, "tx" to them, "" unknown or both.
+    Directions are decoded separately; offsets count all data. Raises RequestError for an unknown family or direction.
     """
 
-    def __init__(self, family: str | Family, way: str = "") -> None:
-        self.family: Final = spoken(family)
-        self._way: Final = checked(way)
-        self._captures: Final[Captures] = captures_of(self.family)
-        self._frames: Final = self.family.link.kind == "frames"
-        self._lines: Final[dict[str, _Line]] = {}
-        self._usual: Final[type] = CanFrame if self._frames else bytes
-        self._taken = 0
+    def __init__(self, family: str | Family, direction: str = "") -> None:
+        if isinstance(family, str):
+            family = families.load(family)
+        elif not hasattr(family, "link"):
+            raise RequestError(
+                f"{shown(family)} is no family of devices",
+                expected=f"one of {', '.join(families.names())}, or a `FAMILY`",
+                advice='give the name of the family, as "feetech"',
+            )
+        self.family: Final = family
+        self.code_meaning: Final = _receiver(family, direction).code_meaning
+        """The meaning of `Packet.code`, in words; "" if the family has no codes."""
+        self._direction: Final = direction
+        self._frames: Final = family.link.kind == "frames"
+        self._streams: Final[dict[str, _Stream]] = {}
+        self._position = 0
 
-    def feed(self, data: Data, at: float | None = None, way: str | None = None) -> Heard:
-        """Take bytes, cut anywhere, or one CAN frame, and when (s) they came; give what is complete.
+    def feed(self, data: Data, at: float | None = None, direction: str | None = None) -> list[Packet]:
+        """Take bytes, or one CAN frame, and the time (s) of their arrival; return the packets that are complete.
 
-        Raises RequestError for an unknown way, for a time that is no finite number, and for bytes where frames are due
-        or the other way round.
+        Raises RequestError for an unknown direction, a time that is not finite, and data of the wrong kind of bus.
         """
-        if at is not None and (at.__class__ is not float or at - at != 0.0):
-            timed(at)
-        if data.__class__ is not self._usual:
-            fitting(self._frames, data)
-            if not self._frames:
-                data = bytes(data)  # type: ignore[arg-type]
-        way = self._way if way is None else checked(way)
-        line = self._lines.get(way)
-        if line is None:
-            line = self._lines[way] = _Line(self._captures.cutter(way), self._frames)
-        place = self._taken
-        self._taken += 1 if self._frames else len(data)
-        return line.feed(data, place, at)
+        if at is not None and not (isinstance(at, int | float) and -inf < at < inf):
+            raise RequestError(f"at: {shown(at)} is no time", expected="a finite number of seconds, or None")
+        if self._frames:
+            if not isinstance(data, CanFrame):
+                raise RequestError(f"{self.family.name} devices are on a CAN bus", expected="a CanFrame")
+        elif isinstance(data, bytes | bytearray | memoryview):
+            data = bytes(data)
+        else:
+            raise RequestError(f"{self.family.name} devices are on a serial line", expected="bytes")
+        direction = self._direction if direction is None else direction
+        stream = self._streams.get(direction)
+        if stream is None:
+            stream = self._streams[direction] = _Stream(_receiver(self.family, direction), self._frames)
+        start = self._position
+        self._position += 1 if self._frames else len(data)
+        return stream.feed(data, start, at)
 
     def flush(self) -> list[Packet]:
-        """Nothing more comes: what can be made of the rest, one way after the other."""
-        return [packet for rest in self.rest() for packet in rest]
-
-    def rest(self) -> list[Heard]:
-        """As `flush`, with the columns of each way by itself."""
-        return [line.flush() for line in self._lines.values()]
+        """End of the recording: return the packets in the remaining data, one direction after the other."""
+        return [packet for stream in self._streams.values() for packet in stream.flush()]
 
 
-class _Line:
-    """What went one way."""
+class _Chunk(NamedTuple):
+    """Data that were fed together: the offset in their direction and in the recording, and their time (s)."""
 
-    __slots__ = ("_at", "_cutter", "_fault", "_frames", "_marks", "_more", "_noise", "_taken", "_told")
+    own: int
+    start: int
+    at: float | None
 
-    def __init__(self, cutter: Cutter, frames: bool) -> None:
-        self._cutter = cutter
+
+class _Stream:
+    """The data of one direction."""
+
+    def __init__(self, receiver: RecordingReceiver, frames: bool) -> None:
+        self._receiver = receiver
         self._frames = frames
-        self._taken = 0
-        self._told = 0
-        self._more: int | None = None
-        self._at: float | None = None
-        self._marks: tuple[Mark, ...] = ()
+        self._chunks: deque[_Chunk] = deque()
+        self._fed = 0
+        self._position = 0  # of the next packet
         self._noise = b""
-        self._fault = 0
+        self._fault = ""
 
-    def feed(self, data: Data, place: int, at: float | None) -> Heard:
-        own = self._taken
-        self._taken = own + (1 if self._frames else len(data))
-        more = place - own
-        if more != self._more or at != self._at:
-            self._more, self._at = more, at
-            self._marks += (Mark(own, more, at),)
-        return self._heard(self._cutter.feed(data))
+    def feed(self, data: Data, start: int, at: float | None) -> list[Packet]:
+        self._chunks.append(_Chunk(self._fed, start, at))
+        self._fed += 1 if self._frames else len(data)
+        return self._packets(self._receiver.feed(data))
 
-    def flush(self) -> Heard:
-        return self._heard(self._cutter.flush(), last=True)
+    def flush(self) -> list[Packet]:
+        return self._packets(self._receiver.flush(), end=True)
 
-    def _heard(self, runs: list[Run], last: bool = False) -> Heard:
-        noise: dict[int, int] = {}
-        if len(runs) == 1 and isinstance(runs[0], list) and not self._noise:
-            data = sound = runs[0]  # the usual case of a good line
-        else:
-            data, sound = self._sorted(runs, noise)
-        if last:
-            self._silence(data, noise)
-        first, marks = self._told, self._marks
-        self._told = told = first + len(data if self._frames else b"".join(data))
-        if len(marks) > 1:
-            self._marks = marks[max(bisect_right(marks, told, key=_OWN) - 1, 0) :]
-        return Heard(first, marks, data, noise, self._cutter.tell(sound), self._frames)
+    def _packets(self, events: list[RecordedEvent], end: bool = False) -> list[Packet]:
+        packets: list[Packet] = []
+        chunks, position = self._chunks, self._position
+        own, start, at = chunks[0]
+        limit = chunks[1].own if len(chunks) > 1 else inf
+        for data, kind, node, code, fault in self._merged(events, end):
+            while position >= limit:
+                chunks.popleft()
+                own, start, at = chunks[0]
+                limit = chunks[1].own if len(chunks) > 1 else inf
+            packets.append(Packet(start + position - own, data, kind, node, code, fault, at))
+            position += 1 if self._frames else len(data)
+        self._position = position
+        return packets
 
-    def _sorted(self, runs: list[Run], noise: dict[int, int]) -> tuple[list[bytes], list[bytes]]:
-        """All in order, and of it the packets; of noise the fault into `noise`, by its place."""
-        data: list[bytes] = []
-        sound: list[bytes] = []
-        stray, fault, frames = self._noise, self._fault, self._frames
-        for run in runs:
-            if isinstance(run, list):
-                if stray:
-                    noise[len(data)] = fault
-                    data.append(stray)
-                    stray = b""
-                data += run
-                sound += run
+    def _merged(self, events: list[RecordedEvent], end: bool) -> Iterator[tuple[bytes, str, int, int, str]]:
+        """Yield data, kind, node, code and fault of each packet; consecutive noise with one fault is one packet."""
+        for event in events:
+            if not isinstance(event, Noise):
+                if self._noise:
+                    yield self._noise, "noise", ABSENT, ABSENT, self._fault
+                    self._noise = b""
+                data, kind, node, code = event
+                yield data, kind, node, code, ""
                 continue
-            more, name, _ = run
-            number = _NUMBER[name]
-            if stray and number != fault:
-                noise[len(data)] = fault
-                data.append(stray)
-                stray = b""
-            fault = number
-            stray += more
-            while len(stray) >= PIECE or (frames and stray):
-                noise[len(data)] = fault
-                data.append(stray[:PIECE])
-                stray = stray[PIECE:]
-        self._noise, self._fault = stray, fault
-        return data, sound
-
-    def _silence(self, data: list[bytes], noise: dict[int, int]) -> None:
-        """The noise has ended: tell it."""
-        if self._noise:
-            noise[len(data)] = self._fault
-            data.append(self._noise)
+            if self._noise and (event.fault != self._fault or self._frames):
+                yield self._noise, "noise", ABSENT, ABSENT, self._fault
+                self._noise = b""
+            self._noise += event.data
+            self._fault = event.fault
+            while len(self._noise) >= NOISE_LENGTH:
+                yield self._noise[:NOISE_LENGTH], "noise", ABSENT, ABSENT, self._fault
+                self._noise = self._noise[NOISE_LENGTH:]
+        if self._noise and (end or self._frames):
+            yield self._noise, "noise", ABSENT, ABSENT, self._fault
             self._noise = b""
 
 
-def checked(way: str) -> str:
-    """This way, if it is one. Raises RequestError for another word."""
-    if way not in WAYS:
+def _receiver(family: Family, direction: str) -> RecordingReceiver:
+    if direction not in ("", "rx", "tx"):
         raise RequestError(
-            f"there is no way {way!r}", expected='"rx" from the devices, "tx" to them, "" both'
+            f"there is no direction {direction!r}", expected='"rx" from the devices, "tx" to them, "" both'
         )
-    return way
+    return family.recording(direction) if family.recording else _BusReceiver(family)
 
 
-def timed(at: object) -> None:
-    """Raise RequestError for what is no time (s)."""
-    try:
-        if not isinstance(at, bool) and isfinite(at):  # type: ignore[arg-type]  # it says so itself
-            return
-    except (TypeError, ValueError, OverflowError):
-        pass
-    raise RequestError(
-        f"at: {shown(at)} is no time",
-        expected="a finite number of seconds",
-        advice="leave it out where none was noted",
-    )
+class _BusReceiver:
+    """The receiver of a bus: replies and notices only. A reply has a node where each node has its own lane."""
 
+    code_meaning = ""
 
-def fitting(frames: bool, data: object) -> None:
-    """Raise RequestError for bytes from a bus of frames, and for a frame, or anything else, from a line of bytes."""
-    if frames and not isinstance(data, CanFrame):
-        raise RequestError(
-            "these devices are on a CAN bus: there are no bytes, but frames", expected="a CanFrame"
-        )
-    if not frames and not isinstance(data, bytes | bytearray | memoryview):
-        raise RequestError("these devices are on a serial line", expected="bytes")
+    def __init__(self, family: Family) -> None:
+        self._receiver = family.open().receiver()
+        self._frames = family.link.kind == "frames"
+
+    def feed(self, data: Data) -> list[RecordedEvent]:
+        return [self._recorded(event, data) for event in self._receiver.feed(data)]
+
+    def flush(self) -> list[RecordedEvent]:
+        return [self._recorded(event, b"") for event in self._receiver.flush()]
+
+    def _recorded(self, event: Event, data: Data) -> RecordedEvent:
+        whole = data.flat() if isinstance(data, CanFrame) else event.data
+        if isinstance(event, Noise):
+            return Noise(whole, event.fault)
+        if isinstance(event, Notification):
+            return RecordedFrame(whole, "notice", event.node, ABSENT)
+        return RecordedFrame(whole, "reply", event.lane if self._frames else ABSENT, ABSENT)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Iterable
 from itertools import pairwise
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import pytest
 from hypothesis import given
@@ -19,7 +19,6 @@ from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import Receiver
 from motorbus.core.request import Noise, Reply
 from motorbus.families.feetech import wire
-from motorbus.families.feetech.wire import stream
 from tests.protocol.feetech.vectors import REPLIES, name_of
 from tests.protocol.vectors import Vector
 
@@ -236,79 +235,3 @@ def test_no_single_wrong_byte_makes_another_value(vector: Vector) -> None:
             )
     assert tried == 255 * len(vector.data)
     assert wrong == 0
-
-
-# -- where nothing is searched --------------------------------------------------------------------------------------
-
-SOUND_ONE = wire.encode_status(1, 0, b"\x18\x05")
-BAD_ONE = SOUND_ONE[:-1] + bytes((SOUND_ONE[-1] ^ 1,))
-ENDS_IN_FF = b"\xff\xff\x01\x04\x00\x18\x05\xff"
-HEADER_INSIDE = b"\xff\xff\x01\x06\x00\xff\xff\x01\x02\x00"
-NOBODYS = b"\xff\xff\xfe\x04\x00\x18\x05\x00"
-LOW_PLACE = b"\xff\xff\x01\x04\xff\x18\x05\x00"
-"""Its fifth byte is FF, and that begins no header."""
-BEGUN = b"\xff\xff\x01\x20\x00\x01"
-
-
-def counted(monkeypatch: pytest.MonkeyPatch, name: str) -> list[int]:
-    """One for each call of this method of streams."""
-    calls: list[int] = []
-    method = getattr(stream.Stream, name)
-
-    def counting(self: Any, *given: Any, **more: Any) -> Any:
-        calls.append(1)
-        return method(self, *given, **more)
-
-    monkeypatch.setattr(stream.Stream, name, counting)
-    return calls
-
-
-@pytest.mark.parametrize(
-    ("data", "searches"),
-    [
-        (b"", 0),
-        (SOUND_ONE * 3, 0),
-        (SOUND_ONE + BAD_ONE + SOUND_ONE, 0),
-        (BAD_ONE, 0),
-        (LOW_PLACE + SOUND_ONE, 0),
-        (b"\x00\x01" + SOUND_ONE, 0),
-        (b"\x00" + SOUND_ONE, 0),
-        (SOUND_ONE + b"\x00" + SOUND_ONE, 0),
-        (BEGUN, 0),
-        (SOUND_ONE + BEGUN, 0),
-        (SOUND_ONE + b"\xff\xff\x01\x04", 0),
-        (SOUND_ONE + b"\xff\xff\x01", 0),
-        (ENDS_IN_FF + SOUND_ONE, 1),
-        (HEADER_INSIDE + SOUND_ONE, 1),
-        (NOBODYS + SOUND_ONE, 0),
-        (b"\xff" * 9 + SOUND_ONE[2:], 0),
-        (b"\xff\xff\x01\x12" + SOUND_ONE * 3, 0),
-        (b"\xff\xff\x01\x12" + BAD_ONE + SOUND_ONE * 3, 1),
-        (SOUND_ONE + b"\x00", 1),
-        (SOUND_ONE + b"\xff", 1),
-        (b"\x00\x01\x02\x03\x04\x05", 1),
-        (SOUND_ONE + b"\xff\xff\xfe\x04", 1),
-    ],
-)
-def test_a_search_begins_only_where_it_must(
-    monkeypatch: pytest.MonkeyPatch, data: bytes, searches: int
-) -> None:
-    calls = counted(monkeypatch, "_search")
-    stream.Stream(252, bytes).runs(data)
-    assert len(calls) == searches
-
-
-def test_the_last_byte_of_a_bad_packet_may_begin_the_next_one_of_the_next_piece() -> None:
-    found = stream.Stream(252, bytes)
-    runs = [*found.runs(ENDS_IN_FF), *found.runs(SOUND_ONE[1:])]
-    assert runs == [Noise(ENDS_IN_FF[:-1], "checksum"), [SOUND_ONE]]
-
-
-def test_what_waits_for_more_is_not_looked_at_before_it_can_be_whole(monkeypatch: pytest.MonkeyPatch) -> None:
-    cuts = counted(monkeypatch, "_cut")
-    packet = wire.encode_status(1, 0, bytes(30))
-    found = stream.Stream(252, bytes)
-    taken = [found.runs(packet[place : place + 1]) for place in range(len(packet))]
-    assert taken[-1] == [[packet]]
-    assert len(cuts) == 5, "until its length is known, and when it is whole"
-    assert found.held == 0

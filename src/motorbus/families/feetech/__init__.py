@@ -23,6 +23,7 @@ from motorbus.core.family import (
     Stop,
 )
 from motorbus.core.half_duplex import HalfDuplexSerial
+from motorbus.core.recording import RecordingReceiver
 from motorbus.core.request import Request, Response
 from motorbus.core.steps import Procedure, Runnable
 from motorbus.families.feetech import driver, wire
@@ -60,7 +61,6 @@ from motorbus.families.feetech.driver import (
 )
 from motorbus.families.feetech.driver.assured import ASSURANCE
 from motorbus.families.feetech.table import BAUD_CODES, CONTROL, MODELS, TABLES
-from motorbus.families.feetech.wire.recording import CAPTURES
 
 __all__ = [
     "FAMILY",
@@ -195,6 +195,13 @@ _ESTOP_HOLD: Final = Option(
     "ids of servos that an emergency stop holds where they are, as 1+4, instead of letting them go",
 )
 
+
+def _recording(direction: str) -> RecordingReceiver:
+    from motorbus.families.feetech.wire.recording import Recording
+
+    return Recording(direction)
+
+
 FAMILY: Final = Family(
     name="feetech",
     link=LinkSpec(
@@ -203,13 +210,13 @@ FAMILY: Final = Family(
         tuple(BAUD_CODES.values()),
         (_ESTOP_HOLD,),
         stops=("torque_off", "hold"),
-        captures=CAPTURES,
     ),
     registers=TABLES,
     devices=DeviceTypes(Servo, AsyncServo),
     driver=FeetechDriver,
     simulator=_simulator,
     simulator_options=_simulator_options,
+    recording=_recording,
     safety=ASSURANCE,
     cli="motorbus.cli.feetech",
 )

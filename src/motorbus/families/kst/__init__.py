@@ -16,6 +16,7 @@ from motorbus.core.family import (
     Simulator,
 )
 from motorbus.core.guarantees import Guarantee, Guarantees, Level
+from motorbus.core.recording import RecordingReceiver
 from motorbus.core.scan import Skipped
 from motorbus.families.kst.driver.broadcast import (
     broadcast_bit_rate,
@@ -32,7 +33,6 @@ from motorbus.families.kst.driver.provisioning import PowerCycleNeeded, Provisio
 from motorbus.families.kst.driver.scan import BitRates, LineActivity, Suspicion, scan, scan_bit_rates
 from motorbus.families.kst.driver.servo import AsyncServo, Servo, settings_of
 from motorbus.families.kst.profiles import DEFAULT_RATE, PROFILES, RATES, TABLES
-from motorbus.families.kst.recording import CAPTURES
 
 __all__ = [
     "FAMILY",
@@ -107,14 +107,21 @@ def _simulator_options() -> tuple[Option, ...]:
     return OPTIONS
 
 
+def _recording(direction: str) -> RecordingReceiver:
+    from motorbus.families.kst.recording import Recording
+
+    return Recording()
+
+
 FAMILY: Final = Family(
     name="kst",
-    link=LinkSpec("frames", DEFAULT_RATE, RATES, _SETTINGS, stops=("hold",), captures=CAPTURES),
+    link=LinkSpec("frames", DEFAULT_RATE, RATES, _SETTINGS, stops=("hold",)),
     registers=TABLES,
     devices=DeviceTypes(Servo, AsyncServo),
     driver=KstDriver,
     simulator=_simulator,
     simulator_options=_simulator_options,
+    recording=_recording,
     safety=GUARANTEES,
     cli="motorbus.families.kst.cli",
 )

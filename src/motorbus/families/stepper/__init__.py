@@ -38,6 +38,7 @@ from motorbus.core.family import (
     Simulator,
     Stop,
 )
+from motorbus.core.recording import RecordingReceiver
 from motorbus.core.request import Request, Response
 from motorbus.core.steps import Procedure, Runnable
 from motorbus.families.stepper import driver, wire
@@ -71,7 +72,6 @@ from motorbus.families.stepper.execution import Behaviour
 from motorbus.families.stepper.program import Conditions, Estimate, Finding, Plan, Profile, Program
 from motorbus.families.stepper.program.backups import Backup
 from motorbus.families.stepper.table import RATE, TABLES, checked_order
-from motorbus.families.stepper.wire.recording import CAPTURES
 
 __all__ = [
     "FAMILY",
@@ -199,14 +199,21 @@ def _simulator_options() -> tuple[Option, ...]:
     return OPTIONS
 
 
+def _recording(direction: str) -> RecordingReceiver:
+    from motorbus.families.stepper.wire.recording import Recording
+
+    return Recording(direction)
+
+
 FAMILY: Final = Family(
     name="stepper",
-    link=LinkSpec("bytes", RATE, (RATE,), _SETTINGS, only=wire.ONLY, captures=CAPTURES),
+    link=LinkSpec("bytes", RATE, (RATE,), _SETTINGS, only=wire.ONLY),
     registers=TABLES,
     devices=DeviceTypes(Controller, AsyncController),
     driver=StepperDriver,
     simulator=_simulator,
     simulator_options=_simulator_options,
+    recording=_recording,
     safety=ASSURANCE,
     cli="motorbus.cli.stepper",
 )

@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, TypeVar
 
-from motorbus.core.agreed import agreed
 from motorbus.core.family import State
 from motorbus.core.register import Register, RegisterMap
 from motorbus.core.request import Request
 from motorbus.core.steps import Runnable
-from motorbus.errors import DeviceError
+from motorbus.errors import DeviceError, VerificationFailed
 from motorbus.families.feetech.driver.exchanges import PRESENT, read_block
 from motorbus.families.feetech.driver.gauge import quantity
 from motorbus.families.feetech.driver.identity import known, unknown_map
@@ -24,6 +23,8 @@ T = TypeVar("T")
 
 FEEDBACK: Final = 15
 """Bytes of the feedback block, registers 56 to 70."""
+READINGS: Final = 8
+"""Maximum number of readings of a confirmed position."""
 
 
 def telemetry(node: Node) -> Runnable[State]:
@@ -89,8 +90,29 @@ def position(node: Node, *, confirmed: bool = False) -> Runnable[float]:
     if kept is not None and kept[0] is node.settings and not confirmed:
         return kept[1]
     if confirmed:
-        return agreed(lambda: _quantity(node, "present_position"), node=node.node, what="position")
+        return _confirmed_position(node)
     return _quantity(node, "present_position")
+
+
+async def _confirmed_position(node: Node) -> float:
+    """Read until two consecutive readings are equal.
+
+    An 8-bit sum accepts about one in some hundred packets with two damaged bytes. A second reading that is also
+    damaged, also accepted and equal is improbable.
+    """
+    last = position = None
+    for _ in range(READINGS):
+        last, position = position, await _quantity(node, "present_position")
+        if position == last:
+            return position
+    raise VerificationFailed(
+        f"node {node.node}: of {READINGS} readings of the position no two consecutive ones are equal, "
+        f"the last two are {last} and {position} rad",
+        expected="two consecutive readings that are equal",
+        cause="the shaft moves or vibrates, or the line is very bad",
+        advice="wait until the shaft is at rest; read a moving value without `confirmed`",
+        node=node.node,
+    )
 
 
 def velocity(node: Node) -> Runnable[float]:

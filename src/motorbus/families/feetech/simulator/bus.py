@@ -12,10 +12,10 @@ from bisect import bisect_right, insort
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from itertools import count
 from operator import attrgetter
+from random import Random
 from typing import Final, NamedTuple, cast
 
 from motorbus.core.can_frame import CanFrame
-from motorbus.core.chance import Chance
 from motorbus.core.request import Data
 from motorbus.errors import RequestError
 from motorbus.families.feetech.simulator import effects
@@ -89,7 +89,7 @@ class FeetechBus:
         self._order = count()
         self._by_id: dict[int, list[Servo]] | None = None
         self._by_second: dict[int, list[Servo]] = {}
-        self._chance = Chance(self.switches.seed)
+        self._random = Random(self.switches.seed)
         self._jitter = self.switches.reply_jitter
         self._read_by_map = self.switches.sync_read == "by_map" and self.switches.sync_read_level != "silent"
         self._sight = Sight()
@@ -327,9 +327,9 @@ class FeetechBus:
         own, error, delay = servo.speaks()
         bit = self._byte_time(servo) / BITS
         if self._jitter:
-            later += self._jitter * self._chance.draw()
+            later += self._jitter * self._random.random()
         elif servo in self.twins:
-            later += _TWIN_JITTER * bit * self._chance.draw()
+            later += _TWIN_JITTER * bit * self._random.random()
         data = frame(own if id is None else id, error, parameters)
         return at + delay + later, data, bit
 

@@ -13,8 +13,9 @@ from dataclasses import replace
 from math import copysign, inf
 from typing import Final, NamedTuple
 
-from motorbus.core.plant import Drive, Motion, obstructed, rest, run
+from motorbus.core.plant import Drive, Motion, rest, run
 from motorbus.families.feetech.simulator.motor import FEEBLE, Settings
+from motorbus.families.feetech.simulator.obstacle import obstructed, stretches
 from motorbus.families.feetech.simulator.switches import Switches
 from motorbus.families.feetech.table import Mode
 
@@ -99,7 +100,7 @@ def loads(
 ) -> Iterator[Load]:
     """What the motor does from `since` on: some stretches and then, to infinity, what it does in the end."""
     torque = max(-available, min(available, world.torque))
-    for begin, end, _, velocity, acceleration in motion.stretches(since):
+    for begin, end, _, velocity, acceleration in stretches(motion, since):
         if end == inf and push is not None:
             yield Load(begin, end, push, 0.0, drive.current(0.0, push), push)
         else:

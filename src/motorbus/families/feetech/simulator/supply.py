@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import inf
+from random import Random
 
-from motorbus.core.chance import Chance
 from motorbus.families.feetech.simulator.servo import Servo
 from motorbus.families.feetech.simulator.switches import Switches
 
@@ -20,14 +20,14 @@ class Supply:
     """What the servos of one bus share: supply and cables of `resistance` ohm. It gives each servo its `threshold`."""
 
     def __init__(self, servos: Sequence[Servo], switches: Switches) -> None:
-        chance = Chance(switches.seed)
+        random = Random(switches.seed)
         self.resistance = switches.supply_resistance
         self._servos = servos
         self._falls = switches.brown_out > 0
         self._fallen: set[Servo] = set()
         if self._falls:
             for servo in servos:
-                servo.threshold = switches.brown_out + switches.brown_out_spread * (2 * chance.draw() - 1)
+                servo.threshold = switches.brown_out + switches.brown_out_spread * (2 * random.random() - 1)
 
     def sag(self, at: float) -> float:
         """By how many V it is lower at this moment than without current."""

@@ -7,16 +7,12 @@ is not lost. What may still become a packet waits (at most 258 bytes); `flush` s
 Each byte ends in exactly one event. Noise is "checksum" for the bytes of a whole packet whose checksum is
 wrong, else "framing". How the stream was cut changes neither packets nor these words, only whether a run of
 noise comes in one piece.
-
-Packets in a row are taken one by one where each is expected, and so is a packet with nothing wrong but its checksum in
-which no other can begin; only elsewhere the search begins, which gives the same events.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, Generic, Literal, TypeAlias, TypeVar
-from zlib import adler32
+from typing import Generic, Literal, TypeAlias, TypeVar
 
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Data, Event, Noise, Reply
@@ -35,27 +31,18 @@ from motorbus.families.feetech.wire.packets import (
 P = TypeVar("P")
 Direction: TypeAlias = Literal["status", "instruction"]
 Packet: TypeAlias = StatusPacket | InstructionPacket
-Run: TypeAlias = "list[bytes] | Noise"
-"""Whole packets in a row, or what lies between two of them."""
-HEADLESS: Final = 65011
-"""Where Adler-32 begins so that its low half is the sum without the header; that of a sound packet is never reduced."""
-_SIZES: Final = (0, 0, *range(OVERHEAD, MAX_LENGTH + 5))
-"""Bytes of a packet by its length field; 0 for none."""
-_new: Final = tuple.__new__
-"""Makes a `Noise` in a third of the time."""
 
 
 class Stream(Generic[P]):
-    """Finds packets with an id up to `top` and hands each whole one to `make`."""
+    """Finds packets with an id up to `top`; an event is the result of `make` for each."""
 
-    __slots__ = ("_above", "_make", "_rest", "_suspect", "_top")
+    __slots__ = ("_damaged", "_make", "_rest", "_top")
 
     def __init__(self, top: int, make: Callable[[bytes], P]) -> None:
         self._top = top
-        self._above = HEADER + bytes((top + 1,))
         self._make = make
         self._rest = b""
-        self._suspect = 0  # so many bytes of the rest belong to a packet whose checksum was wrong
+        self._damaged = 0  # bytes of the rest that belong to a packet with a wrong checksum
 
     @property
     def held(self) -> int:
@@ -63,118 +50,37 @@ class Stream(Generic[P]):
         return len(self._rest)
 
     def feed(self, data: bytes) -> list[P | Noise]:
-        """Take bytes; give what is complete. Good packets in a row, the usual case, are not searched for."""
-        if self._rest:
-            data = self._rest + data
-        events: list[P | Noise] = []
-        if self._suspect:
-            return self._made(self._hunt(data, more=True))
-        start, end, make, top = 0, len(data), self._make, self._top
-        while end - start >= OVERHEAD:
-            stop = start + data[start + 3] + 4
-            packet = data[start:stop]
-            if stop > end or packet[2] > top or packet[3] < 2 or packet[:2] != HEADER:
-                break
-            if sum(packet) & 0xFF != SOUND:
-                break
-            events.append(make(packet))
-            start = stop
-        if start == end:
-            self._rest = b""
-            return events
-        return events + self._made(self._hunt(data[start:], more=True))
+        """Take a chunk of bytes; return the events that are complete."""
+        return self._split(self._rest + data if self._rest else data, more=True)
 
     def flush(self) -> list[P | Noise]:
-        """Nothing more comes: look for packets behind each false start, and give the rest as noise."""
-        return self._made(self.rest())
+        """End of data: return the packets in the held bytes, and the remainder as noise."""
+        return self._split(self._rest, more=False)
 
-    def runs(self, data: bytes) -> list[Run]:
-        """As `feed`, but packets as they are and all that follow one another in one list: for much at once."""
-        if held := self._rest:
-            data = held + data
-            if len(held) > 3 and len(data) < held[3] + 4:
-                self._rest = data
-                return []
-        return self._cut(data)
-
-    def rest(self) -> list[Run]:
-        """As `flush`, in runs."""
-        return self._hunt(self._rest, more=False)
-
-    def _made(self, runs: list[Run]) -> list[P | Noise]:
+    def _split(self, data: bytes, more: bool) -> list[P | Noise]:
+        """Return the packets and the noise in `data`. Consecutive valid packets need no search."""
         events: list[P | Noise] = []
-        for run in runs:
-            if isinstance(run, Noise):
-                events.append(run)
-            else:
-                events += map(self._make, run)
-        return events
-
-    def _cut(self, data: bytes) -> list[Run]:
-        """All that is complete: what can be told where it is expected to begin, and the rest searched."""
-        runs: list[Run] = []
-        run: list[bytes] = []
-        above, sizes, end = self._above, _SIZES, len(data)
-        start, last = 0, end - 4
-        if self._suspect and (start := self._search(data, 0, runs, more=True)) < 0:
-            return runs
-        while start <= last:
-            stop = start + sizes[data[start + 3]]
-            packet = data[start:stop]
-            if adler32(packet, HEADLESS) & 0xFF == 0xFF and stop <= end and HEADER <= packet < above:
-                run.append(packet)
+        start, end, make, top = 0, len(data), self._make, self._top
+        while True:
+            while end - start >= OVERHEAD and not self._damaged:
+                stop = start + data[start + 3] + 4
+                packet = data[start:stop]
+                if stop > end or packet[2] > top or packet[3] < 2 or packet[:2] != HEADER:
+                    break
+                if sum(packet) & 0xFF != SOUND:
+                    break
+                events.append(make(packet))
                 start = stop
-                continue
-            if run:
-                runs.append(run)
-                run = []
-            if packet < HEADER:
-                behind, fault = data.find(HEADER, start + 1), "framing"
-            elif packet >= above:
-                behind, fault = self._sound(data, data.find(HEADER, _behind(data, start))), "framing"
-            elif stop > end:
-                break
-            else:
-                behind, fault = self._inside(data, start, stop), "checksum"
-            if behind > 0:
-                runs.append(_new(Noise, (data[start:behind], fault, None)))
-                start = behind
-            elif (start := self._search(data, start, runs, more=True)) < 0:
-                return runs
-        if run:
-            runs.append(run)
-        rest = data[start:]
-        if not rest or HEADER <= rest < above:
-            self._rest = rest
-        else:
-            self._search(rest, 0, runs, more=True)
-        return runs
+            if start == end:
+                self._rest = b""
+                return events
+            start = self._search(data, start, events, more)
+            if start < 0:
+                return events
 
-    def _inside(self, data: bytes, start: int, stop: int) -> int:
-        """Where to look on behind a header here whose checksum is wrong; -1 where only a search can tell."""
-        place = data.find(HEADER, start + 2, stop + 1)
-        if place < 0:
-            return -1 if stop == len(data) and data[-1] == HEADER[0] else stop
-        return self._sound(data, place)
-
-    def _sound(self, data: bytes, place: int) -> int:
-        """This place of a header if it holds a packet, and -1 if not, or not yet; also for -1."""
-        size = _SIZES[data[place + 3]] if 0 <= place < len(data) - 3 else 0
-        packet = data[place : place + size]
-        return place if len(packet) == size > 0 and packet < self._above and is_sound(packet) else -1
-
-    def _hunt(self, data: bytes, more: bool) -> list[Run]:
-        """All of this searched."""
-        runs: list[Run] = []
-        position = 0
-        while (start := self._search(data, position, runs, more)) >= 0:
-            position = start + data[start + 3] + 4
-            runs.append([data[start:position]])
-        return runs
-
-    def _search(self, data: bytes, position: int, runs: list[Run], more: bool) -> int:
-        """Where the next packet begins, all before it told; -1 when there is none, what may become one kept."""
-        noise = position  # what lies between the two is noise, not yet told
+    def _search(self, data: bytes, position: int, events: list[P | Noise], more: bool) -> int:
+        """Return the start of the next packet and add the noise before it; -1 if there is none, then keep the rest."""
+        noise = position  # start of the noise that is not in `events` yet
         end = len(data)
         while (start := data.find(HEADER, position)) >= 0:
             size = self._size(data, start)
@@ -185,13 +91,13 @@ class Stream(Generic[P]):
             if not size or start + size > end:
                 continue
             if is_sound(data[start : start + size]):
-                self._tell(runs, data[noise:start])
-                self._suspect = 0
+                self._add_noise(events, data[noise:start])
+                self._damaged = 0
                 return start
-            noise = self._doubt(runs, data, noise, start, size)
+            noise = self._add_damaged(events, data, noise, start, size)
         else:
             position = end - 1 if more and position < end and data[-1] == 0xFF else end
-        self._tell(runs, data[noise:position])
+        self._add_noise(events, data[noise:position])
         self._rest = data[position:]
         return -1
 
@@ -204,21 +110,21 @@ class Stream(Generic[P]):
             return data[start + 3] + 4 if data[start + 3] >= 2 else 0
         return OVERHEAD
 
-    def _doubt(self, runs: list[Run], data: bytes, noise: int, start: int, size: int) -> int:
-        """A whole packet with a wrong checksum: from where on noise is not yet told."""
-        if start - noise >= self._suspect:
-            self._tell(runs, data[noise:start])
+    def _add_damaged(self, events: list[P | Noise], data: bytes, noise: int, start: int, size: int) -> int:
+        """Mark a whole packet with a wrong checksum; return the start of the noise that is not in `events` yet."""
+        if start - noise >= self._damaged:
+            self._add_noise(events, data[noise:start])
             noise = start
-        self._suspect = max(self._suspect, start + size - noise)
+        self._damaged = max(self._damaged, start + size - noise)
         return noise
 
-    def _tell(self, runs: list[Run], noise: bytes) -> None:
-        bad, stray = noise[: self._suspect], noise[self._suspect :]
+    def _add_noise(self, events: list[P | Noise], noise: bytes) -> None:
+        bad, stray = noise[: self._damaged], noise[self._damaged :]
         if bad:
-            runs.append(Noise(bad, "checksum"))
+            events.append(Noise(bad, "checksum"))
         if stray:
-            runs.append(Noise(stray, "framing"))
-        self._suspect -= len(bad)
+            events.append(Noise(stray, "framing"))
+        self._damaged -= len(bad)
 
 
 class Splitter:

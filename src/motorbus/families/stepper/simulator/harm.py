@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from random import Random
 from typing import Final
 
-from motorbus.core.chance import Chance
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.simulator.switches import Switches
 
@@ -44,7 +44,7 @@ class Harm:
     def __init__(self, switches: Switches, remark: Callable[[str], object]) -> None:
         self._switches = switches
         self._remark = remark
-        self._chance = Chance(switches.seed)
+        self._random = Random(switches.seed)
         self._seen: Counter[str] = Counter()
         self._passed = 0
         self._echoes = False
@@ -55,7 +55,7 @@ class Harm:
         self._switches = switches
         self._seen.clear()
         if reseed:
-            self._chance = Chance(switches.seed)
+            self._random = Random(switches.seed)
 
     # -- what the host sends --------------------------------------------------------------------------------------
 
@@ -125,7 +125,7 @@ class Harm:
 
     def with_notice(self, data: bytes) -> bytes:
         """A dump that has a notice between two of its bytes, somewhere behind its header."""
-        place = wire.REPLY_LENGTH + int(self._chance.draw() * (len(data) - wire.REPLY_LENGTH))
+        place = wire.REPLY_LENGTH + int(self._random.random() * (len(data) - wire.REPLY_LENGTH))
         self._remark(f"fault: a notice in the dump of project {data[3]}, before byte {place}")
         return data[:place] + wire.NOTICE + data[place:]
 
@@ -143,7 +143,7 @@ class Harm:
     def _garbled(self, data: bytes, probability: float, what: str) -> bytes:
         if not probability:
             return data
-        draw = self._chance.draw
+        draw = self._random.random
         found = bytes(byte ^ 1 + int(255 * draw()) if draw() < probability else byte for byte in data)
         wrong = sum(one != other for one, other in zip(data, found, strict=True))
         if wrong:

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.plant import Phase, Stretch, move, obstructed
+from motorbus.core.plant import Phase, move
+from motorbus.families.feetech.simulator.obstacle import Stretch, obstructed, stretches
 
 places = st.floats(-50_000, 50_000)
 velocities = st.floats(-5_000, 5_000)
@@ -20,7 +21,7 @@ accelerations = st.floats(10, 50_000)
 def test_a_movement_in_parts_of_one_direction() -> None:
     # at -20 counts/s it brakes for 0.2 s and 2 counts first, then goes the other way
     motion = move(1.0, 0.0, 100.0, velocity=-20.0, speed=50.0, acceleration=100.0)
-    parts = list(motion.stretches())
+    parts = list(stretches(motion))
     assert [part.way for part in parts] == [-1.0, 1.0, 1.0, 1.0, 0.0]
     assert (parts[0].begin, parts[0].end, parts[0].velocity) == (1.0, 1.2, -20.0)
     assert (parts[1].position, parts[1].velocity) == pytest.approx((-2.0, 0.0))
