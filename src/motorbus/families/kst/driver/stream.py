@@ -25,7 +25,7 @@ from motorbus.families.kst.driver.requests import ask_presence, write_register
 async def open_stream(servos: Sequence[Node], *, rate: int) -> PositionStream:
     """These servos for a control loop. Reads their limits and writes nothing; `rate` (bit/s) has no effect here.
 
-    Raises RequestError for no servo or a repeated one; else the first error of a servo, with a note for each other.
+    Raises RequestError for no servo or a repeated one; else the first error of a servo.
     """
     if len({node.node for node in servos}) != len(servos) or not servos:
         raise RequestError("an id is named twice" if servos else "no servo is named", expected="each id once")
@@ -51,16 +51,12 @@ class PositionStream:
     def goals(self, to: Mapping[int, float]) -> Sequence[Request[None]]:
         """A request with a target (rad) for each of these servos.
 
-        Raises LimitExceeded for a value that is not finite or outside the profile, RequestError for a servo that is not
-        in the stream, or whose limits may have changed.
+        Raises LimitExceeded outside the profile, RequestError for another servo, or one whose limits may have changed.
         """
         return [self._goal(id, value) for id, value in to.items()]
 
     async def begin(self, speeds: Mapping[int, float]) -> None:
-        """Start each servo where the profile has that rule, and make its present position its target.
-
-        The servos have no speed setting; `speeds` (rad/s) are only checked.
-        """
+        """Start each servo where the profile has that rule, and hold it. `speeds` (rad/s) are only checked."""
         for id, speed in speeds.items():
             check_above_zero("speed", speed, "rad/s", node=self._servo(id)[0].node)
 

@@ -20,14 +20,11 @@ class Quirks:
     """Behaviour of the simulated servos. Times are in s, in ms where the name says so; positions in raw counts."""
 
     bit_rate: int = switch(
-        DEFAULT_RATE,
-        "the rate they are set to, in bit/s",
-        *RATES,
-        source="manual, defaults: 500k (provisional)",
+        DEFAULT_RATE, "their rate, bit/s", *RATES, source="manual, defaults: 500k (provisional)"
     )
     id_format: str = switch(
         "asked",
-        "they take 11-bit and 29-bit identifiers and answer as they were asked, or take one form only",
+        "identifiers that they take: 11 and 29 bits, answered in the form of the request, or one form",
         "asked",
         "std",
         "ext",
@@ -35,23 +32,23 @@ class Quirks:
     )
     duplicate: str = switch(
         "",
-        "ids of which there is one servo more, as 0x25 or 0x25+0x26; its key is 1000 + its number on the bus",
+        "ids with a second servo, as 0x25 or 0x25+0x26; its key is 1000 + its number",
         source="two servos as shipped share 0x25",
     )
     duplicate_delay: float = switch(
         0.0,
-        "how much later those servos answer, in s; 0: at the same moment, so unequal answers collide",
-        source="two devices never think equally long, but arbitration lets late ones begin together",
+        "s by which the second servo replies later; 0: at once, so unequal replies collide",
+        source="replies never take equally long",
     )
     accept_sized: bool = switch(
         True,
-        "writes that state their length (23, 27, 2B, 2F) are taken, or refused with 05040001",
-        source="manual shows 22 only; a public XQPOWER tool sends 2F and 23",
+        "writes with a length (23, 27, 2B, 2F) are taken, or refused with 05040001",
+        source="manual: 22 only; XQPOWER tool: 2F and 23",
     )
     accept_unsized: bool = switch(
         True,
-        "writes that do not state their length (22) are taken, or refused with 06070010 where that is not 4 bytes",
-        source="manual shows 22 only; some CANopen servers refuse it so",
+        "writes without a length (22) are taken, or refused with 06070010 unless 4 bytes",
+        source="manual: 22 only; some CANopen servers refuse it",
     )
     out_of_range: str = switch(
         "abort",
@@ -61,9 +58,7 @@ class Quirks:
         source="both codes are in the manual's list; it does not say when they come",
     )
     broadcast_read: bool = switch(
-        True,
-        "a read of node 0 is answered by everyone",
-        source="a public demo of a newer protocol finds all servos by one broadcast read of 0x3000",
+        True, "every servo replies to a read of node 0", source="a public demo driver finds all servos so"
     )
     pending_id: str = switch(
         "pending",
@@ -83,8 +78,8 @@ class Quirks:
     x2: int = switch(0, "the second status byte", source="manual, command 7: defined as needed", span=_BYTE)
     firmware: str = switch(
         "1.00",
-        "the version string of 0x100A; one of more than four characters is sent in segments",
-        source="manual, command 8: four characters; CiA 301 makes 0x100A a string of any length",
+        "version in 0x100A; more than four characters come in segments",
+        source="manual, command 8: four characters; CiA 301: any length",
     )
     save_reply: str = switch(
         "none",
@@ -95,7 +90,7 @@ class Quirks:
         source="manual, command 3: no reply; CiA 301 demands one",
     )
     flash_time: float = switch(
-        0.15, "how long a save takes, in s", source="a public flight-controller driver leaves 150 ms"
+        0.15, "s that a save takes", source="a public flight-controller driver leaves 150 ms"
     )
     flash_cut: str = switch(
         "old",
@@ -115,14 +110,12 @@ class Quirks:
     )
     reports_ms: float = switch(
         0.0,
-        "report from power-up on every so many milliseconds; 0: only when started, as 0x2200 says",
-        source="a servo that was set to report before it was connected",
+        "ms between reports from power-up on; 0: only when started, as 0x2200 says",
+        source="a servo may have been started before",
     )
     boot_notice: bool = switch(
         False,
-        "they send a heartbeat of state 0 whenever their supply comes back",
-        source="CiA 301; the manual has none, and neither has any public driver",
+        "a heartbeat of state 0 whenever their supply comes back",
+        source="CiA 301; manual and drivers: none",
     )
-    position: int = switch(
-        0, "where they stand at first, in raw counts", source="an assumption, no source", span=_COUNTS
-    )
+    position: int = switch(0, "their first position, raw counts", source="an assumption", span=_COUNTS)
