@@ -70,7 +70,7 @@ def measured(nodes: range, bitrate: int, reads: int) -> Filled:
     for servo in simulator.servos:
         servo.raw_position = raw(servo.node)
     wire = CanWire(simulator, latency=LATENCY / 2)
-    bus = Bus(MemoryLink(wire, rate=bitrate), kst.FAMILY.configured(), interlock=Gate())
+    bus = Bus(MemoryLink(wire, rate=bitrate), kst.FAMILY.open(), interlock=Gate())
     times: list[float] = []
 
     async def reading(node: int) -> None:

@@ -104,7 +104,7 @@ def _met(bus: Any, node: int) -> None:
     """It has answered once, so that the stop knows it; where nothing runs in time it is asked again."""
     for _ in range(TRIES):
         with suppress(MotorbusError):
-            bus.run(bus.family.identify(node))
+            bus.run(bus.driver.identify(node))
             return
 
 

@@ -20,7 +20,7 @@ NET: Final = (
     "tests/golden",
     "tests/interop",
     "tests/protocol/feetech/test_wire_vectors.py",
-    "tests/protocol/kst/test_wire_vectors.py",
+    "tests/protocol/kst",
     "tests/protocol/stepper/execution",
     "tests/protocol/stepper/test_wire_vectors.py",
     "tests/safety/test_gate_property.py",

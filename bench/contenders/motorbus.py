@@ -60,8 +60,10 @@ class MemoryLink:
 
 def _in_memory(workload: Workload) -> Bus:
     """A bus as `motorbus.open` would leave it, after the test of the echo."""
-    bus = Bus(MemoryLink(workload), feetech.FAMILY, interlock=Gate())
-    test = feetech.FAMILY.echo_test()
+    driver = feetech.FAMILY.open()
+    bus = Bus(MemoryLink(workload), driver, interlock=Gate())
+    test = driver.echo_test()
+    assert test is not None
     bus.expect_echo(test)
     bus.run(test)
     return bus

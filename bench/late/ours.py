@@ -108,7 +108,7 @@ def reader(name: str, lateness: Lateness, echo: bool = False) -> Reader:
 
 def _opened(bus: Bus) -> Bus:
     """The test of the echo, where the family has one."""
-    test = bus.family.echo_test()
+    test = bus.driver.echo_test()
     if test is not None:
         bus.expect_echo(test)
         with suppress(MotorbusError):
@@ -138,7 +138,7 @@ def _feetech(line: Line) -> Reader:
         there.nodes[ID].raw_position = place(heard)
 
     servos = Turning(there, turn)
-    bus = _opened(Bus(MemoryLink(servos, line=line), feetech.FAMILY, interlock=Gate()))
+    bus = _opened(Bus(MemoryLink(servos, line=line), feetech.FAMILY.open(), interlock=Gate()))
     devices = {node: feetech.Servo(bus, node) for node in (ID, NOBODY)}
 
     def read(node: int) -> int | None:
@@ -162,9 +162,7 @@ def _kst(line: Line) -> Reader:
         there.nodes[ID].raw_position = where(heard)
 
     servos = Turning(there, turn)
-    bus = Bus(
-        MemoryLink(servos, rate=500_000, line=line, pace=True), kst.FAMILY.configured(), interlock=Gate()
-    )
+    bus = Bus(MemoryLink(servos, rate=500_000, line=line, pace=True), kst.FAMILY.open(), interlock=Gate())
     devices = {node: kst.Servo(bus, node) for node in (ID, NOBODY)}
 
     def read(node: int) -> int | None:
@@ -188,9 +186,7 @@ def _stepper(line: Line) -> Reader:
 
     servos = Turning(there, turn)
     bus = _opened(
-        Bus(
-            MemoryLink(servos, rate=9600, line=line, pace=True), stepper.FAMILY.configured(), interlock=Gate()
-        )
+        Bus(MemoryLink(servos, rate=9600, line=line, pace=True), stepper.FAMILY.open(), interlock=Gate())
     )
     device = stepper.Controller(bus)
 

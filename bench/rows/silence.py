@@ -151,8 +151,8 @@ def ours(port: str, count: int) -> Said:
         sent, expected = told.sent, int(str(told.expected).split()[0])
         assert isinstance(sent, bytes)
         asked: Request[None] = Request(sent, (Expected(NOBODY, NOBODY, expected),))
-        family = feetech.FAMILY
-        patience = family.air_time(asked, BAUD) + family.turnaround(asked) + bus.link.latency
+        driver = feetech.FAMILY.open()
+        patience = driver.air_time(asked, BAUD) + driver.turnaround(asked) + bus.link.latency
         return timed(ask, count, patience + MARGIN[asked.reply_within])
 
 

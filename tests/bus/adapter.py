@@ -139,8 +139,8 @@ class Engine:
         answer: Callable[[Any], list[Data]] | None = None,
     ) -> None:
         self.wire = Wire()
-        self.family = FAMILIES[family]
-        self.link = MemoryLink(self.wire, rate=self.family.link.rate)
+        self.driver = FAMILIES[family].open()
+        self.link = MemoryLink(self.wire, rate=self.driver.family.link.rate)
         self.link.listen_only = listen_only
         self.calls: dict[str, Any] = {}
         self.bus = self.open(check, latency)
@@ -148,14 +148,14 @@ class Engine:
         if answer is not None:
             self.wire.answer = answer
             if family == "feetech":  # as `motorbus.open` does
-                test = self.family.echo_test()
+                test = self.driver.echo_test()
                 self.bus.expect_echo(test)
                 self.bus.run(test)
         self.wire.answer = lambda frame: []
         self.sent()
 
     def open(self, check: Callable[[Any], None] | None, latency: float) -> Bus:
-        bus = Bus(self.link, self.family, interlock=None if check is None else Check(check))
+        bus = Bus(self.link, self.driver, interlock=None if check is None else Check(check))
         bus.latency = latency
         self.engine = bus.engine
         return bus
@@ -166,7 +166,7 @@ class Engine:
 
     @property
     def quiet_time(self) -> float:
-        return float(self.family.quiet_time(self.bus.rate))
+        return float(self.driver.quiet_time(self.bus.rate))
 
     @property
     def deadline(self) -> float:

@@ -92,4 +92,4 @@ def write(node: int, address: int, value: int, effect: Effect = Effect.NONE) -> 
 def memory_bus(line: Line | None = None, **options: Any) -> tuple[Bus, Responder]:
     responder = Responder()
     link = MemoryLink(responder, line=line, **options)
-    return Bus(link, FAMILY, interlock=ADMIT_ALL), responder
+    return Bus(link, FAMILY.open(), interlock=ADMIT_ALL), responder

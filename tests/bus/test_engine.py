@@ -432,7 +432,7 @@ def test_a_half_duplex_bus_has_one_request_in_flight(engine: Engine) -> None:
 
 
 def test_a_can_bus_has_one_request_in_flight_per_lane_and_as_many_lanes_as_its_window(can: Engine) -> None:
-    window = can.family.link.window
+    window = can.driver.window
     lanes = range(1, window + 3)
     for node in lanes:
         can.submit(f"{node}", can_read(node))

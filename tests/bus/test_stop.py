@@ -133,7 +133,7 @@ def test_the_stop_thread_sleeps_from_the_first_torque_command_on_and_ends_with_t
 
 def served(path: Path) -> tuple[Bus, Responder]:
     responder = Responder()
-    bus = Bus(MemoryLink(responder, virtual=False), FAMILY, interlock=ADMIT_ALL, stop_socket=path)
+    bus = Bus(MemoryLink(responder, virtual=False), FAMILY.open(), interlock=ADMIT_ALL, stop_socket=path)
     known(bus, 1)
     bus.run(write(1, TORQUE, 1, Effect.TORQUE))
     return bus, responder

@@ -41,7 +41,7 @@ def test_without_a_thread_to_be_had_the_caller_stops_the_bus_himself(monkeypatch
 
 def test_a_port_that_is_called_otherwise_by_now_is_stopped_under_that_name(tmp_path: Path) -> None:
     old, new = tmp_path / "old.sock", tmp_path / "new.sock"
-    bus = Bus(MemoryLink(Responder(), virtual=False), FAMILY, interlock=ADMIT_ALL, stop_socket=old)
+    bus = Bus(MemoryLink(Responder(), virtual=False), FAMILY.open(), interlock=ADMIT_ALL, stop_socket=old)
     bus.run(position(1))
     bus.stopper.move(new)
     assert request_estop(new).acknowledged == (1,)
@@ -58,7 +58,7 @@ def test_a_port_that_is_called_otherwise_by_now_is_stopped_under_that_name(tmp_p
 
 
 def test_a_bus_that_no_other_program_reaches_has_nothing_to_move() -> None:
-    bus = Bus(MemoryLink(Responder(), virtual=False), FAMILY, interlock=ADMIT_ALL)
+    bus = Bus(MemoryLink(Responder(), virtual=False), FAMILY.open(), interlock=ADMIT_ALL)
     bus.stopper.move(Path("/nowhere"))
     assert bus.stopper.socket_path is None
     bus.close()

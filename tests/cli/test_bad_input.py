@@ -25,7 +25,7 @@ PING, READ, WRITE, SYNC_READ = 1, 2, 3, 0x82
 
 def registers(arm: Simulation) -> dict[str, int]:
     """Every register of servo 1."""
-    return {name: arm[1].memory[name] for name in arm.family.tables["sts"]}
+    return {name: arm[1].memory[name] for name in arm.family.registers["sts"]}
 
 
 def listening(arm: Simulation, monkeypatch: pytest.MonkeyPatch) -> list[bytes]:

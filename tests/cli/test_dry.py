@@ -138,7 +138,7 @@ def test_every_kind_of_step_is_gone_through(arm: Simulation) -> None:
 
 
 def test_an_error_reaches_the_operation(arm: Simulation) -> None:
-    absent = motorbus.feetech.FAMILY.probe(9, 0)
+    absent = motorbus.feetech.FAMILY.open().probe(9, 0)
 
     async def careful(request: Request[bool]) -> str:
         try:
@@ -155,10 +155,10 @@ def test_what_was_withheld_from_one_hides_nothing_of_another(arm: Simulation) ->
     with motorbus.open(arm.url) as bus:
         rehearsal = DryBus(bus)
         Servo(rehearsal, 1).enable_torque()
-        assert rehearsal.run(FAMILY.probe(1, 0)) is not True
-        assert rehearsal.run(FAMILY.probe(2, 0)) is True
+        assert rehearsal.run(FAMILY.open().probe(1, 0)) is not True
+        assert rehearsal.run(FAMILY.open().probe(2, 0)) is True
         rehearsal.run(action_all())  # which everyone hears
-        assert rehearsal.run(FAMILY.probe(2, 0)) is not True
+        assert rehearsal.run(FAMILY.open().probe(2, 0)) is not True
 
 
 def test_frames_are_explained_without_their_framing(

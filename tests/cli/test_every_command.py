@@ -160,7 +160,7 @@ AXES = [
     "init arm=feetech:sim,ids=1-3#1-3 kst:sim#1 --force",
 ]
 """By the names of a machine file."""
-LACKS = {"kst": ("torque ", "--velocity")}
+LACKS = {"kst": ("torque ", "--velocity"), "template": ("--velocity",)}
 """What devices of a family cannot: no torque switch, no speed."""
 HERE = {"feetech": "3.0", "kst": "0.2", "template": "0.2"}
 """rad; inside the limits, and near to where a simulated device stands."""
@@ -281,10 +281,10 @@ def test_frames_are_explained(family: str, run: Run) -> None:
 
 
 def test_a_frame_on_can_is_withheld_and_shown(run: Run) -> None:
-    ran = run("write", "template:sim#1", "goal_position=0.2", "--dry-run", "--json")
+    ran = run("write", "kst:sim#1", "goal_position=0.2", "--dry-run", "--json")
     (frame,) = ran.document["withheld"]
-    assert frame["data"].startswith("00 00 02 01 08 02 20 01")
-    assert frame["frame"].startswith("201#022001")
+    assert frame["data"].startswith("00 00 06 01 08 22 03 60")
+    assert frame["frame"].startswith("601#220360")
     assert "request to node 1" in frame["meaning"]
 
 
@@ -292,6 +292,12 @@ def test_an_option_that_a_family_lacks_is_no_order(run: Run) -> None:
     ran = run("move", "template:sim#1=0.2", "--acceleration", "5")
     assert (ran.code, ran.out) == (2, "")
     assert "has no acceleration" in ran.err
+
+
+def test_a_family_without_commands_is_refused(run: Run) -> None:
+    ran = run("template")
+    assert (ran.code, ran.out) == (2, "")
+    assert "template devices have no commands of their own" in ran.err
 
 
 def test_who_was_named_confirms_the_stop_of_its_own_family(run: Run) -> None:

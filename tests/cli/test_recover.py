@@ -210,7 +210,7 @@ def test_a_family_that_keeps_no_journal_says_what_to_do_instead(run: Run) -> Non
             ran = run("recover", simulation.url, *more)
             assert ran.code == 2
             assert "kst buses keep no journal" in ran.err
-            assert "say what was cut off again, `motorbus set-id`" in ran.err
+            assert "repeat `motorbus set-id`" in ran.err
     assert run("recover", "kst:can://slcan/dev/ttyACM42").code == 2, "before a port is opened"
 
 

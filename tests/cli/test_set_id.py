@@ -92,7 +92,7 @@ def test_a_kst_servo_is_provisioned(run: Run) -> None:
         words = ["set-id", f"{simulation.url}#37", "39", "--yes", "--timeout", "1s"]
         ran = run(*words)
         assert ran.code == 1
-        assert "take the supply of this servo away now" in ran.err
+        assert "switch the supply of this servo off and on again now" in ran.err
         simulation[37].power_cycle()
         ran = run(*words)
         assert ran.code == 0, ran.err

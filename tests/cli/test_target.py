@@ -96,7 +96,7 @@ def test_what_no_device_of_a_family_can_is_known_without_a_bus() -> None:
 
 def test_an_option_may_be_said_as_a_flag() -> None:
     with target.opened("kst:sim,ids=1", {"id-format": "ext"}, Output()) as bus:
-        assert bus.run(bus.family.identify(1)).node == 1
+        assert bus.run(bus.driver.identify(1)).node == 1
 
 
 def test_a_name_of_the_machine_file_is_a_target(bench: Bench) -> None:

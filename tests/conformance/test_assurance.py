@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import pytest
 
 from motorbus.core.family import Family
@@ -11,7 +9,7 @@ from motorbus.core.guarantees import Guarantees, Level
 from tests.support.subjects import FAMILIES
 from tests.support.world import abilities, world
 
-DECLARED = {name: family for name, family in FAMILIES.items() if family.devices.assures is not None}
+DECLARED = {name: family for name, family in FAMILIES.items() if family.safety is not None}
 
 
 @pytest.fixture(params=DECLARED)
@@ -21,7 +19,7 @@ def declared(request: pytest.FixtureRequest) -> Family:
 
 
 def assurance(family: Family) -> Guarantees:
-    found = family.devices.assures
+    found = family.safety
     assert found is not None
     return found
 
@@ -44,20 +42,20 @@ def test_what_is_claimed_of_its_devices_is_what_an_axis_can_do(declared: Family)
     assert (said.limits.given is not Level.NO) == ("limits" in able)
     assert (said.restart.given is not Level.NO) == ("health" in able)
     assert (said.strain.given is not Level.NO) == ("health" in able)
-    assert said.led == ("train" in able)
+    assert said.led == ("stream" in able)
 
 
 def test_each_emergency_stop_is_declared_and_promises_what_it_says(declared: Family) -> None:
     said = assurance(declared)
     policies = declared.link.stops or ("",)
     assert tuple(said.estops) == policies
-    assert said.estops[policies[0]].text == declared.stop({1: None}).promise
+    assert said.estops[policies[0]].text == declared.open().stop({1: None}).promise
 
 
 def test_the_stop_promises_what_it_says(declared: Family) -> None:
     with world(declared) as there:
         device = there.device(there.ids[0])
-        able: Mapping[str, object] = abilities(declared)
+        able = abilities(declared)
         if "enable_torque" in able:
             device.enable_torque()
         assert device.stop().value == assurance(declared).stop.text

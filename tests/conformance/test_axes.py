@@ -30,7 +30,7 @@ DOCUMENTED: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "run": (("device", "number"), ("timeout",)),
     "cap_torque": (("device", "fraction"), ()),
     "cap_current": (("device", "ampere"), ()),
-    "train": (("devices",), ("rate",)),
+    "stream": (("devices",), ("rate",)),
     "keep_time": (("device", "angle", "timing"), ("velocity", "acceleration")),
 }
 """By capability: what it is called with in order, and what by name."""
@@ -43,17 +43,19 @@ WAY = 0.3  # rad; some servos turn 44° to either side and no more
 
 
 def test_capabilities_are_those_of_the_contract_and_are_called_as_it_says(subject: Family) -> None:
-    for name, function in abilities(subject).items():
+    able = abilities(subject)
+    for name in able.names:
+        function = getattr(able, name)
         order, named = DOCUMENTED[name]
         inspect.signature(function).bind(*order, **dict.fromkeys(named))
 
 
 def test_what_is_no_model_has_no_axis(subject: Family) -> None:
-    assert dict(subject.axis("no such model")) == dict(subject.axis("")) == {}
+    assert not subject.open().axis("no such model").names | subject.open().axis("").names
 
 
 def test_a_model_that_is_led_tells_its_position_and_its_limits_and_can_be_stopped(leader: Family) -> None:
-    assert {"position", "state", "limits", "move", "stop"} <= abilities(leader).keys()
+    assert {"position", "state", "limits", "move", "stop"} <= abilities(leader).names
 
 
 def test_a_torque_switch_goes_both_ways(subject: Family) -> None:
@@ -66,9 +68,9 @@ def test_what_it_tells_is_a_number_and_telling_writes_nothing(subject: Family) -
         before = there.settings()
         for name in TOLD:
             if name in able:
-                assert isfinite(ran(there, able[name](there.device(there.ids[0]))))
+                assert isfinite(ran(there, getattr(able, name)(there.device(there.ids[0]))))
         if "state" in able:
-            assert isinstance(ran(there, able["state"](there.device(there.ids[0]))), State)
+            assert isinstance(ran(there, able.state(there.device(there.ids[0]))), State)
         assert there.settings() == before
 
 
@@ -80,10 +82,10 @@ def test_health_is_one_exchange_of_a_known_device_writes_nothing_and_agrees_with
     with world(leader) as there:
         before = there.settings()
         device = there.device(NODE)
-        ran(there, able["health"](device))
-        wanted = able["health"](device)
+        ran(there, able.health(device))
+        wanted = able.health(device)
         assert isinstance(wanted, Request)
-        found, state = ran(there, wanted), ran(there, able["state"](device))
+        found, state = ran(there, wanted), ran(there, able.state(device))
         assert isinstance(found, Health)
         assert found.torque in ((True, False) if "enable_torque" in able else (None,))
         assert found.state.at <= state.at
@@ -100,11 +102,11 @@ def test_health_tells_whether_the_torque_is_on_and_that_it_went_with_the_supply(
         return
     with world(leader) as there:
         device = there.device(NODE)
-        assert ran(there, able["health"](device)).torque is False
-        ran(there, able["enable_torque"](device), Effect.MOTION)
-        assert ran(there, able["health"](device)).torque is True
+        assert ran(there, able.health(device)).torque is False
+        ran(there, able.enable_torque(device), Effect.MOTION)
+        assert ran(there, able.health(device)).torque is True
         there.simulator.nodes[NODE].power_cycle()
-        assert ran(there, able["health"](device)).torque is False
+        assert ran(there, able.health(device)).torque is False
 
 
 def test_limits_are_read_from_a_device_that_is_not_known_and_contain_where_it_stands(leader: Family) -> None:
@@ -112,8 +114,8 @@ def test_limits_are_read_from_a_device_that_is_not_known_and_contain_where_it_st
     with world(leader) as there:
         before = there.settings()
         device = there.device(NODE)
-        low, high = ran(there, able["limits"](device))
-        assert low < ran(there, able["position"](device)) < high
+        low, high = ran(there, able.limits(device))
+        assert low < ran(there, able.position(device)) < high
         assert there.settings() == before
         with pytest.raises(LimitExceeded):
             device.move(high + 0.1)
@@ -125,7 +127,7 @@ def test_a_cap_is_taken_lasts_until_power_off_and_keeps_nothing(subject: Family)
         for name, cap in (("cap_torque", 0.4), ("cap_current", 0.3)):
             if name in able:
                 before = there.settings()
-                ran(there, able[name](there.device(NODE), cap), Effect.MOTION)
+                ran(there, getattr(able, name)(there.device(NODE), cap), Effect.MOTION)
                 assert there.settings() != before
                 there.simulator.nodes[NODE].power_cycle()
                 assert there.settings() == before
@@ -146,7 +148,7 @@ def coupled(there: World) -> PositionStream:
     """All devices as a train; so far nothing was written."""
     before = there.settings()
     devices = [there.device(node) for node in there.ids]
-    train: PositionStream = ran(there, abilities(there.family)["train"](devices, rate=there.family.link.rate))
+    train: PositionStream = ran(there, abilities(there.family).stream(devices, rate=there.family.link.rate))
     assert there.settings() == before
     return train
 
@@ -197,7 +199,7 @@ def test_it_is_known_by_then_and_positions_and_goals_ask_nothing_more(leader: Fa
         with sent(there.bus) as frames:
             here = heard(there, train)
         assert len(frames) == len(train.positions)
-        there.bus.run(train.begin({}))
+        there.bus.run(train.start({}))
         goals = train.goals(here)
         with sent(there.bus) as frames:
             there.bus.run(together(goals))
@@ -214,7 +216,7 @@ def test_beginning_moves_nothing_wherever_the_devices_went_before(leader: Family
             switched(there, node, "disable_torque")
         train = coupled(there)
         before = stands(there)
-        there.bus.run(train.begin(dict.fromkeys(there.ids, 2.0)))
+        there.bus.run(train.start(dict.fromkeys(there.ids, 2.0)))
         there.link.advance(1.0)
         assert all(abs(here - before[node]) <= 1 for node, here in stands(there).items())
 
@@ -227,7 +229,7 @@ def test_beginning_stops_who_is_on_his_way(leader: Family) -> None:
         goal = device.position() + WAY
         device.move(goal, wait=False)
         there.link.advance(0.01)
-        there.bus.run(train.begin({}))
+        there.bus.run(train.start({}))
         there.link.advance(1.0)
         assert device.position() < goal - WAY / 4
 
@@ -235,7 +237,7 @@ def test_beginning_stops_who_is_on_his_way(leader: Family) -> None:
 def test_goals_are_gone_to_by_those_who_get_one(leader: Family) -> None:
     with world(leader) as there:
         train = coupled(there)
-        there.bus.run(train.begin(dict.fromkeys(there.ids, 3.0)))
+        there.bus.run(train.start(dict.fromkeys(there.ids, 3.0)))
         begun = heard(there, train)
         led(there, train, {node: here + WAY for node, here in begun.items()})
         there.link.advance(2.0)
@@ -249,7 +251,7 @@ def test_goals_are_gone_to_by_those_who_get_one(leader: Family) -> None:
 def test_who_is_led_stays_close_behind_goals_that_come_in_small_steps(leader: Family) -> None:
     with world(leader) as there:
         train = coupled(there)
-        there.bus.run(train.begin({}))
+        there.bus.run(train.start({}))
         begun = heard(there, train)
         for step in range(60):
             led(there, train, {node: here + step * 0.005 for node, here in begun.items()})
@@ -263,10 +265,10 @@ def test_goals_outside_the_limits_are_refused_for_all_and_nothing_moves(leader: 
     able = abilities(leader)
     with world(leader) as there:
         train = coupled(there)
-        there.bus.run(train.begin({}))
+        there.bus.run(train.start({}))
         there.link.advance(0.5)
         here, before = heard(there, train), stands(there)
-        bounds = ran(there, able["limits"](there.device(NODE)))
+        bounds = ran(there, able.limits(there.device(NODE)))
         beyond = bounds[way > 0] + way
         with sent(there.bus) as frames, pytest.raises(LimitExceeded) as caught:
             led(there, train, here | {NODE: beyond})
@@ -307,8 +309,8 @@ def test_goals_made_before_a_setting_was_written_do_not_leave(keeping_leader: Fa
     with world(keeping_leader) as there:
         device = there.device(NODE)
         devices = [device, *(there.device(node) for node in there.ids[1:])]
-        train = there.bus.run(abilities(keeping_leader)["train"](devices, rate=keeping_leader.link.rate))
-        there.bus.run(train.begin({}))
+        train = there.bus.run(abilities(keeping_leader).stream(devices, rate=keeping_leader.link.rate))
+        there.bus.run(train.start({}))
         goals = train.goals(heard(there, train))
         row = next(row for row in kept(there.table(NODE)) if not row.choices)
         held = row.to_raw(device.read(row.name)[row.name])
@@ -328,7 +330,7 @@ def test_goals_made_before_a_setting_was_written_do_not_leave(keeping_leader: Fa
 def test_a_dead_node_is_missing_and_costs_nobody_else_his_position(leader: Family, dead: int) -> None:
     with world(leader) as there:
         train = coupled(there)
-        there.bus.run(train.begin({}))
+        there.bus.run(train.start({}))
         there.simulator.nodes[dead].unplug()
         assert heard(there, train).keys() == set(there.ids) - {dead}
         led_others(there, train, dead)
@@ -348,7 +350,7 @@ def test_beginning_visits_everyone_and_then_says_who_is_dead(leader: Family) -> 
         train = coupled(there)
         there.simulator.nodes[NODE].unplug()
         with pytest.raises(NoReply) as caught:
-            there.bus.run(train.begin({}))
+            there.bus.run(train.start({}))
         assert caught.value.node == NODE
         led_others(there, train, NODE)
 
@@ -365,7 +367,7 @@ def test_who_is_known_is_coupled_again_without_being_asked(leader: Family) -> No
     able = abilities(leader)
     with world(leader) as there:
         devices = [there.device(node) for node in there.ids]
-        make: Callable[[], Runnable[PositionStream]] = lambda: able["train"](devices, rate=leader.link.rate)  # noqa: E731
+        make: Callable[[], Runnable[PositionStream]] = lambda: able.stream(devices, rate=leader.link.rate)  # noqa: E731
         there.bus.run(make())
         with sent(there.bus) as frames:
             there.bus.run(make())
@@ -380,4 +382,4 @@ def switched(there: World, node: int, name: str) -> None:
     """The torque, where there is a switch for it."""
     able = abilities(there.family)
     if name in able:
-        there.bus.run(able[name](there.device(node)))
+        there.bus.run(getattr(able, name)(there.device(node)))

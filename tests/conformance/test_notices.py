@@ -33,7 +33,7 @@ def said_unasked(family: Family) -> list[Data]:
         vector.data
         for vector in vectors(family.name)
         if vector.direction == "status"
-        and any(isinstance(event, Notification) for event in family.receiver().feed(vector.data))
+        and any(isinstance(event, Notification) for event in family.open().receiver().feed(vector.data))
     ]
 
 
@@ -48,7 +48,7 @@ def test_notices_disturb_nothing(reporter: Family) -> None:
                     device.ping(),
                     device.identify(),
                     device.read(),
-                    there.bus.run(reporter.scan(there.ids)),
+                    there.bus.run(reporter.open().scan(there.ids)),
                 ]
             looked.append((values, frames))
         assert line.fired

@@ -14,7 +14,7 @@ from tests.support.world import IDS, World, abilities, world
 NODE = IDS[0]
 
 
-@pytest.mark.parametrize("one", ["position", "state", "train"])
+@pytest.mark.parametrize("one", ["position", "state", "stream"])
 def test_the_bus_keeps_what_told_a_position_and_how_to_read_it(leader: Family, one: str) -> None:
     with world(leader) as found:
         told = _told(found, one)
@@ -29,10 +29,10 @@ def test_the_bus_keeps_what_told_a_position_and_how_to_read_it(leader: Family, o
 def _told(found: World, one: str) -> float:
     device: Any = found.device(NODE)
     able = abilities(found.family)
-    if one != "train":
-        told = found.bus.run(able[one](device))
+    if one != "stream":
+        told = found.bus.run(getattr(able, one)(device))
         return float(told.position if one == "state" else told)
-    train = found.bus.run(able["train"]([device], rate=found.bus.rate))
+    train = found.bus.run(able.stream([device], rate=found.bus.rate))
     (reading,) = train.positions
     assert isinstance(reading, Request)
     return float(found.bus.run(reading).values[NODE])

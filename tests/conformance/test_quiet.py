@@ -24,9 +24,12 @@ def looks(there: World) -> dict[str, Runnable[Any]]:
     """Everything that only looks, not yet begun."""
     device = there.device(NODE)
     found: dict[str, Runnable[Any]] = {verb: said(device, verb) for verb in LOOKS if has(there.family, verb)}
-    found |= {"scan": there.family.scan(there.ids), "scan of all": there.family.scan()}
-    found |= {"identify by family": there.family.identify(NODE), "probe": there.family.probe(NODE, 0)}
-    test = there.family.echo_test()
+    found |= {"scan": there.family.open().scan(there.ids), "scan of all": there.family.open().scan()}
+    found |= {
+        "identify by family": there.family.open().identify(NODE),
+        "probe": there.family.open().probe(NODE, 0),
+    }
+    test = there.family.open().echo_test()
     return found | ({"echo test": test} if test is not None else {})
 
 
@@ -56,18 +59,18 @@ def is_group(request: Request[Any]) -> bool:
 def test_identify_says_what_is_there(subject: Family) -> None:
     with world(subject) as there:
         for node in there.ids:
-            identity = there.bus.run(subject.identify(node))
+            identity = there.bus.run(subject.open().identify(node))
             assert identity.node == node
             assert identity.model
             assert identity.firmware
-            assert identity.table in subject.tables
+            assert identity.table in subject.registers
             assert there.device(node).identify() == identity
 
 
 def test_who_is_not_there_is_silent(shared: Family) -> None:
     with world(shared) as there:
         with pytest.raises(NoReply) as raised:
-            there.bus.run(shared.identify(9))
+            there.bus.run(shared.open().identify(9))
         assert raised.value.node == 9
         assert there.device(9).ping() is False
 
@@ -78,7 +81,7 @@ def test_ping_says_who_is_there(subject: Family) -> None:
             there.simulator.nodes[gone].unplug()
             assert [there.device(node).ping() for node in there.ids] == [node != gone for node in there.ids]
             with pytest.raises(NoReply) as raised:
-                there.bus.run(subject.identify(gone))
+                there.bus.run(subject.open().identify(gone))
             assert raised.value.node == gone
             there.simulator.nodes[gone].plug()
             assert there.device(gone).ping() is True
@@ -90,24 +93,24 @@ def test_a_scan_finds_exactly_who_is_there(
     subject: Family, ids: tuple[int, ...], asked: tuple[int, ...]
 ) -> None:
     with world(subject, ids=possible(subject, ids)) as there:
-        found = there.bus.run(subject.scan(possible(subject, asked)))
+        found = there.bus.run(subject.open().scan(possible(subject, asked)))
         assert sorted(one.node for one in found) == list(there.ids)
         assert {one.rate for one in found} == {subject.link.rate}
         for one in found:
-            assert one.identity == there.bus.run(subject.identify(one.node))
+            assert one.identity == there.bus.run(subject.open().identify(one.node))
 
 
 def test_a_scan_finds_nobody_where_nobody_is(shared: Family) -> None:
     with world(shared, ids=(20,)) as there:
-        assert there.bus.run(shared.scan(IDS)) == []
-        assert there.bus.run(shared.scan((20,)))
+        assert there.bus.run(shared.open().scan(IDS)) == []
+        assert there.bus.run(shared.open().scan((20,)))
 
 
 def test_a_scan_finds_nobody_where_all_are_gone(subject: Family) -> None:
     with world(subject) as there:
         for node in there.ids:
             there.simulator.nodes[node].unplug()
-        assert there.bus.run(subject.scan(there.ids)) == []
+        assert there.bus.run(subject.open().scan(there.ids)) == []
 
 
 def test_a_scan_tells_early(shared: Family) -> None:
@@ -124,7 +127,7 @@ def test_a_scan_tells_early(shared: Family) -> None:
             if isinstance(event, Found):
                 when.append((event, left))
 
-        found = there.bus.run(shared.scan(tuple(range(1, 20))), report)
+        found = there.bus.run(shared.open().scan(tuple(range(1, 20))), report)
     assert {(one.node, one.rate) for one, _ in when} == {(one.node, one.rate) for one in found}
     assert when[0][1] < when[-1][1] < len(frames)
     progress = [event for event in there.events if isinstance(event, Progress)]
@@ -135,7 +138,7 @@ def test_a_scan_tells_early(shared: Family) -> None:
 def test_a_scan_finds_at_each_rate_who_is_there(subject: Family) -> None:
     with world(subject) as there:
         rates = subject.link.rates
-        found = there.bus.run(subject.scan(there.ids, rates))
+        found = there.bus.run(subject.open().scan(there.ids, rates))
         assert {(one.node, one.rate) for one in found} == {(node, subject.link.rate) for node in there.ids}
         assert there.device(NODE).ping() is True
 
@@ -143,10 +146,10 @@ def test_a_scan_finds_at_each_rate_who_is_there(subject: Family) -> None:
 def test_a_scan_leaves_the_rate_as_it_was(subject: Family) -> None:
     usual, other = subject.link.rate, subject.link.rates[-1]
     with world(subject, rate=other) as there:
-        found = there.bus.run(subject.scan(there.ids, (usual,)))
+        found = there.bus.run(subject.open().scan(there.ids, (usual,)))
         assert {(one.node, one.rate) for one in found} == {(node, usual) for node in there.ids}
         assert (there.bus.rate, there.link.rate) == (other, other)
-        assert bool(there.bus.run(subject.scan(there.ids))) == (usual == other)
+        assert bool(there.bus.run(subject.open().scan(there.ids))) == (usual == other)
 
 
 @pytest.mark.parametrize("before", [True, False], ids=["before", "after"])
@@ -156,7 +159,7 @@ def test_a_scan_that_is_cut_leaves_the_rate_as_it_was(subject: Family, before: b
         with world(subject) as there:
             steps = Steps(there.bus, cut_at=number, before=before)
             with suppress(Cut):
-                steps.run(subject.scan(there.ids, subject.link.rates))
+                steps.run(subject.open().scan(there.ids, subject.link.rates))
             assert (there.bus.rate, there.link.rate) == (subject.link.rate, subject.link.rate)
             number, cuts = number + 7, steps.cuts
 
@@ -169,14 +172,19 @@ def test_looking_is_the_same_blocking_and_async(subject: Family) -> None:
             await device.ping(),
             await device.identify(),
             await device.read(),
-            await bus.run(subject.scan(there.ids)),
+            await bus.run(subject.open().scan(there.ids)),
         ]
         await bus.close()
         return found
 
     with world(subject) as there:
         device = there.device(NODE)
-        found = [device.ping(), device.identify(), device.read(), there.bus.run(subject.scan(there.ids))]
+        found = [
+            device.ping(),
+            device.identify(),
+            device.read(),
+            there.bus.run(subject.open().scan(there.ids)),
+        ]
         assert asyncio.run(looked(there)) == found
 
 

@@ -60,18 +60,18 @@ def test_vectors_of_both_directions_and_both_verdicts_exist(family: Family) -> N
 
 def test_a_reply_is_told_apart_however_it_is_cut(family: Family, reply: Vector) -> None:
     for pieces in ways(reply.data):
-        assert answers(fed(family.receiver(), pieces)) == [payload(reply.data)]
+        assert answers(fed(family.open().receiver(), pieces)) == [payload(reply.data)]
 
 
 def test_a_bad_frame_is_no_reply_however_it_is_cut(family: Family, bad: Vector) -> None:
     for pieces in ways(bad.data):
-        assert answers(fed(family.receiver(), pieces)) == []
+        assert answers(fed(family.open().receiver(), pieces)) == []
 
 
 def test_a_reply_is_found_behind_noise_and_before_it(family: Family, reply: Vector) -> None:
     for noise in noises(reply.data):
         for pieces in ([noise, reply.data], [reply.data, noise]):
-            receiver = family.receiver()
+            receiver = family.open().receiver()
             before = [] if line_of(family).checksum else apart(receiver, pieces, reply.data)
             assert answers([*before, *fed(receiver, pieces)]) == [payload(reply.data)]
 
@@ -87,7 +87,7 @@ def apart(receiver: Receiver, pieces: list[Data], whole: Data) -> list[Event]:
 
 
 def test_a_vector_is_explained_and_a_bad_one_is_faulted(family: Family, vector: Vector) -> None:
-    explained = family.explain(flat(vector.data))
+    explained = family.open().decode(flat(vector.data))
     assert all_of(explained) == flat(vector.data)
     assert bool([one.fault for one in explained if one.fault]) is not vector.valid
     for one in explained:
@@ -127,7 +127,7 @@ def test_the_simulator_answers_in_frames_that_the_receiver_takes(family: Family)
     answered = 0
     for vector in vectors(family.name):
         said = heard(family, (vector.data, 1.0))
-        events = fed(family.receiver(), [data for _, data in said])
+        events = fed(family.open().receiver(), [data for _, data in said])
         assert [event for event in events if isinstance(event, Noise)] == []
         answered += bool(events)
     assert answered
@@ -145,7 +145,7 @@ def wrong_frames(data: Data) -> Iterator[Data]:
 
 def test_a_wrong_frame_is_never_taken_for_a_good_one(family: Family, checked_reply: Vector) -> None:
     for wrong in wrong_frames(checked_reply.data):
-        got = answers(fed(family.receiver(), [wrong]))
+        got = answers(fed(family.open().receiver(), [wrong]))
         assert [data for data in got if len(data) == len(payload(checked_reply.data))] == []
 
 
@@ -174,14 +174,15 @@ def judged(receiver: Receiver, pieces: Iterable[Data]) -> None:
 
 @given(data=st.data())
 def test_garbage_never_raises_and_is_never_hoarded(family: Family, data: st.DataObject) -> None:
-    judged(family.receiver(), data.draw(st.lists(deliveries[family.link.kind], max_size=30)))
+    judged(family.open().receiver(), data.draw(st.lists(deliveries[family.link.kind], max_size=30)))
 
 
 @given(data=st.data())
 def test_frames_among_garbage_are_never_hoarded(family: Family, data: st.DataObject) -> None:
     known = st.sampled_from([vector.data for vector in vectors(family.name)])
     judged(
-        family.receiver(), data.draw(st.lists(st.one_of(deliveries[family.link.kind], known), max_size=30))
+        family.open().receiver(),
+        data.draw(st.lists(st.one_of(deliveries[family.link.kind], known), max_size=30)),
     )
 
 
@@ -198,20 +199,20 @@ def test_long_runs_of_garbage_are_never_hoarded(family: Family, run: bytes | str
             else:
                 piece = random.randbytes(size) if isinstance(run, str) else (run * size)[:size]
                 pieces.append(piece if family.link.kind == "bytes" else CanFrame(0x281, piece[:8]))
-        judged(family.receiver(), pieces)
+        judged(family.open().receiver(), pieces)
 
 
 @given(data=st.binary(max_size=300))
 def test_what_is_of_the_wrong_kind_is_noise(family: Family, data: bytes) -> None:
     wrong: Data = data if family.link.kind == "frames" else CanFrame(0x123, data[:8])
-    events = fed(family.receiver(), [wrong])
+    events = fed(family.open().receiver(), [wrong])
     assert answers(events) == []
     assert b"".join(event.data for event in events) == payload(wrong)
 
 
 @given(data=st.binary(max_size=300))
 def test_garbage_is_explained_to_the_last_byte(family: Family, data: bytes) -> None:
-    assert all_of(family.explain(data)) == data
+    assert all_of(family.open().decode(data)) == data
 
 
 @given(data=st.data())

@@ -59,7 +59,7 @@ def test_every_plain_row_takes_values_up_to_both_ends(plain_one: Family) -> None
 def test_every_kept_row_takes_values_up_to_both_ends_and_outlives_a_power_cut(writer: Family) -> None:
     with world(writer) as there:
         rows = kept(there.table(NODE))
-    assert rows or not [row for row in writer.tables.values() if "lock" in row]
+    assert rows or not [row for row in writer.registers.values() if "lock" in row]
     for row in rows:
         for raw in samples(row):
             with world(writer) as there:

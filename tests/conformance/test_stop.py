@@ -75,7 +75,7 @@ def assert_at_rest(there: World, outcome: StopOutcome, silent: tuple[int, ...] =
 def test_when_nobody_is_known_yet(subject: Family) -> None:
     with world(subject) as there, sent(there.bus) as frames:
         assert there.bus.estop().promise
-    assert len(frames) >= len(subject.stop({}).requests)
+    assert len(frames) >= len(subject.open().stop({}).requests)
 
 
 def test_when_idle(mover: Family) -> None:
@@ -88,7 +88,7 @@ def test_without_a_gate(mover: Family) -> None:
     with world(mover) as there:
         met(there)
         under_way(there)
-        bus = make_bus(there.link, mover, gate=False)
+        bus = make_bus(there.link, mover.open(), gate=False)
         for node in IDS:
             assert mover.devices.blocking(bus, node).ping() is True
         assert_at_rest(there, bus.estop())
@@ -193,16 +193,16 @@ def test_at_any_moment_of_a_move(mover: Family) -> None:
 
 def test_what_stops_does_not_switch_on_or_keep(family: Family) -> None:
     nodes = dict.fromkeys(possible(family, IDS))
-    effects = {request.effect for request in family.stop(nodes).requests}
+    effects = {request.effect for request in family.open().stop(nodes).requests}
     assert effects <= {Effect.NONE, Effect.TORQUE, Effect.MOTION}
 
 
 def test_stop_frames_are_small_enough_to_hurry(family: Family) -> None:
     def air(request: Request[Any]) -> float:
-        return family.air_time(request, family.link.rate)
+        return family.open().air_time(request, family.link.rate)
 
     nodes = dict.fromkeys(possible(family, IDS))
-    assert all(air(request) < 0.02 for request in family.stop(nodes).requests)
+    assert all(air(request) < 0.02 for request in family.open().stop(nodes).requests)
 
 
 def test_who_can_hold_instead_of_letting_go_takes_whom_it_is_to_hold(family: Family) -> None:

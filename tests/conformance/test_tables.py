@@ -19,7 +19,7 @@ NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 
 
 def rows(family: Family) -> Iterator[Register]:
-    for table in family.tables.values():
+    for table in family.registers.values():
         yield from table.values()
 
 
@@ -74,14 +74,14 @@ def test_every_row_keeps_the_law(family: Family, law: str) -> None:
 
 
 def test_there_are_tables_and_each_is_called_by_its_name(family: Family) -> None:
-    assert family.tables
-    assert {name: table.name for name, table in family.tables.items()} == {
-        name: name for name in family.tables
+    assert family.registers
+    assert {name: table.name for name, table in family.registers.items()} == {
+        name: name for name in family.registers
     }
 
 
 def test_rows_are_found_by_their_address_and_do_not_overlap(family: Family) -> None:
-    for table in family.tables.values():
+    for table in family.registers.values():
         assert [table.at(row.address, row.subindex) for row in table.values()] == list(table.values())
         plain = sorted(
             (row.address, row.address + row.size) for row in table.values() if row.subindex is None
@@ -119,5 +119,5 @@ def test_what_is_kept_in_eeprom_can_be_locked_and_the_lock_is_closed_as_shipped(
     for lock in locks(family):
         assert lock.default == closed(lock)
         assert lock.effect is Effect.PERSISTENT
-    for table in family.tables.values():
+    for table in family.registers.values():
         assert "lock" not in table or kept(table)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from motorbus import families
-from motorbus.cli.kst import budget_frames
 from motorbus.diagnose.budget import Transfer, budget
 from motorbus.diagnose.loops import Wanted, count
 from motorbus.errors import RequestError
+from motorbus.families.kst.cli import budget_frames
 from motorbus.session.robot import Robot
 from tests.support.machines import machine
 
@@ -78,7 +78,9 @@ def test_on_can_it_lies_within_what_is_counted_to_the_bit() -> None:
     found = count(Wanted("kst:can://slcan/dev/x", {node: str(node) for node in nodes}))
     assert found is not None
     frames = [
-        Transfer(node, one) for node in nodes for one in budget_frames(families.load("kst"), node).values()
+        Transfer(node, one)
+        for node in nodes
+        for one in budget_frames(families.load("kst").open(), node).values()
     ]
     exact = budget(frames, found.budget.bit_rate)
     assert exact.time.least < found.budget.wire < exact.time.most

@@ -58,7 +58,8 @@ def test_there_are_commands_to_judge() -> None:
 def test_a_command_parses(line: str) -> None:
     words = shlex.split(line)[1:]
     command, _, _ = parse(build(), words)
-    assert f"{command.__module__}.".startswith(f"motorbus.cli.{words[0].replace('-', '_')}.")
+    name = words[0].replace("-", "_")
+    assert f"{command.__module__}.".startswith((f"motorbus.cli.{name}.", f"motorbus.families.{name}.cli."))
 
 
 @pytest.mark.parametrize(

@@ -147,14 +147,14 @@ def run_process(line: str, words: list[str], folder: Path) -> Ran:
         if first:
             process.send_signal(signal.SIGINT)
         if WITH_HANDS.search(line):
-            assert "take the supply" in process.stderr.readline()
+            assert "switch the supply" in process.stderr.readline()
             power_cycle(folder / "kst.control")
         out, err = process.communicate(timeout=60)
     return Ran(process.returncode, first + out, err)
 
 
 def power_cycle(control: Path) -> None:
-    """What a person does who is asked to take the supply away and to give it back."""
+    """Switch the supply of the servo off and on, as the user is asked to."""
     with socket.socket(socket.AF_UNIX) as line:
         line.connect(str(control))
         line.sendall(b"power-cycle\n")

@@ -105,7 +105,9 @@ def test_l18_a_change_of_id_or_baud_is_written_once(what: str, register: int) ->
         return data[4:6] == bytes((wire.Instruction.WRITE, register))
 
     rig.put(line := DeafTo(is_it))
-    servo = Servo(Bus(rig.link, FAMILY, interlock=Gate(), report=lambda event: None), 1)  # it keeps a journal
+    servo = Servo(
+        Bus(rig.link, FAMILY.open(), interlock=Gate(), report=lambda event: None), 1
+    )  # it keeps a journal
     told: list[type[MotorbusError]] = []
     try:
         servo.set_id(7) if register == 5 else servo.set_baud(500_000)

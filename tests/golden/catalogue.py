@@ -41,7 +41,7 @@ EXCLUDED = {
 }
 
 DEVICES = Argument(lambda bench: list(bench.devices.values()))
-SETTINGS = Argument(lambda bench: bench.family.settings_of(bench.bus.family))
+SETTINGS = Argument(lambda bench: bench.family.settings_of(bench.bus))
 NO_FACTS: dict[str, Any] = {}
 
 

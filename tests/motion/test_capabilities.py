@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import inspect
+from dataclasses import replace
 from inspect import getattr_static
 from math import tau
 
 import pytest
 
 from motorbus import AsyncRobot, NoReply, RequestError, Robot
-from motorbus.core.family import Quality
+from motorbus.core.family import AxisDriver, Quality
 from motorbus.core.steps import Sleep
 from motorbus.motion.axis import AsyncAxis, Axis
 from motorbus.motion.body import Body
@@ -92,13 +93,13 @@ def test_a_sample_says_how_far_it_can_be_trusted() -> None:
 def test_a_sample_that_nothing_confirms_is_suspect() -> None:
     with machine(arm="1") as (made, sims), Robot.of(made) as robot:
         robot["a1"].state()
-        inner = robot["a1"].able["state"]
+        inner = robot["a1"].able.state
 
         def twitching(device: object) -> object:
             sims["arm"][1].raw_position = 5000 - sims["arm"][1].raw_position
             return inner(device)
 
-        robot["a1"].able = {**robot["a1"].able, "state": twitching}  # type: ignore[dict-item]
+        robot["a1"].able = replace(robot["a1"].able, state=twitching)  # type: ignore[arg-type]
         sims["arm"][1].raw_position = 3500
         assert robot["a1"].state().quality is Quality.SUSPECT
 
@@ -106,7 +107,7 @@ def test_a_sample_that_nothing_confirms_is_suspect() -> None:
 def test_effort_has_the_direction_of_the_axis() -> None:
     with machine(arm="1", axes={"a1": TURNED}) as (made, _), Robot.of(made) as robot:
         axis = robot["a1"]
-        axis.able = {**axis.able, "load": lambda _: _told(0.25), "current": lambda _: _told(0.5)}
+        axis.able = replace(axis.able, load=lambda _: _told(0.25), current=lambda _: _told(0.5))
         assert axis.load() == -0.25
         assert axis.current() == -0.5
 
@@ -164,7 +165,7 @@ def test_the_cap_of_the_file_is_set_before_the_torque() -> None:
 def _parts(sim: Simulation, title: str) -> str:
     assert isinstance(sim.line, Heard)
     frames = (data for data in sim.line.sent if isinstance(data, bytes))
-    found = (one for data in frames for one in sim.family.explain(data) if one.title == title)
+    found = (one for data in frames for one in sim.family.open().decode(data) if one.title == title)
     return " ".join(f"{part.name} {part.meaning}" for part in next(found).parts)
 
 
@@ -235,7 +236,7 @@ def test_the_async_face_is_the_same() -> None:
 
 def test_an_axis_of_which_nothing_is_known_can_nothing() -> None:
     with machine(arm="1") as (made, _), Robot.of(made) as robot:
-        bare = Axis(robot["a1"].bus, "a1", made.axes["a1"], robot["a1"].device, {})
+        bare = Axis(robot["a1"].bus, "a1", made.axes["a1"], robot["a1"].device, AxisDriver())
         assert bare.capabilities == frozenset()
         assert isinstance(robot, Body)
 

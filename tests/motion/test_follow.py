@@ -50,7 +50,7 @@ def move(robot: Robot, name: str, to: float) -> None:
     """By the device's own verb."""
     axis = robot[name]
     axis.enable_torque()
-    robot.buses[axis.spec.bus].run(axis.able["move"](axis.device, axis.spec.to_device(to), velocity=1.5))  # type: ignore[attr-defined]
+    robot.buses[axis.spec.bus].run(axis.able.move(axis.device, axis.spec.to_device(to), velocity=1.5))  # type: ignore[attr-defined]
 
 
 def test_leaders_are_let_go_and_followers_hold() -> None:

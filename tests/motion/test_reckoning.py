@@ -249,7 +249,7 @@ def test_a_program_makes_it_unknown() -> None:
     with machine(lift=True) as (made, _), Robot.of(made) as robot:
         lift = robot["lift"]
         lift.declare(0.0)
-        lift.able = {**lift.able, "run": lambda _, number, **__: _ran(number)}
+        lift.able = replace(lift.able, run=lambda _, number, **__: _ran(number))
         assert lift.run(2) == "project 2 ran"
         assert lift.estimated is None
         assert "program 2" in lift.reckoning.why  # type: ignore[union-attr]

@@ -11,7 +11,7 @@ import pytest
 import motorbus
 from motorbus import AsyncRobot, NoReply, RequestError, Robot
 from motorbus.core.device import device_method
-from motorbus.core.family import Identity
+from motorbus.core.family import AxisDriver, Identity
 from motorbus.core.steps import Sleep
 from motorbus.motion import recognition
 from tests.support.machines import listened, machine, said
@@ -194,7 +194,7 @@ def test_a_place_to_park_needs_a_way_to_it() -> None:
     with machine(can="0x25", exit="park", park="0 deg") as (made, _), Robot.of(made, "c1") as robot:
         axis = robot["c1"]
         assert recognition._lacking(axis) is None
-        axis.able = {"position": axis.able["position"]}
+        axis.able = AxisDriver(position=axis.able.position)
         refused = recognition._lacking(axis)
         assert refused is not None
         assert "axis.c1.exit" in str(refused)

@@ -37,7 +37,7 @@ def test_where_it_is_guided_is_what_is_written_down() -> None:
         axis = robot["a1"]
         axis.enable_torque()
         robot.buses["arm"].run(  # type: ignore[attr-defined]  # something else moves it meanwhile
-            axis.able["move"](axis.device, axis.spec.to_device(1.0), velocity=1.5, wait=False)
+            axis.able.move(axis.device, axis.spec.to_device(1.0), velocity=1.5, wait=False)
         )
         found = robot.teach("a1", seconds=2.0, limp=False)
         places = found.axes["a1"]

@@ -141,15 +141,3 @@ def test_an_unknown_way_is_refused() -> None:
     with pytest.raises(RequestError, match="'up'"):
         decoder.feed(READ, way="up")
     assert [packet.start for packet in decoder.feed(READ)] == [0]
-
-
-def test_a_family_may_be_configured() -> None:
-    family = motorbus.kst.FAMILY.configured(profile="xqpower")
-    assert Decoder(family).family is family
-
-
-@pytest.mark.parametrize("family", [None, 5, [], b"feetech", motorbus.feetech, motorbus.kst.FAMILY.link])
-def test_what_is_no_family_is_refused(family: Any) -> None:
-    with pytest.raises(RequestError, match="is no family of devices") as caught:
-        Decoder(family)
-    assert "feetech" in caught.value.expected

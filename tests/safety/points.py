@@ -25,5 +25,5 @@ def sent(sims: Any) -> list[Data]:
 
 def known(axis: Any) -> Any:
     """The device of an axis, once its limits and units have been read."""
-    axis.bus.run(axis.able["limits"](axis.device))
+    axis.bus.run(axis.able.limits(axis.device))
     return axis.device

@@ -46,7 +46,7 @@ def busy(family: str, *, seed: int) -> Iterator[tuple[Bus, list[Any]]]:
         sim.pace = True
         with motorbus.open(sim.url) as bus:
             for node in NODES[family]:
-                bus.run(bus.family.identify(node))
+                bus.run(bus.driver.identify(node))
             sim.line = NoisyLine(seed, corrupt=0.2, loss=0.05, delay=0.0002)
             orders = queued(bus, NODES[family])
             for _ in range(seed):
@@ -61,7 +61,7 @@ def question(bus: Bus, node: int) -> Request[Any]:
         return read_block(device, 0, 200, bytes)
     if bus.family.name == "kst":
         return position(device)
-    return bus.family.probe(node, 0)
+    return bus.driver.probe(node, 0)
 
 
 def order(bus: Bus, node: int) -> Request[Any]:

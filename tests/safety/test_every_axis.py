@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
+from dataclasses import replace
 from random import Random
 from typing import Any
 
@@ -48,10 +49,8 @@ def befall(robot: Any, sims: Any, fates: Fates) -> None:
         elif fate == "alarm":
             sims[bus][int(node, 0)].alarm = 0x20
         elif fate == "raises":
-            axis.able = {
-                verb: breaking(one) if verb in ("stop", "disable_torque") else one
-                for verb, one in axis.able.items()
-            }
+            broken = axis.able.names & {"stop", "disable_torque"}
+            axis.able = replace(axis.able, **{name: breaking(getattr(axis.able, name)) for name in broken})
     listened(sims)
 
 

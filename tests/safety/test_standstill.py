@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import pkgutil
 from collections.abc import Callable
+from dataclasses import replace
 from enum import Enum
 from importlib import import_module
 
@@ -98,7 +99,7 @@ def test_it_is_proven_exactly_when_enough_readings_in_a_row_are_at_one_place(
 def test_an_axis_that_moves_is_stopped_and_seen_to_rest() -> None:
     with machine(arm="1") as (made, _), Robot.of(made) as robot:
         axis = robot["a1"]
-        axis.bus.run(axis.able["move"](axis.device, 4.0, velocity=1.5, wait=False))
+        axis.bus.run(axis.able.move(axis.device, 4.0, velocity=1.5, wait=False))
         axis.departs()
         found = axis.bus.run(stopped(axis))
         assert found.rest is Rest.STOPPED
@@ -109,21 +110,21 @@ def test_an_axis_that_moves_is_stopped_and_seen_to_rest() -> None:
 def test_what_goes_on_is_said_to_move() -> None:
     with machine(arm="1") as (made, _), Robot.of(made) as robot:
         axis = robot["a1"]
-        axis.bus.run(axis.able["move"](axis.device, 4.0, velocity=0.5, wait=False))
+        axis.bus.run(axis.able.move(axis.device, 4.0, velocity=0.5, wait=False))
         assert axis.bus.run(seen(axis, Promise.HOLD, patience=0.3)).rest is Rest.MOVING
 
 
 def test_an_axis_that_is_silent_afterwards_was_not_seen_to_rest() -> None:
     with machine(arm="1") as (made, sims), Robot.of(made) as robot:
         axis = robot["a1"]
-        inner = axis.able["stop"]
+        inner = axis.able.stop
 
         async def stops_and_is_unplugged(device: object) -> Enum:
             promise: Enum = await inner(device)
             sims["arm"][1].unplug()
             return promise
 
-        axis.able = {**axis.able, "stop": stops_and_is_unplugged}
+        axis.able = replace(axis.able, stop=stops_and_is_unplugged)
         found = axis.bus.run(stopped(axis, patience=0.3))
         assert (found.rest, found.position) == (Rest.UNSEEN, None)
 
@@ -224,5 +225,5 @@ def test_no_promise_of_a_device_claims_that_it_rests(family: str) -> None:
     for promise in (one for kind in found for one in kind):
         assert promise.name != "STOPPED"
         assert any(words in promise.value or "torque off ends" in promise.value for words in CAREFUL), promise
-    said_ = families.load(family).configured().stop({1: None}).promise
+    said_ = families.load(family).open().stop({1: None}).promise
     assert any(words in said_ for words in CAREFUL)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motorbus import RequestError
-from motorbus.families.kst import settings_of
+from motorbus.families.kst import KstDriver
 from motorbus.session.opening import lock_name, prepare, simulated
 
 
@@ -23,7 +23,8 @@ def test_options_of_the_address_and_of_the_call_are_one() -> None:
 
 def test_what_a_family_takes_goes_to_the_family_and_the_rest_to_the_link() -> None:
     found = prepare("kst:can://slcan/dev/ttyACM0,profile=xqpower,ttyBaudrate=115200", {})
-    assert settings_of(found.family).profile.name == "xqpower"
+    assert isinstance(found.driver, KstDriver)
+    assert found.driver.settings.profile.name == "xqpower"
     assert found.options == {"ttyBaudrate": "115200"}
     simulated = prepare("feetech:sim,ids=1-3,model=sts3215", {})
     assert simulated.options == {"ids": "1-3", "model": "sts3215"}

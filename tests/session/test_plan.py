@@ -115,8 +115,8 @@ def test_whom_an_emergency_stop_is_to_hold_is_told_to_the_family() -> None:
         assert estop_options(made, "arm") == {"estop_hold": "2+4"}
         assert estop_options(made, "can") == {}
         with Plan.of(made, "a1").open("arm", None) as bus:  # also for those that are not wanted
-            sent = [one.wire for one in bus.family.stop({}).requests]
-            assert sent == [one.wire for one in FAMILY.configured(estop_hold="2+4").stop({}).requests]
+            sent = [one.wire for one in bus.driver.stop({}).requests]
+            assert sent == [one.wire for one in FAMILY.open(estop_hold="2+4").stop({}).requests]
 
 
 def test_whom_the_address_names_is_held_too() -> None:

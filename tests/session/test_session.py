@@ -87,7 +87,7 @@ def test_opening_writes_nothing() -> None:
         before = [sim[node].memory.read(0, 56) for node in (1, 2, 3)]
         for _ in range(10):
             with motorbus.open(sim.url) as bus:
-                found = bus.run(bus.family.scan((1, 2, 3, 4)))
+                found = bus.run(bus.driver.scan((1, 2, 3, 4)))
                 assert [item.node for item in found] == [1, 2, 3]
                 motorbus.feetech.Servo(bus, 2).telemetry()
         assert [sim[node].memory.read(0, 56) for node in (1, 2, 3)] == before
@@ -104,13 +104,13 @@ def test_an_echoing_adapter_is_found_at_open_and_told(caplog: pytest.LogCaptureF
 
 
 def test_a_broken_port_is_closed_again_when_opening_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    from motorbus.families.feetech import Feetech
+    from motorbus.families.feetech import FeetechDriver
 
-    def fail(self: Feetech) -> Request[Any]:
+    def fail(self: FeetechDriver) -> Request[Any]:
         raise RuntimeError("bug")
 
     with motorbus.simulate("feetech") as sim:
-        monkeypatch.setattr(Feetech, "echo_test", fail)
+        monkeypatch.setattr(FeetechDriver, "echo_test", fail)
         with pytest.raises(RuntimeError):
             motorbus.open(sim.url)
         monkeypatch.undo()

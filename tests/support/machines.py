@@ -66,7 +66,7 @@ def said(sims: Mapping[str, Simulation]) -> list[str]:
     """What was sent since `listened`, bus by bus, as `decode` calls each frame: `READ to servo 1 …`."""
     frames = ((sim, data) for sim in sims.values() if isinstance(sim.line, Heard) for data in sim.line.sent)
     flat = ((sim, data if isinstance(data, bytes) else data.flat()) for sim, data in frames)
-    return [one.title for sim, data in flat for one in sim.family.explain(data)]
+    return [one.title for sim, data in flat for one in sim.family.open().decode(data)]
 
 
 @contextmanager

@@ -11,14 +11,15 @@ from __future__ import annotations
 import json
 import sys
 import tomllib
+from dataclasses import replace
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 from motorbus import families
 from motorbus.core.can_frame import CanFrame
-from motorbus.core.family import Family, Simulator
+from motorbus.core.family import BusDriver, Family, Simulator
 from motorbus.core.register import RegisterMap
 from motorbus.core.request import Data
 
@@ -97,24 +98,20 @@ def possible(family: Family, ids: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(range(1, most + 1)) if most and len(ids) >= most else ids
 
 
-class Kind:
-    """A family in all things, whose simulated devices are of one kind: `options` of its simulator say which.
+def _kind(family: Family, key: str, options: dict[str, str]) -> Family:
+    """The family whose simulated devices all have one register map; `options` of its simulator say which."""
+    names = {option.name for option in family.link.settings}
+    settings = {name: value for name, value in options.items() if name in names}
 
-    `simulated` is the table they have.
-    """
+    def driver(one: Family, **given: object) -> BusDriver:
+        return family.driver(one, **{**settings, **given})
 
-    def __init__(self, family: Family, simulated: RegisterMap, options: dict[str, str]) -> None:
-        self.simulated = simulated
-        self._family = family
-        self._options = options
+    def simulator(ids: tuple[int, ...], model: str = "", **given: object) -> Simulator:
+        chosen: dict[str, Any] = {**options, **given}
+        return family.simulator(ids, **(chosen | ({"model": model} if model else {})))
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._family, name)
-
-    def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
-        """As the family makes it, with the options of this kind where nothing else is asked for."""
-        chosen: dict[str, Any] = {"model": model, **self._options, **options}
-        return self._family.simulator(ids, **(chosen | ({"model": model} if model else {})))
+    registers = {key: family.registers[key]}
+    return replace(family, registers=registers, driver=driver, simulator=simulator)
 
 
 def _kinds(name: str, family: Family) -> dict[str, Family]:
@@ -122,14 +119,7 @@ def _kinds(name: str, family: Family) -> dict[str, Family]:
     maps = KINDS.get(name, {}).get("maps", {})
     if len(maps) < 2:
         return {name: family}
-    told = {option.name for option in family.link.settings}
-    kinds: dict[str, Family] = {}
-    for key, options in maps.items():
-        settings: dict[str, object] = {one: value for one, value in options.items() if one in told}
-        kinds[f"{name}-{key}"] = cast(
-            "Family", Kind(family.configured(**settings), family.tables[key], options)
-        )
-    return kinds
+    return {f"{name}-{key}": _kind(family, key, options) for key, options in maps.items()}
 
 
 SUBJECTS: dict[str, Family] = {
@@ -140,7 +130,7 @@ SUBJECTS: dict[str, Family] = {
 
 def tables_of(subject: Family) -> list[RegisterMap]:
     """The tables that its simulated devices can have."""
-    return [subject.simulated] if isinstance(subject, Kind) else list(subject.tables.values())
+    return list(subject.registers.values())
 
 
 def vectors(name: str) -> list[Vector]:

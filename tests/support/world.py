@@ -6,7 +6,7 @@ This file alone knows the engine (`motorbus.bus`). Every other helper and every 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from typing import Any, Protocol, cast
@@ -18,7 +18,7 @@ from motorbus.bus.engine import Engine
 from motorbus.bus.jobs import Attempt, RequestJob
 from motorbus.bus.stop_socket import StopOutcome
 from motorbus.bus.trace import Subscription, TraceRecord
-from motorbus.core.family import Family
+from motorbus.core.family import AxisDriver, BusDriver, Family
 from motorbus.core.register import Register, RegisterMap
 from motorbus.core.request import Data, Effect, Notification, Request, Step
 from motorbus.core.steps import Exclusive, Gather, Runnable, Shielded, discard
@@ -38,19 +38,19 @@ Notify = Callable[[object], None]
 
 def make_bus(
     link: Link,
-    family: Family,
+    driver: BusDriver,
     *,
     gate: bool = True,
     report: Notify | None = None,
     journal: Notify | None = None,
 ) -> Bus:
     """A blocking bus around a link that the test has made, with a gate that admits motion unless `gate` is off."""
-    return Bus(link, family, interlock=Gate() if gate else None, report=report, journal=journal)
+    return Bus(link, driver, interlock=Gate() if gate else None, report=report, journal=journal)
 
 
-def make_async_bus(link: Link, family: Family, *, report: Notify | None = None) -> AsyncBus:
+def make_async_bus(link: Link, driver: BusDriver, *, report: Notify | None = None) -> AsyncBus:
     """An async bus around a link that the test has made."""
-    return AsyncBus(link, family, interlock=Gate(), report=report)
+    return AsyncBus(link, driver, interlock=Gate(), report=report)
 
 
 def exclude_echo(bus: BaseBus) -> None:
@@ -99,7 +99,7 @@ class Tries:
     """s from the request to its reply."""
 
     def __init__(self, family: Family, rate: int, *, echo: bool = True) -> None:
-        self.engine = Engine(family, rate=rate)
+        self.engine = Engine(family.open(), rate=rate)
         if not echo:
             self.engine.echo.exclude()
 
@@ -139,11 +139,11 @@ class World:
         self.simulator = family.simulator(self.ids)
         self.link = link(self.simulator, rate=rate or family.link.rate, line=line)
         self.events: list[object] = []
-        self.bus = make_bus(self.link, family, report=self.events.append)
+        self.bus = make_bus(self.link, family.open(), report=self.events.append)
 
     def async_bus(self) -> AsyncBus:
         """An async bus on the same link; use only one of the two at a time."""
-        return make_async_bus(self.link, self.family, report=self.events.append)
+        return make_async_bus(self.link, self.family.open(), report=self.events.append)
 
     def device(self, node: int) -> Any:
         """The device object of one id."""
@@ -155,7 +155,7 @@ class World:
 
     def table(self, node: int) -> RegisterMap:
         """The register table of the device."""
-        return self.family.tables[self.bus.run(self.family.identify(node)).table]
+        return self.family.registers[self.bus.run(self.family.open().identify(node)).table]
 
     def settings(self) -> dict[int, dict[str, int]]:
         """All writable rows of all devices."""
@@ -227,21 +227,21 @@ def has_torque_switch(family: Family) -> bool:
     return moves(family) and has(family, "enable_torque")
 
 
-def abilities(family: Family) -> Mapping[str, Callable[..., Any]]:
+def abilities(family: Family) -> AxisDriver:
     """The axis functions that the family offers for the model of its simulated device."""
     return _abilities(cast("Any", family))
 
 
 @cache
-def _abilities(family: Any) -> Mapping[str, Callable[..., Any]]:
+def _abilities(family: Any) -> AxisDriver:
     with world(family) as there:
-        found: Mapping[str, Callable[..., Any]] = family.axis(there.device(there.ids[0]).identify().model)
+        found: AxisDriver = family.open().axis(there.device(there.ids[0]).identify().model)
         return found
 
 
 def leads(family: Family) -> bool:
     """Whether a control loop can drive devices of this family."""
-    return "train" in abilities(family)
+    return "stream" in abilities(family)
 
 
 def switch_on(device: Any) -> None:
@@ -253,13 +253,13 @@ def switch_on(device: Any) -> None:
 def reports(family: Family) -> list[Notification]:
     """The notices that devices of this family send without a request."""
     told = [vector.data for vector in vectors(family.name) if vector.direction == "status"]
-    events = [event for data in told for event in family.receiver().feed(data)]
+    events = [event for data in told for event in family.open().receiver().feed(data)]
     return [event for event in events if isinstance(event, Notification)]
 
 
 def locks(family: Family) -> list[Register]:
     """The rows named `lock`: what a guarded sequence opens and must close. Their choices say which is which."""
-    return [table["lock"] for table in family.tables.values() if "lock" in table]
+    return [table["lock"] for table in family.registers.values() if "lock" in table]
 
 
 def closed(lock: Register) -> int:

@@ -1,262 +1,208 @@
-"""DRIVER: what to say to get a thing done. Here belong sequences, verification and guards; no bytes, no waiting.
-
-A function takes a node. It returns a `Request`, which can be kept and run again, or is a coroutine that awaits steps; a
-blocking or an async bus runs it. Device methods do not call each other; these functions do. They fill `node`, the known
-state of a device.
-"""
+"""Requests and procedures of the Metronome. They send nothing themselves; a bus runs them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
-from motorbus.core.family import Health, Identity, State, Stop
+from motorbus.core.access import readable_rows, writable_values
+from motorbus.core.arrival import wait_in_position
+from motorbus.core.family import AxisDriver, Explanation, Health, Identity, Receiver, State, Stop
+from motorbus.core.half_duplex import HalfDuplexSerial
 from motorbus.core.register import Register, Storage, Value
-from motorbus.core.request import (
-    Effect,
-    Expected,
-    Notification,
-    Precondition,
-    Priority,
-    Request,
-    Response,
-    TimeoutClass,
-)
+from motorbus.core.request import Effect, Expected, Precondition, Priority, Request, Response, TimeoutClass
 from motorbus.core.setpoint import Setpoint
-from motorbus.core.steps import Exclusive, Guard, WaitFor, catch
-from motorbus.errors import (
-    DeviceError,
-    LimitExceeded,
-    NoReply,
-    RequestError,
-    Stalled,
-    VerificationFailed,
-)
+from motorbus.core.steps import Exclusive, Guard, catch
+from motorbus.core.stream import PositionStream, read_positions
+from motorbus.core.verify import write_verified
+from motorbus.errors import DeviceError, LimitExceeded, NoReply, RequestError
 
-from . import wire
-from .table import TABLE
+from . import protocol
+from .protocol import Command
+from .registers import TABLE
 
 T = TypeVar("T")
 
-PATIENCE: Final = 0.25
-"""s to wait for a report of arrival before asking; a report may be lost, so it is never all that is waited for."""
+GOAL: Final = TABLE["goal_position"]
+PRESENT: Final = TABLE["present_position"]
+TORQUE: Final = TABLE["torque_enable"]
 
 
 class Node:
-    """One servo by its id, 1 to 63, and what is known of it. `limits` in rad; None when not read yet."""
+    """One servo by its id, 1 to 63, and what the driver knows of it.
+
+    `limits` (rad) as last read; None: not read yet. `alarm` and `at` (s, link clock) are those of its last reply.
+    """
 
     def __init__(self, node: int) -> None:
-        if node not in wire.NODES:
-            raise RequestError(f"{node!r} is not the id of one servo", expected="1 to 63")
+        if node not in protocol.IDS:
+            raise RequestError(f"{node!r} is not the id of a servo", expected="1 to 63")
         self.node: Final = node
         self.limits: tuple[float, float] | None = None
         self.alarm: tuple[str, ...] = ()
         self.at = -math.inf
 
 
-# --- single exchanges ---------------------------------------------------------------------------------------
+# -- requests ------------------------------------------------------------------------------------------------
 
 
-def exchange(
+def request(
     node: Node,
-    command: wire.Command,
-    index: int = 0,
-    subindex: int = 0,
-    value: bytes = b"",
+    command: Command,
+    operands: bytes = b"",
     *,
-    take: Callable[[bytes], T],
-    priority: Priority = Priority.POLL,
-    effect: Effect = Effect.NONE,
-    setpoints: tuple[Setpoint, ...] = (),
-    reply_within: TimeoutClass = TimeoutClass.REPLY,
-    reports_position: bool | Callable[[Response], Mapping[int, float]] = False,
-    precondition: Precondition | None = None,
+    size: int = 0,
+    decode: Callable[[bytes], T],
+    **options: Any,
 ) -> Request[T]:
-    """One request to one node; `take` makes a value of the four bytes of the answer.
+    """A request whose reply has `size` bytes of data, of which `decode` makes the value.
 
-    Everything here is repeatable: a goal is absolute. A relative move would have to say `repeatable=False`.
+    `options` are those of `Request`. A refusal raises DeviceError. Goals are absolute, so all requests are repeatable.
     """
 
-    def read(answer: Response) -> T:
-        data = answer.replies[0].data
-        node.alarm, node.at = wire.alarms(data[3]), answer.at
-        if data[3] & 0x0F:
-            raise _refused(node, data[3] & 0x0F, index, subindex)
-        return take(data[4:])
+    def take(response: Response) -> T:
+        reply = response.replies[0].data
+        status = reply[4]
+        node.alarm, node.at = protocol.alarms(status), response.at
+        if status & 15:
+            raise DeviceError(
+                f"node {node.node} refused {command.name}: {protocol.status_text(status)}",
+                code=status & 15,
+                node=node.node,
+            )
+        return decode(reply[5:-2])
 
-    return Request(
-        wire.encode_request(node.node, command, index, subindex, value),
-        (Expected(node.node, (int(command), index, subindex), wire.LENGTH),),
-        read,
-        lane=node.node,
-        priority=priority,
-        effect=effect,
-        setpoints=setpoints,
-        reply_within=reply_within,
-        repeatable=True,
-        reports_position=reports_position,
-        precondition=precondition,
-    )
+    expected = Expected(node.node, node.node, protocol.OVERHEAD + size)
+    frame = protocol.encode_request(node.node, command, operands)
+    return Request(frame, (expected,), take, repeatable=True, **options)
 
 
 def read_row(node: Node, row: Register) -> Request[int]:
-    """The raw value of one object."""
-    return exchange(
-        node,
-        wire.Command.READ,
-        row.address,
-        row.subindex or 0,
-        take=lambda data: row.decode(data[-row.size :]),
-    )
+    """The raw value of one register."""
+    return request(node, Command.READ, bytes((row.address, row.size)), size=row.size, decode=row.decode)
 
 
-def write_row(
-    node: Node, row: Register, raw: int, *setpoints: Setpoint, precondition: Precondition | None = None
-) -> Request[None]:
-    """Write one object, unless `precondition` objects just before. Raises RequestError for a raw value out of range."""
-    return exchange(
+def write_row(node: Node, row: Register, raw: int, *setpoints: Setpoint, **options: Any) -> Request[None]:
+    """Write one register. Raises RequestError for a raw value out of range."""
+    return request(
         node,
-        wire.Command.WRITE,
-        row.address,
-        row.subindex or 0,
-        row.encode(raw),
-        take=_nothing,
+        Command.WRITE,
+        bytes((row.address,)) + row.encode(raw),
+        decode=_no_value,
         priority=Priority.CONTROL,
         effect=row.effect,
         setpoints=setpoints,
         reply_within=TimeoutClass.STORE if row.storage is Storage.EEPROM else TimeoutClass.REPLY,
-        precondition=precondition,
+        **options,
     )
 
 
-def proof(node: Node, attempt: int = 0, reply_within: TimeoutClass = TimeoutClass.REPLY) -> Request[bool]:
-    """Ask for something whose answer is known beforehand and differs with `attempt`."""
-    subindex = attempt & 0xFF
-    right = bytes((~subindex & 0xFF,))
-    return exchange(
-        node,
-        wire.Command.READ,
-        wire.PROOF,
-        subindex,
-        take=lambda data: data[-1:] == right,
-        reply_within=reply_within,
-    )
+def health(node: Node) -> Request[Health]:
+    """Position (rad), temperature (°C), moving, alarm and torque, in one request."""
+
+    def decode(data: bytes) -> Health:
+        position, temperature = to_position(data), TABLE["temperature"].decode(data[5:6])
+        state = State(node.at, position, temperature=temperature, moving=bool(data[4]), alarm=node.alarm)
+        return Health(state, torque=data[6] == 1)
+
+    def positions(response: Response) -> dict[int, float]:
+        reply = response.replies[0].data
+        return {} if reply[4] & 15 else {node.node: to_position(reply[5:])}
+
+    block = bytes((PRESENT.address, 7))
+    return request(node, Command.READ, block, size=7, decode=decode, reports_position=positions)
+
+
+def to_position(data: bytes) -> float:
+    """The present position (rad) at the start of these bytes."""
+    return float(PRESENT.to_value(PRESENT.decode(data[: PRESENT.size])))
+
+
+def telemetry(node: Node) -> Request[State]:
+    """Position (rad), temperature (°C), moving and alarm."""
+    return health(node).convert(lambda health: health.state)
 
 
 def position(node: Node) -> Request[float]:
-    """Present position, rad."""
-    row = TABLE["present_position"]
-
-    def where(answer: Response) -> dict[int, float]:
-        data = answer.replies[0].data
-        return {} if data[3] & 0x0F else {node.node: float(row.to_value(row.decode(data[4:])))}
-
-    return exchange(
-        node,
-        wire.Command.READ,
-        row.address,
-        row.subindex or 0,
-        take=lambda data: float(row.to_value(row.decode(data))),
-        reports_position=where,
-    )
+    """Present position (rad)."""
+    return health(node).convert(lambda health: health.state.position or 0.0)
 
 
 def stop(node: Node) -> Request[None]:
-    """Brake and hold; torque stays as it is. Goes before everything else and needs to know nothing."""
-    return exchange(node, wire.Command.STOP, take=_nothing, priority=Priority.STOP, effect=Effect.MOTION)
+    """Brake and hold; torque stays as it is."""
+    return request(node, Command.STOP, decode=_no_value, priority=Priority.STOP, effect=Effect.MOTION)
 
 
 def disable_torque(node: Node) -> Request[None]:
-    """Torque off: it goes limp where it is."""
-    return write_row(node, TABLE["torque_enable"], 0)
+    """Torque off: the shaft turns freely."""
+    return write_row(node, TORQUE, 0)
 
 
-def _nothing(data: bytes) -> None:
-    """An answer without a value."""
+def probe(node: Node, attempt: int = 0) -> Request[bool]:
+    """Read 7 to 22 bytes from the model on; True if the id among them is possible. No other read has these lengths."""
+    size = 7 + attempt % 16
+    at = TABLE["node_id"].address
+    return request(
+        node, Command.READ, bytes((0, size)), size=size, decode=lambda data: data[at] in protocol.IDS
+    )
 
 
-def _refused(node: Node, code: int, index: int, subindex: int) -> DeviceError:
-    row = TABLE.at(index, subindex)
-    name = row.name if row else f"0x{index:02X}:{subindex}"
-    why = wire.REFUSALS.get(code, f"refusal {code}")
-    return DeviceError(f"node {node.node} refused {name}: {why}", code=code, register=name, node=node.node)
+def _no_value(data: bytes) -> None:
+    """A reply without data."""
 
 
-# --- who is there -------------------------------------------------------------------------------------------
+# -- identity and registers ----------------------------------------------------------------------------------
 
 
 async def ping(node: Node) -> bool:
-    """Is it there? Silence is the answer False."""
+    """Whether the servo replies."""
     try:
-        return await proof(node)
+        return await probe(node)
     except NoReply:
         return False
 
 
 async def identify(node: Node) -> Identity:
-    """Model and firmware. Unknown firmware would get table "": readable, never written."""
+    """Model and firmware. `table` is "" for an unknown model: it is read but never written."""
     model = await read_row(node, TABLE["model"])
     firmware = await read_row(node, TABLE["firmware"])
-    name = TABLE["model"].choices.get(model, f"unknown model 0x{model:04X}")
-    known = TABLE.name if model in TABLE["model"].choices else ""
-    return Identity(node.node, name, f"{firmware >> 8}.{firmware & 0xFF}", known, {"model_number": model})
+    known = model == TABLE["model"].default
+    name = "metronome" if known else f"unknown model 0x{model:04X}"
+    return Identity(node.node, name, f"{firmware >> 8}.{firmware & 255}", TABLE.name if known else "")
 
 
-# --- objects by name ----------------------------------------------------------------------------------------
-
-
-async def read(node: Node, *names: str) -> dict[str, Value]:
-    """Objects in API units by name, all when none is named. Raises RequestError for an unknown name."""
-    rows = [TABLE[name] for name in names or TABLE if TABLE[name].readable]
-    values: dict[str, Value] = {}
-    for row in rows:
-        values[row.name] = row.to_value(await read_row(node, row))
-    return values
+async def read(node: Node, /, *names: str) -> dict[str, Value]:
+    """Registers by name in API units; all without a name. Raises RequestError for an unknown name."""
+    return {row.name: row.to_value(await read_row(node, row)) for row in readable_rows(TABLE, names)}
 
 
 async def write(node: Node, /, **values: Value) -> None:
-    """Write objects by name, in API units; all are checked before the first is sent.
+    """Write registers by name in API units; all values are checked before the first is sent.
 
-    What lies in EEPROM goes through the guarded sequence. Raises RequestError for what cannot or must not be
-    written so, VerificationFailed when EEPROM reads back different.
+    Raises RequestError for a value that is not written by name, VerificationFailed when a setting reads back different.
     """
-    orders = [(TABLE[name], _checked(TABLE[name], value)) for name, value in values.items()]
-    kept = [(row, raw) for row, raw in orders if row.storage is Storage.EEPROM]
-    if kept:
-        await Exclusive(_write_eeprom(node, kept))
-    for row, raw in orders:
-        if row.effect is Effect.MOTION:
-            await write_row(node, row, raw, await _goal(node, raw))
-        elif row.storage is not Storage.EEPROM:
+    if values.get("torque_enable"):
+        raise RequestError("torque_enable is not written by name: use enable_torque()", node=node.node)
+    methods = {"node_id": "set_node_id()", "lock": "write(), which opens and closes it"}
+    raws = writable_values(TABLE, values, Register.to_raw, node=node.node, methods=methods)
+    await Exclusive(_write_settings(node, [(row, raw) for row, raw in raws if row.storage is Storage.EEPROM]))
+    for row, raw in raws:
+        if row is GOAL:
+            await write_row(node, row, raw, await setpoint(node, raw))
+        elif row.storage is Storage.RAM:
             await write_row(node, row, raw)
 
 
 async def set_node_id(node: Node, new: int) -> None:
-    """Give it another id, 1 to 63, which it takes at its next power-up."""
+    """Give the servo another id, 1 to 63, from its next power-up on."""
     TABLE["node_id"].encode(new)
-    await Exclusive(_write_eeprom(node, [(TABLE["node_id"], new)]))
-
-
-def _checked(row: Register, value: Value) -> int:
-    """The raw value to write. Raises RequestError when this may not be written by name."""
-    raw = row.to_raw(value)
-    refusal = ""
-    if not row.writable:
-        refusal = "it can only be read"
-    elif row.protected:
-        refusal = "a verb of its own writes it"
-    elif row.name == "torque_enable" and raw:
-        refusal = "it could jump to an old goal; enable_torque() first makes the goal the present position"
-    if refusal:
-        raise RequestError(f"{row.name} is not written by name: {refusal}", advice="nothing was sent")
-    row.encode(raw)
-    return raw
+    await Exclusive(_write_settings(node, [(TABLE["node_id"], new)]))
 
 
 class Unlocked(Guard):
-    """EEPROM can be written inside the block; locked again after an error, an interrupt and a cancellation."""
+    """Settings can be written inside the block. The lock is closed after it, also after an error or an interrupt."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -266,115 +212,123 @@ class Unlocked(Guard):
 
     async def leave(self, error: BaseException | None) -> None:
         lock = write_row(self._node, TABLE["lock"], 1)
-        if await catch(lock) is not None:  # not acknowledged, after the retries of the bus
+        if await catch(lock) is not None:  # no acknowledgement: write it again
             await lock
 
 
-async def _write_eeprom(node: Node, orders: list[tuple[Register, int]]) -> None:
-    """Unlock, write, read back, lock."""
+async def _write_settings(node: Node, values: Sequence[tuple[Register, int]]) -> None:
+    if not values:
+        return
     node.limits = None
     async with Unlocked(node):
-        for row, raw in orders:
-            await write_row(node, row, raw)
-            found = await read_row(node, row)
-            if found != raw:
-                raise VerificationFailed(f"{row.name} reads back {found}, not {raw}", node=node.node)
+        for row, raw in values:
+            write, read = partial(write_row, node, row, raw), partial(read_row, node, row)
+            await write_verified(write, read, raw, node=node.node, what=row.name)
 
 
-# --- moving -------------------------------------------------------------------------------------------------
-
-
-async def enable_torque(node: Node) -> None:
-    """Torque on without a jump: the goal becomes the present position first."""
-    here = await read_row(node, TABLE["present_position"])
-    await write_row(node, TABLE["goal_position"], here, await _goal(node, here))
-    await write_row(node, TABLE["torque_enable"], 1)
-
-
-async def move(
-    node: Node, to: float, *, velocity: float | None = None, wait: bool = True, tolerance: float = 0.01
-) -> None:
-    """Move to `to` rad, at most at `velocity` rad/s; returns when it is there, at once with `wait=False`.
-
-    Raises LimitExceeded when `to` is not finite (and the gate does outside the limits), Stalled when it stopped
-    elsewhere.
-    """
-    if not math.isfinite(to):
-        raise LimitExceeded(f"node {node.node}: {to} is no position", advice="give a number in rad")
-    row = TABLE["goal_position"]
-    goal = await _goal(node, row.to_raw(to))
-    if velocity is not None:
-        await write(node, move_velocity=velocity)
-    await write_row(node, row, row.to_raw(to), goal)
-    if wait:
-        await _arrival(node, to, tolerance)
-
-
-async def _arrival(node: Node, to: float, tolerance: float) -> None:
-    """Wait for the report, and ask now and then: it may have been sent before we listened."""
-    while await read_row(node, TABLE["moving"]):
-        await WaitFor(partial(_is_arrival, node.node), PATIENCE)
-    here = await position(node)
-    if abs(here - to) > tolerance:
-        raise Stalled(f"node {node.node} stands at {here:.4g} rad, not at {to:.4g} rad", node=node.node)
-
-
-def _is_arrival(node: int, notice: Notification) -> bool:
-    return notice.node == node and notice.kind == "arrived"
-
-
-async def _goal(node: Node, raw: int) -> Setpoint:
-    """What this raw goal orders, with the limits the device itself declares, for the gate to judge."""
-    known = await limits(node)
-    return Setpoint(node.node, "position", float(TABLE["goal_position"].to_value(raw)), *known)
+# -- motion --------------------------------------------------------------------------------------------------
 
 
 async def limits(node: Node) -> tuple[float, float]:
-    """Lowest and highest position, rad, as the device itself has them; read once."""
+    """Lowest and highest position (rad) in the settings of the servo; read once."""
     if node.limits is None:
         found = await read(node, "min_position", "max_position")
         node.limits = found["min_position"], found["max_position"]
     return node.limits
 
 
-async def telemetry(node: Node) -> State:
-    """One sample: position (rad), temperature (°C), moving, alarm."""
-    here = await position(node)
-    at = node.at
-    others = await read(node, "moving", "present_temperature")
-    return State(
-        at=at,
-        position=here,
-        temperature=others["present_temperature"],
-        moving=bool(others["moving"]),
-        alarm=node.alarm,
-    )
+async def setpoint(node: Node, raw: int) -> Setpoint:
+    """What a goal asks of the servo, with its limits; the gate checks it."""
+    return Setpoint(node.node, "position", float(GOAL.to_value(raw)), *await limits(node))
 
 
-def health(node: Node) -> Request[Health]:
-    """Whether its torque is on, and its alarms: what is asked again and again while it is led, so one exchange."""
-    row = TABLE["torque_enable"]
-
-    def take(data: bytes) -> Health:
-        return Health(State(at=node.at, alarm=node.alarm), torque=row.decode(data[-row.size :]) == 1)
-
-    return exchange(node, wire.Command.READ, row.address, row.subindex or 0, take=take)
-
-
-def stop_all(nodes: tuple[int, ...]) -> Stop:
-    """What an emergency stop sends: everyone at once, then each known node until it acknowledges."""
-    everyone = Request[Response](
-        wire.encode_request(wire.EVERYONE, wire.Command.STOP), priority=Priority.STOP, effect=Effect.MOTION
-    )
-    each = [_plain(stop(Node(node))) for node in nodes]
-    return Stop(
-        (everyone, *each),
-        "each node that acknowledged brakes and then holds where it came to rest; its torque stays as it was",
-    )
+def to_goal(node: Node, to: float) -> int:
+    """The raw goal of a position (rad). Raises LimitExceeded for a position that no servo can have."""
+    raw = GOAL.to_raw(to) if math.isfinite(to) else GOAL.high + 1
+    if not GOAL.low <= raw <= GOAL.high:
+        raise LimitExceeded(
+            f"node {node.node}: {to} is no position", advice="give a number in rad", node=node.node
+        )
+    return raw
 
 
-def _plain(one: Request[None]) -> Request[Response]:
-    """The same exchange without a reading of its answer: an alarm must not count as a missing acknowledgement."""
-    return Request(
-        one.wire, one.expected, lane=one.lane, priority=one.priority, effect=one.effect, repeatable=True
-    )
+async def enable_torque(node: Node) -> None:
+    """Torque on without a jump: the goal becomes the present position first."""
+    here = await read_row(node, PRESENT)
+    await write_row(node, GOAL, here, await setpoint(node, here))
+    await write_row(node, TORQUE, 1)
+
+
+async def move(node: Node, to: float, *, wait: bool = True) -> None:
+    """Move to `to` rad and return in position, at once with `wait=False`.
+
+    Raises LimitExceeded for a goal outside the limits, Stalled when the servo stops elsewhere.
+    """
+    raw = to_goal(node, to)
+    await write_row(node, GOAL, raw, await setpoint(node, raw))
+
+    if wait:
+        await wait_in_position(
+            lambda: telemetry(node), to, node=node.node, tolerance=0.01, timeout=lambda way: 5.0 + 2.0 * way
+        )
+
+
+async def open_stream(nodes: Sequence[Node], *, rate: int) -> PositionStream[Node]:
+    """These servos for a control loop. Reads their limits and writes nothing."""
+    known = {node: await limits(node) for node in nodes}
+
+    def goal(node: Node, to: float, precondition: Precondition) -> Request[None]:
+        raw = to_goal(node, to)
+        setpoint = Setpoint(node.node, "position", float(GOAL.to_value(raw)), *known[node])
+        return write_row(node, GOAL, raw, setpoint, precondition=precondition)
+
+    async def start(node: Node, speed: float | None) -> None:
+        await enable_torque(node)  # the servo has no setting for a speed
+
+    positions = [read_positions(node.node, position(node)) for node in nodes]
+    return PositionStream(nodes, positions, goal, start, lambda node: node.limits != known[node])
+
+
+# -- the bus -------------------------------------------------------------------------------------------------
+
+_AXIS: Final = AxisDriver(
+    state=telemetry,
+    position=position,
+    health=health,
+    enable_torque=enable_torque,
+    disable_torque=disable_torque,
+    move=move,
+    stop=stop,
+    limits=limits,
+    stream=open_stream,
+)
+
+
+class MetronomeDriver(HalfDuplexSerial):
+    """Metronomes on one open bus; see `core.family.BusDriver`."""
+
+    ids = protocol.IDS
+    longest_reply = protocol.OVERHEAD + protocol.MOST_DATA
+
+    def receiver(self) -> Receiver:
+        return protocol.receiver()
+
+    def probe(self, node: int, attempt: int) -> Request[bool]:
+        return probe(Node(node), attempt)
+
+    def stop(self, nodes: Mapping[int, Response | None]) -> Stop:
+        frame = protocol.encode_request(protocol.BROADCAST, Command.STOP)
+        everyone = Request[Response](frame, priority=Priority.STOP, effect=Effect.MOTION)
+        each = [stop(Node(node)).with_decoder(lambda response: response) for node in nodes]
+        return Stop(
+            (everyone, *each), "each servo that acknowledged brakes and then holds; torque stays as it was"
+        )
+
+    async def identify(self, node: int) -> Identity:
+        return await identify(Node(node))
+
+    def axis(self, model: str) -> AxisDriver:
+        return _AXIS if model == "metronome" else AxisDriver()
+
+    def decode(self, data: bytes) -> list[Explanation]:
+        return protocol.decode(data)

@@ -1,225 +1,130 @@
-"""SIMULATOR: how a real one behaves. Here belong memory, physics and timing, as seen from the wire.
-
-Time comes in as an argument; nothing here waits, ticks or knows the driver. What two sources tell differently of
-the real device becomes a named switch with a default. `nodes[id].memory` shows the raw value of every row as a
-host would read it, so that tests can compare.
-"""
+"""Simulated Metronomes, byte-exact on the wire. They have no clock: time (s) is an argument."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import count
-from math import inf
 from typing import Final
 
 from motorbus.core import plant
-from motorbus.core.can_frame import CanFrame
-from motorbus.core.register import Register, Storage
-from motorbus.core.request import Data
+from motorbus.core.register import Storage
+from motorbus.core.simulated import PoweredDevice, SerialLine
 from motorbus.errors import RequestError
 
-from . import wire
-from .table import COUNT, TABLE
+from . import protocol
+from .protocol import Command
+from .registers import COUNT, END, TABLE
 
 RATE: Final = 500_000
-"""bit/s; what those of the first year have (250 kbit/s) is not simulated."""
-THINKS: Final = 0.0003
-"""s from the end of a request to the beginning of the answer."""
-STORES: Final = 0.004
-"""s more when EEPROM is written."""
+REPLY_DELAY: Final = 0.0003
+"""s from the end of a request to the start of its reply. # assumption"""
+STORE_TIME: Final = 0.004
+"""s longer for a setting. # assumption"""
+SPEED: Final = 6.0 / COUNT
+"""counts/s. # assumption"""
 ACCELERATION: Final = 40.0 / COUNT
-"""counts/s²."""
+"""counts/s². # assumption"""
 HOT: Final = 80
-"""°C above which the temperature alarm is set."""
+"""°C above which the alarm is set. # assumption"""
 
 
-class Servo:
-    """One Metronome: its memory, its shaft, and what a request does to them.
+class Servo(PoweredDevice):
+    """One servo. `memory[name]` is the raw value of a register at this moment; a test may set `temperature` (°C)."""
 
-    `temperature` (°C) may be set by a test. `memory[name]` is the raw value of a row at this moment.
-    """
-
-    def __init__(self, bus: Metronomes, node_id: int, temperature: float) -> None:
-        self.bus = bus
-        self.temperature = temperature
-        self.plugged = True
-        self._values = {row.name: row.default or 0 for row in TABLE.values()} | {"node_id": node_id}
-        self.node_id = node_id
-        self.motion = plant.rest(0.0, 0.0)
-        self.reported_at = inf
+    def __init__(self, bus: Metronomes, id: int) -> None:
+        self.temperature = 25.0
+        self.id = id
+        self._bus = bus
+        self._values = {row.name: row.default or 0 for row in TABLE.values()} | {"node_id": id}
+        self._motion = plant.rest(0.0, 0.0)
 
     @property
     def memory(self) -> Mapping[str, int]:
-        """The raw value of every row, as a host would read it at this moment."""
-        now = self.bus.now
-        return {
-            **self._values,
-            "present_position": round(self.motion.position(now)),
-            "moving": int(self.motion.moving(now)),
-            "present_temperature": round(self.temperature),
+        now = self._bus.now
+        return self._values | {
+            "present_position": round(self._motion.position(now)),
+            "moving": int(self._motion.moving(now)),
+            "temperature": round(self.temperature),
         }
 
-    # -- what a test or a control socket does to it ---------------------------------------------------------
+    def power_off(self) -> None:
+        self._release(self._bus.now)
 
-    def unplug(self) -> None:
-        """Pull its cable: bus and supply."""
-        self._let_go(self.bus.now)
-        self.plugged = False
-
-    def plug(self) -> None:
-        """Put its cable back: it powers up."""
-        if not self.plugged:
-            self.plugged = True
-            self.power_cycle()
-
-    def power_cycle(self) -> None:
-        """RAM is as shipped afterwards, EEPROM as it was stored; the shaft stays where it is."""
-        self._let_go(self.bus.now)
+    def power_on(self) -> None:
         self._values |= {row.name: row.default or 0 for row in TABLE.values() if row.storage is Storage.RAM}
-        self.node_id = self._values["node_id"]
+        self.id = self._values["node_id"]
 
     def status(self) -> dict[str, object]:
-        """How it is, as plain data."""
         return {"plugged": self.plugged, **self.memory}
 
-    # -- what a request does --------------------------------------------------------------------------------
+    def reply(self, command: int, operands: bytes, at: float) -> tuple[float, bytes]:
+        """Carry out a request; return the delay (s) and the reply."""
+        status, data, delay = 5, b"", REPLY_DELAY
+        if command == Command.STOP:
+            status = 0
+            self._move(at, 0.0)
+        elif command == Command.READ and len(operands) == 2:
+            start, end = operands[0], operands[0] + operands[1]
+            status, data = (0, self._image()[start:end]) if start < end <= END else (1, b"")
+        elif command == Command.WRITE and operands:
+            status = self._write(operands[0], operands[1:], at)
+            row = TABLE.at(operands[0])
+            if row is not None and row.storage is Storage.EEPROM and not status:
+                delay += STORE_TIME
+        alarm = 1 << 4 if self.temperature > HOT else 0
+        return delay, protocol.encode_reply(self.id, alarm | status, data)
 
-    def obey(self, request: wire.Message, at: float) -> tuple[int, bytes, float]:
-        """Status and value of the answer, and how much later than usual it comes (s)."""
-        if request.command == wire.Command.STOP:
-            self._go(at, 0.0, self.motion.velocity(at))
-            return self._alarms, b"", 0.0
-        if request.command == wire.Command.READ and request.object == wire.PROOF:
-            return self._alarms, bytes((~request.subindex & 0xFF,)), 0.0
-        row = TABLE.at(request.object, request.subindex)
-        if row is None or not row.readable:
-            return self._alarms | 1, b"", 0.0
-        if request.command == wire.Command.READ:
-            return self._alarms, self._code(row), 0.0
-        if request.command != wire.Command.WRITE:
-            return self._alarms | 5, b"", 0.0
-        refusal = self._write(row, row.decode(request.value[-row.size :]), at)
-        slow = STORES if row.storage is Storage.EEPROM and not refusal else 0.0
-        return self._alarms | refusal, b"", slow
+    def _image(self) -> bytes:
+        memory = self.memory
+        return b"".join(row.encode(memory[row.name]) for row in TABLE.values())
 
-    @property
-    def _alarms(self) -> int:
-        return 1 << 4 if self.temperature > HOT else 0
-
-    def _code(self, row: Register) -> bytes:
-        return (self.memory[row.name] % (1 << 8 * row.size)).to_bytes(row.size, "big")
-
-    def _write(self, row: Register, raw: int, at: float) -> int:
-        values = self._values
+    def _write(self, address: int, data: bytes, at: float) -> int:
+        row, values = TABLE.at(address), self._values
+        if row is None or row.size != len(data):
+            return 1
         if not row.writable:
             return 2
-        goes_beyond = row.name == "goal_position" and not (
-            values["min_position"] <= raw <= values["max_position"]
-        )
-        if not row.low <= raw <= row.high or goes_beyond:
+        raw, low, high = row.decode(data), row.low, row.high
+        if row.name == "goal_position":
+            low, high = values["min_position"], values["max_position"]
+        if not low <= raw <= high:
             return 3
         if row.storage is Storage.EEPROM and values["lock"]:
             return 4
         values[row.name] = raw
         if row.name == "torque_enable" and not raw:
-            self._let_go(at)
+            self._release(at)
         elif row.name in ("goal_position", "torque_enable") and values["torque_enable"]:
-            self._go(at, values["move_velocity"] / 1000 / COUNT, self.motion.velocity(at))
+            self._move(at, SPEED)
         return 0
 
-    # -- how it moves ---------------------------------------------------------------------------------------
+    def _release(self, at: float) -> None:
+        """Friction holds the shaft at once."""
+        self._motion = plant.rest(at, self._motion.position(at))
 
-    def _let_go(self, at: float) -> None:
-        """Friction holds it at once."""
-        self.motion = plant.rest(at, self.motion.position(at))
-        self.reported_at = inf
-
-    def _go(self, at: float, speed: float, velocity: float) -> None:
-        """To the goal, or (speed 0) to a halt as soon as it can."""
-        position, goal = self.motion.position(at), float(self._values["goal_position"])
+    def _move(self, at: float, speed: float) -> None:
+        """Move to the goal; with speed 0 brake."""
+        here, velocity = self._motion.position(at), self._motion.velocity(at)
         if not speed and not velocity:
-            self._let_go(at)
+            self._release(at)
             return
-        self.motion = plant.move(
-            at, position, goal, velocity=velocity, speed=speed, acceleration=ACCELERATION
-        )
-        self.reported_at = at
-
-    def report_due(self) -> float | None:
-        """When it next says by itself where it is: in intervals while it moves, and once when it arrives."""
-        if self.reported_at == inf:
-            return None
-        interval = self._values["report_interval"] * 0.001 or inf
-        return min(self.reported_at + interval, self.motion.done_at)
-
-    def report(self, at: float) -> CanFrame:
-        """Say it."""
-        arrived = at >= self.motion.done_at
-        self.reported_at = inf if arrived else at
-        reason = wire.Reason.ARRIVED if arrived else wire.Reason.UNDER_WAY
-        position = round(self.motion.position(at))
-        return wire.encode_report(self.node_id, reason, position.to_bytes(4, "big", signed=True))
+        goal = float(self._values["goal_position"])
+        self._motion = plant.move(at, here, goal, velocity=velocity, speed=speed, acceleration=ACCELERATION)
 
 
-class Metronomes:
-    """A simulated bus with these nodes, all of one model. Raises RequestError for impossible ones."""
+class Metronomes(SerialLine[Servo]):
+    """A simulated bus with these servos. Raises RequestError for impossible ids or another model."""
 
-    def __init__(self, ids: tuple[int, ...], model: str = "", temperature: object = 25.0) -> None:
+    def __init__(self, ids: tuple[int, ...], model: str = "") -> None:
         if model not in ("", "metronome"):
             raise RequestError(f"there is no simulated {model!r}", expected="metronome")
-        if not ids or not set(ids) <= set(wire.NODES):
+        if not ids or not set(ids) <= set(protocol.IDS):
             raise RequestError(f"ids {ids} cannot be simulated", expected="one or more of 1 to 63")
-        self.now = 0.0
-        self.rate = 0
-        self._nodes = {node: Servo(self, node, float(str(temperature))) for node in ids}
-        self._outgoing: list[tuple[float, int, CanFrame]] = []
-        self._order = count()
+        servos = {id: Servo(self, id) for id in ids}
+        super().__init__(servos, RATE, protocol.parser(protocol.REQUEST))
 
-    @property
-    def nodes(self) -> Mapping[int, Servo]:
-        """The servos by the id they were made with."""
-        return self._nodes
-
-    def tune(self, rate: int) -> None:
-        """The host's rate; at another one than `RATE` they neither hear nor are heard."""
-        self.rate = rate
-
-    def receive(self, data: Data, at: float) -> None:
-        """A frame of the host has arrived."""
-        self.now = max(self.now, at)
-        if not isinstance(data, CanFrame) or self.rate != RATE:
-            return
-        request = wire.decode_request(data)
-        if request is None:
-            return
-        for servo in self._nodes.values():
-            if servo.plugged and request.node in (servo.node_id, wire.EVERYONE):
-                status, value, later = servo.obey(request, at)
-                if request.node != wire.EVERYONE:
-                    self._say(at + THINKS + later, wire.encode_answer(request, status, value))
-
-    def advance(self, to: float) -> list[tuple[float, Data]]:
-        """Every frame that a servo begins to send up to this moment, in order."""
-        while (moment := self._report_due()) is not None and moment <= to:
-            self.now = max(self.now, moment)
-            for servo in self._nodes.values():
-                if servo.report_due() == moment:
-                    self._say(moment, servo.report(moment))
-        self.now = max(self.now, to)
-        self._outgoing.sort()
-        said: list[tuple[float, Data]] = [(when, frame) for when, _, frame in self._outgoing if when <= to]
-        del self._outgoing[: len(said)]
-        return said
-
-    def due(self) -> float | None:
-        """When the next frame begins, or None."""
-        moments = [when for when, _, _ in self._outgoing]
-        report = self._report_due()
-        return min(moments if report is None else [*moments, report], default=None)
-
-    def _report_due(self) -> float | None:
-        dues = [servo.report_due() for servo in self._nodes.values() if servo.plugged]
-        return min((due for due in dues if due is not None), default=None)
-
-    def _say(self, when: float, frame: CanFrame) -> None:
-        self._outgoing.append((when, next(self._order), frame))
+    def carry_out(self, frame: bytes, at: float) -> None:
+        for servo in self.nodes.values():
+            if servo.plugged and frame[2] in (servo.id, protocol.BROADCAST):
+                delay, reply = servo.reply(frame[4], frame[5:-2], at)
+                if frame[2] != protocol.BROADCAST:
+                    self.send(at + delay, reply)

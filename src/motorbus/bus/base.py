@@ -21,7 +21,7 @@ from motorbus.bus.stop_socket import StopOutcome, asked_by
 from motorbus.bus.tasks import Notify, TaskTree
 from motorbus.bus.trace import TraceRecord
 from motorbus.bus.turn import Turn
-from motorbus.core.family import Family, IdChanged
+from motorbus.core.family import BusDriver, Family, IdChanged
 from motorbus.core.request import Data, Priority, Request
 from motorbus.core.steps import JournalEntry, Runnable
 from motorbus.errors import LinkError, LinkLost, MotorbusError, RequestError
@@ -33,7 +33,7 @@ IDLE = 0.25
 
 
 class BaseBus:
-    """An open bus: one link, one family, one engine.
+    """An open bus: one link, one driver, one engine.
 
     `interlock` judges requests that move a motor or switch torque; without it they are refused. `report` gets the
     events of procedures. `journal` gets the journal entries first. `stop_socket` is where another process can request
@@ -43,7 +43,7 @@ class BaseBus:
     def __init__(
         self,
         link: Link,
-        family: Family,
+        driver: BusDriver,
         *,
         interlock: Interlock | None = None,
         report: Notify | None = None,
@@ -51,13 +51,13 @@ class BaseBus:
         stop_socket: Path | None = None,
     ) -> None:
         self.link = link
-        self.family = family
+        self.driver = driver
         self.report = report
         self.journal = journal
         self.on_id_change: Callable[[IdChanged], None] | None = None
         self.warnings: tuple[str, ...] = tuple(link.warnings)
         self.engine = Engine(
-            family,
+            driver,
             rate=link.rate,
             latency=link.latency,
             paced=link.paced,
@@ -85,6 +85,11 @@ class BaseBus:
         """Procedures that are stepped whenever the bus is used; see `BackgroundTask`."""
         if stop_socket is not None:
             self.stopper.start()
+
+    @property
+    def family(self) -> Family:
+        """The family of the devices."""
+        return self.driver.family
 
     @property
     def interlock(self) -> Interlock | None:

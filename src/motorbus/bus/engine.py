@@ -26,7 +26,7 @@ from motorbus.bus.prepared import Prepared, nodes_of
 from motorbus.bus.statistics import Statistics
 from motorbus.bus.sync import SyncTable
 from motorbus.bus.trace import Feed, TraceRecord
-from motorbus.core.family import Family
+from motorbus.core.family import BusDriver
 from motorbus.core.request import (
     ANY,
     EVERY_LANE,
@@ -64,7 +64,7 @@ class Engine:
 
     def __init__(
         self,
-        family: Family,
+        driver: BusDriver,
         *,
         rate: int,
         latency: float = 0.0,
@@ -72,8 +72,8 @@ class Engine:
         listen_only: bool = False,
         interlock: Interlock | None = None,
     ) -> None:
-        self.family = family
-        self.window = family.link.window
+        self.driver = driver
+        self.window = driver.window
         self.paced = paced
         self.interlock = interlock
         self.before_motion: Callable[[], None] | None = None
@@ -83,10 +83,10 @@ class Engine:
         self.trace: Feed[TraceRecord] = Feed()
         self.notices: Feed[Notification] = Feed()
         self.statistics = Statistics()
-        self.sync = SyncTable(family)
+        self.sync = SyncTable(driver)
         self.echo = Echo()
-        self.receiver = family.receiver()
-        self.positions = LastPositions(family, rate)
+        self.receiver = driver.receiver()
+        self.positions = LastPositions(driver, rate)
         self.in_flight: dict[int, Attempt] = {}
         self.queue: list[Job] = []
         self.notification_handlers: list[Callable[[Notification], None]] = []
@@ -114,11 +114,11 @@ class Engine:
     @property
     def quiet_time(self) -> float:
         """s of silence before a node out of sync is probed."""
-        return self.family.quiet_time(self.rate)
+        return self.driver.quiet_time(self.rate)
 
     def air_time(self, request: Request[Any]) -> float:
         """s on the wire of this request and its replies."""
-        return self.family.air_time(request, self.rate)
+        return self.driver.air_time(request, self.rate)
 
     def reply_timeout(self, request: Request[Any]) -> float:
         """s from the end of the air time to the deadline.
@@ -127,8 +127,8 @@ class Engine:
         """
         if request.reply_within is TimeoutClass.SCAN and self.latency < DIRECT:
             plain: Request[Response] = Request(request.wire, request.expected)
-            return min(self.family.turnaround(plain), self.family.turnaround(request)) + self.latency
-        return self.family.turnaround(request) + self.latency + MARGIN[request.reply_within]
+            return min(self.driver.turnaround(plain), self.driver.turnaround(request)) + self.latency
+        return self.driver.turnaround(request) + self.latency + MARGIN[request.reply_within]
 
     @property
     def idle(self) -> bool:
@@ -397,7 +397,7 @@ class Engine:
         if error is None and job.tune.rate:
             self.rate = job.tune.rate
             self.listening = job.tune.listen_only or self.always_listening
-            self.receiver = self.family.receiver()
+            self.receiver = self.driver.receiver()
         job.settle(before, error)
 
     def alternate(self, request: Request[Any]) -> Request[Any]:
@@ -699,7 +699,7 @@ class Engine:
 
     def _remaining(self, attempt: Attempt, now: float) -> float:
         """s that a stop waits at most: the whole air time on a half-duplex line, else the rest of the request."""
-        if not self.family.link.both_ways:
+        if not self.driver.full_duplex:
             return self.air_time(attempt.request)
         request: Request[Response] = Request(attempt.request.wire)
         return max(0.0, attempt.sent_at + self.air_time(request) - now)
@@ -740,7 +740,7 @@ class Engine:
     def reconnected(self, now: float, latency: float) -> None:
         """The port is open again: all nodes are out of sync and their positions unknown; the nodes stay known."""
         self.latency = latency
-        self.receiver = self.family.receiver()
+        self.receiver = self.driver.receiver()
         self.echo.reset()
         self.sync.mark_all(now + self.quiet_time)
         self.positions.forget()

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from motorbus.bus.jobs import StopCounts
 from motorbus.bus.prepared import Prepared
-from motorbus.core.family import Family, Stop
+from motorbus.core.family import BusDriver, Stop
 from motorbus.core.request import ANY, Effect, Expected, Priority, Request, Response
 from motorbus.core.setpoint import Setpoint, Stays
 
@@ -34,8 +34,8 @@ class LastPositions(Mapping[int, Reading]):
     them at any time.
     """
 
-    def __init__(self, family: Family, rate: int) -> None:
-        self.family = family
+    def __init__(self, driver: BusDriver, rate: int) -> None:
+        self.driver = driver
         self.rate = rate
         self.nodes: frozenset[int] = frozenset()
         self.orders = self.stop_total = 0
@@ -134,9 +134,9 @@ class LastPositions(Mapping[int, Reading]):
     def frames(self, now: float) -> Stop:
         """Requests that stop all known nodes; without positions where the family fails to use them."""
         try:
-            return self.family.stop(self.fresh(now))
+            return self.driver.stop(self.fresh(now))
         except Exception:  # the stop must go out
-            return self.family.stop(dict.fromkeys(sorted(self.nodes)))
+            return self.driver.stop(dict.fromkeys(sorted(self.nodes)))
 
     def accept(self, request: Request[Any], answer: Response) -> None:
         """This request was answered and not refused: nodes that it stops have accepted a stop."""
@@ -170,7 +170,7 @@ class LastPositions(Mapping[int, Reading]):
 
     def _stop_reply_count(self, node: int) -> int:
         """Number of different replies that this node gives to the requests of a stop."""
-        requests = self.family.stop(dict.fromkeys(sorted(self.nodes))).requests
+        requests = self.driver.stop(dict.fromkeys(sorted(self.nodes))).requests
         gated = [one.expected for one in requests if one.effect in GATED and one.expected is not ANY]
         return max(1, len({due for dues in gated for due in dues if due.node == node}))
 

@@ -72,6 +72,6 @@ def _frames_for(
     """The requests that stop these nodes as things are now."""
     fresh = engine.positions.fresh(now)
     try:
-        return engine.family.stop({node: fresh.get(node) for node in nodes}).requests
+        return engine.driver.stop({node: fresh.get(node) for node in nodes}).requests
     except Exception:  # the stop must go out
         return before

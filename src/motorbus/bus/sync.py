@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any, Final, TypeAlias
 
-from motorbus.core.family import Family
+from motorbus.core.family import BusDriver
 from motorbus.core.request import ANY, Expected, Key, Request
 
 PROBES: Final = 64
@@ -50,8 +50,8 @@ class NodeSync:
 class SyncTable:
     """All nodes of a bus that were asked something; `out_of_sync` are the numbers of those not in sync."""
 
-    def __init__(self, family: Family) -> None:
-        self.family = family
+    def __init__(self, driver: BusDriver) -> None:
+        self.driver = driver
         self.nodes: dict[int, NodeSync] = {}
         self.out_of_sync: set[int] = set()
 
@@ -120,7 +120,7 @@ class SyncTable:
         owed: dict[Kind, Request[bool]] = {}
         first: Request[bool] | None = None
         for _ in range(PROBES):
-            probe = self.family.probe(number, node.probes)
+            probe = self.driver.probe(number, node.probes)
             first = first or probe
             if owed and probe.wire == first.wire:  # all probes of the family were compared
                 break

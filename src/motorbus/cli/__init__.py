@@ -1,8 +1,8 @@
 """The shell's face: thin commands that parse, ask, call the floors below and print. No logic of their own.
 
 One file per command, file name = command name, each loaded when it is called, so that `--help`, `--version` and
-completion import no family, no serial port and no plotting. What only one family has lives in a module, or a package,
-of that family's name.
+completion import no family, no serial port and no plotting. The commands of one family are in the module that
+`Family.cli` names.
 """
 
 from __future__ import annotations
@@ -92,6 +92,7 @@ def build() -> App:
         help_format="plaintext",
         help_epilogue=_EPILOGUE,
         default_parameter=Parameter(show_default=_default_shown),
+        group_arguments=Group.create_default_parameters(),
         suppress_keyboard_interrupt=False,
     )
     for group, commands in _COMMANDS.items():
@@ -100,7 +101,7 @@ def build() -> App:
             app.command(f"motorbus.cli.{file}:app", name=name, help=line, group=group)
     for name in faces.names():
         line = f"What only {name} devices can do."
-        app.command(f"motorbus.cli.{name}:app", name=name, help=line, group=_FAMILIES)
+        app.command(f"motorbus.cli.faces:{name}", name=name, help=line, group=_FAMILIES)
     app["--help"].group = app["--version"].group = _PROGRAM
     app.register_install_completion_command(help="Install completion for this shell.", group=_PROGRAM)
     return app
@@ -257,11 +258,11 @@ def _launch(app: App, words: Sequence[str], output: Output) -> int:
         Parameters
         ----------
         as_json
-            One JSON document on stdout instead of tables; JSON Lines for streams.
+            One JSON document on stdout; JSON Lines for streams.
         verbose
             Say on stderr what happens; -vv says more.
         file
-            The machine file by whose names things are called, before $MOTORBUS_MACHINE, ./motorbus.toml and your own.
+            Machine file, before $MOTORBUS_MACHINE and ./motorbus.toml.
         """
         output.json = as_json
         _refuse_rehearsal(app, words)

@@ -18,7 +18,7 @@ from motorbus.errors import RequestError
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from motorbus.core.family import Family
+    from motorbus.core.family import BusDriver, Family
     from motorbus.diagnose.budget import Budget, Span, Traffic, Transfer
 
 app = App(
@@ -126,8 +126,8 @@ def _to_the_bit(
     nodes = bus_loads.nodes(wanted, ids)
     opening = session.prepare(wanted.bus, {**said(options)})
     bitrate = opening.rate or opening.family.link.rate
-    besides = _reports(opening.family, nodes, units.parse(reports, "time")) if reports else []
-    cycle = _cycle(opening.family, nodes, loop)
+    besides = _reports(opening.driver, nodes, units.parse(reports, "time")) if reports else []
+    cycle = _cycle(opening.driver, nodes, loop)
     found = count(cycle, bitrate, loop_rate=rate, besides=besides, **times)
     _show(wanted.bus, nodes, found, output)
     return Exit.OK if found.fits() else Exit.FAILURE
@@ -142,26 +142,26 @@ def _offered(family: Family, what: str) -> Any:
     return found
 
 
-def _cycle(family: Family, nodes: Sequence[int], loop: Loop) -> list[Transfer]:
+def _cycle(driver: BusDriver, nodes: Sequence[int], loop: Loop) -> list[Transfer]:
     from motorbus.diagnose.budget import Transfer
 
-    frames = _offered(family, "budget_frames")
+    frames = _offered(driver.family, "budget_frames")
     names = loop.split("-")
     return [
         Transfer(node, found, f"{name} position")
         for node in nodes
-        for name, found in frames(family, node).items()
+        for name, found in frames(driver, node).items()
         if name in names
     ]
 
 
-def _reports(family: Family, nodes: Sequence[int], interval: float) -> list[Traffic]:
+def _reports(driver: BusDriver, nodes: Sequence[int], interval: float) -> list[Traffic]:
     from motorbus.diagnose.budget import Traffic
 
     if not interval > 0:
         raise RequestError("--reports must be a time above 0", expected="as 10ms")
-    frames = _offered(family, "report_frames")
-    return [Traffic(frames(family, node), 1 / interval, f"reports of {node}") for node in nodes]
+    frames = _offered(driver.family, "report_frames")
+    return [Traffic(frames(driver, node), 1 / interval, f"reports of {node}") for node in nodes]
 
 
 def _span(span: Span) -> dict[str, float]:

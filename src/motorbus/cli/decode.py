@@ -25,7 +25,7 @@ from motorbus.recorder.files import from_hex, read_bytes
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from motorbus.core.family import Family
+    from motorbus.core.family import BusDriver, Family
     from motorbus.recorder.can_log import Logged
 
 MOST = 1 << 25
@@ -86,7 +86,7 @@ def decode(
     options
         How such a bus is spoken to, as --profile xqpower.
     """
-    found = _spoken(families.load(family), options)
+    found = _open(families.load(family), options)
     if file is not None and data:
         raise RequestError("bytes and --file: one of them", advice="decode them one after the other")
     if direction is not None and not summary:
@@ -97,17 +97,17 @@ def decode(
         return _file(file, found, output)
     if data:
         return _bytes_or_frames(data, found, output)
-    first = sys.stdin.readline(can_log.LONGEST) if found.link.kind == "frames" else ""
+    first = sys.stdin.readline(can_log.LONGEST) if found.family.link.kind == "frames" else ""
     if can_log.looks_like_can(first):
         lines = chain([first], can_log.lines_of(sys.stdin))
         return _stream(_on_can(found, can_log.read_lines(lines)), found, output)
-    return _document(found.explain(_bytes(first + _piped())), found, output)
+    return _document(found.decode(_bytes(first + _piped())), found, output)
 
 
-def _file(file: Path, family: Family, output: Output) -> Exit:
-    if _is_serial(file, family):
-        return _told(((one, {}, None) for one in family.explain(_serial(file))), family, output)
-    return _stream(_on_can(family, _recorded(file)), family, output)
+def _file(file: Path, driver: BusDriver, output: Output) -> Exit:
+    if _is_serial(file, driver):
+        return _told(((one, {}, None) for one in driver.decode(_serial(file))), driver, output)
+    return _stream(_on_can(driver, _recorded(file)), driver, output)
 
 
 def _piped() -> str:
@@ -120,8 +120,8 @@ def _piped() -> str:
     return text
 
 
-def _is_serial(file: Path, family: Family) -> bool:
-    return family.link.kind == "bytes" and not can_log.is_log(file)
+def _is_serial(file: Path, driver: BusDriver) -> bool:
+    return driver.family.link.kind == "bytes" and not can_log.is_log(file)
 
 
 def _serial(file: Path) -> bytes:
@@ -129,22 +129,26 @@ def _serial(file: Path) -> bytes:
         return read_bytes(file)
 
 
-def _summary(data: Sequence[str], file: Path | None, family: Family, direction: str, output: Output) -> Exit:
+def _summary(
+    data: Sequence[str], file: Path | None, driver: BusDriver, direction: str, output: Output
+) -> Exit:
     from motorbus.cli.counted import summary
 
-    if file is not None and _is_serial(file, family):
-        return summary(family, _serial(file), direction, output)
-    if family.link.kind == "bytes" and file is None:
-        return summary(family, _bytes(" ".join(data) or _piped()), direction, output)
+    if file is not None and _is_serial(file, driver):
+        return summary(driver.family, _serial(file), direction, output)
+    if driver.family.link.kind == "bytes" and file is None:
+        return summary(driver.family, _bytes(" ".join(data) or _piped()), direction, output)
     if file is not None:
         logged = _recorded(file)
     elif data:
         logged = _typed(data)
     else:
         logged = can_log.read_lines(_words(can_log.lines_of(sys.stdin)))
-    found = list(_on_can(family, logged))
+    found = list(_on_can(driver, logged))
     damaged = [one for one in found if one.line]
-    return summary(family, [_classic(one) for one in found if not one.line], direction, output, damaged)
+    return summary(
+        driver.family, [_classic(one) for one in found if not one.line], direction, output, damaged
+    )
 
 
 def _classic(one: Logged) -> CanFrame:
@@ -157,20 +161,20 @@ def _recorded(file: Path) -> Iterator[Logged]:
         yield from can_log.read_log(file)
 
 
-def _spoken(family: Family, options: Mapping[str, str]) -> Family:
+def _open(family: Family, options: Mapping[str, str]) -> BusDriver:
     settings = said(options)
     known = {option.name for option in family.link.settings}
     if unknown := sorted(settings.keys() - known):
         there = ", ".join(f"--{name.replace('_', '-')}" for name in sorted(known)) or "none"
         raise RequestError(f"--{unknown[0]}: {family.name} has no such option", expected=there)
-    return family.configured(**settings)
+    return family.open(**settings)
 
 
-def _bytes_or_frames(texts: Sequence[str], family: Family, output: Output) -> Exit:
+def _bytes_or_frames(texts: Sequence[str], driver: BusDriver, output: Output) -> Exit:
     if not can_log.looks_like_can(" ".join(texts)):
-        return _document(family.explain(_bytes(" ".join(texts))), family, output)
-    frames = [_explained(one, family) for one in list(_on_can(family, _typed(texts)))]
-    return _document(list(chain.from_iterable(frames)), family, output)
+        return _document(driver.decode(_bytes(" ".join(texts))), driver, output)
+    frames = [_explained(one, driver) for one in list(_on_can(driver, _typed(texts)))]
+    return _document(list(chain.from_iterable(frames)), driver, output)
 
 
 def _typed(texts: Sequence[str]) -> Iterator[Logged]:
@@ -183,20 +187,21 @@ def _words(texts: Iterable[str]) -> Iterator[str]:
     return chain.from_iterable([text] if set("([") & set(text) else text.split() for text in texts)
 
 
-def _on_can(family: Family, logged: Iterable[Logged]) -> Iterable[Logged]:
-    if family.link.kind != "frames":
+def _on_can(driver: BusDriver, logged: Iterable[Logged]) -> Iterable[Logged]:
+    if driver.family.link.kind != "frames":
         raise RequestError(
-            f"{family.name} devices are on no CAN bus", expected="bytes in hexadecimal, as FF FF 01 02 01 FB"
+            f"{driver.family.name} devices are on no CAN bus",
+            expected="bytes in hexadecimal, as FF FF 01 02 01 FB",
         )
     return logged
 
 
-def _explained(one: Logged, family: Family) -> list[Explanation]:
+def _explained(one: Logged, driver: BusDriver) -> list[Explanation]:
     if one.line:
         return [Explanation(b"", f"line {one.line}", (), one.fault)]
     if one.frame is None:
         return [Explanation(b"", f"CAN frame {one.text}", (), one.fault)]
-    return family.explain(one.frame.flat())
+    return driver.decode(one.frame.flat())
 
 
 def _bytes(text: str) -> bytes:
@@ -206,42 +211,44 @@ def _bytes(text: str) -> bytes:
     return found
 
 
-def _document(explained: list[Explanation], family: Family, output: Output) -> Exit:
-    frames = [_facts(one, family) for one in explained]
-    output.document("motorbus.decode/1", {"family": family.name, "frames": frames})
+def _document(explained: list[Explanation], driver: BusDriver, output: Output) -> Exit:
+    frames = [_facts(one, driver) for one in explained]
+    output.document("motorbus.decode/1", {"family": driver.family.name, "frames": frames})
     for one in explained:
-        _show(one, family, output)
+        _show(one, driver, output)
     return Exit.FAILURE if any(one.fault for one in explained) else Exit.OK
 
 
-def _stream(logged: Iterable[Logged], family: Family, output: Output) -> Exit:
+def _stream(logged: Iterable[Logged], driver: BusDriver, output: Output) -> Exit:
     """Each frame as soon as it is read, with the time and the direction that were noted with it."""
     return _told(
         (
             (one, {"time": recorded.at, "relative": recorded.relative, "direction": recorded.direction or None},
              _when(recorded))
             for recorded in logged
-            for one in _explained(recorded, family)
+            for one in _explained(recorded, driver)
         ),
-        family,
+        driver,
         output,
     )  # fmt: skip
 
 
 def _told(
-    explained: Iterable[tuple[Explanation, Mapping[str, object], str | None]], family: Family, output: Output
+    explained: Iterable[tuple[Explanation, Mapping[str, object], str | None]],
+    driver: BusDriver,
+    output: Output,
 ) -> Exit:
     """A recording, frame by frame, each with what was noted with it, as facts and in words."""
     bad, start = False, 0
     for one, noted, when in explained:
         bad = bad or bool(one.fault)
-        facts = {"family": family.name, "start": start, **noted, **_facts(one, family)}
+        facts = {"family": driver.family.name, "start": start, **noted, **_facts(one, driver)}
         output.document("motorbus.decode.frame/1", facts)
-        _show(one, family, output, f"at byte {start}" if when is None else when)
-        start += 1 if family.link.kind == "frames" else len(one.data)
+        _show(one, driver, output, f"at byte {start}" if when is None else when)
+        start += 1 if driver.family.link.kind == "frames" else len(one.data)
     if not start:
         raise RequestError(
-            f"there are no {family.link.kind} to decode",
+            f"there are no {driver.family.link.kind} to decode",
             expected="the bytes of a serial line, the text of candump, or a log of CAN frames",
         )
     return Exit.FAILURE if bad else Exit.OK
@@ -259,13 +266,13 @@ def _time(recorded: Logged) -> str:
     return datetime.fromtimestamp(recorded.at, UTC).isoformat(timespec="microseconds").replace("+00:00", "Z")
 
 
-def _facts(one: Explanation, family: Family) -> dict[str, object]:
+def _facts(one: Explanation, driver: BusDriver) -> dict[str, object]:
     parts = [
         {"start": part.start, "data": part.data.hex(" ").upper(), "name": part.name, "meaning": part.meaning}
         for part in one.parts
     ]
     return {
-        **frame.facts(one.data, family),
+        **frame.facts(one.data, driver.family),
         "title": one.title,
         "valid": not one.fault,
         "fault": one.fault,
@@ -273,12 +280,12 @@ def _facts(one: Explanation, family: Family) -> dict[str, object]:
     }
 
 
-def _show(one: Explanation, family: Family, output: Output, when: str = "") -> None:
+def _show(one: Explanation, driver: BusDriver, output: Output, when: str = "") -> None:
     verdict = f"BAD: {one.fault}" if one.fault else "good"
     rows: Iterable[tuple[object, ...]] = (
         (part.start, part.data.hex(" ").upper(), part.name, part.meaning) for part in one.parts
     )
-    head = [when, frame.shown(one.data, family), f"{one.title}: {verdict}"]
+    head = [when, frame.shown(one.data, driver.family), f"{one.title}: {verdict}"]
     output.text("\n".join(filter(None, head)))
     if one.parts:
         output.table("", [">byte", "data", "field", "meaning"], rows)

@@ -77,7 +77,8 @@ class DryBus:
     """
 
     def __init__(self, bus: Bus) -> None:
-        self.family = copy(bus.family)
+        self.driver = copy(bus.driver)
+        self.family = bus.family
         self.link = bus.link
         self.frames: list[bytes] = []
         self._bus = bus
@@ -184,7 +185,7 @@ class DryBus:
     def _foreseen(self, exchange: Request[Any]) -> object:
         """What it would read after what was withheld, where its family can say that."""
         foresee = faces.offer(self.family.name, "as_written")
-        data = foresee(self.family, self._read, self.frames, exchange.wire) if foresee else None
+        data = foresee(self.driver, self._read, self.frames, exchange.wire) if foresee else None
         if data == b"":
             return self._told(exchange)
         if data is None or exchange.expected is ANY or exchange.decode is None:
@@ -204,7 +205,7 @@ def _answering(exchange: Request[Any]) -> set[int]:
 
 def show(dry: DryBus, output: Output) -> None:
     """Print what was withheld, each frame explained; that there was nothing, where that is so."""
-    explained = [(one, _meaning(one)) for frame in dry.frames for one in dry.family.explain(frame)]
+    explained = [(one, _meaning(one)) for frame in dry.frames for one in dry.driver.decode(frame)]
     facts = [{**frames.facts(one.data, dry.family), "meaning": meaning} for one, meaning in explained]
     output.document("motorbus.dry-run/1", {"withheld": facts})
     if not explained:

@@ -257,7 +257,7 @@ def _meet(opening: Bus, wanted: Wanted, output: Output) -> tuple[MotorbusError |
     The error where everyone was asked and that failed: whoever is named is stopped all the same. And whether every
     device of the bus was asked.
     """
-    needs = [request.reports_position for request in opening.family.stop({ANYBODY: None}).requests]
+    needs = [request.reports_position for request in opening.driver.stop({ANYBODY: None}).requests]
     if not needs or not all(needs):
         return None, False
     _ask_where(opening, wanted.nodes)
@@ -273,7 +273,7 @@ def _meet(opening: Bus, wanted: Wanted, output: Output) -> tuple[MotorbusError |
 
 def _ask_where(opening: Bus, nodes: Iterable[int]) -> None:
     for node in nodes:
-        for request in opening.family.stop({node: None}).requests:
+        for request in opening.driver.stop({node: None}).requests:
             with suppress(MotorbusError):  # the stop itself will say who is silent
                 opening.run(request)
 
@@ -286,7 +286,7 @@ def _confirms(opening: Bus, node: int) -> bool:
 def _stop_node(opening: Bus, node: int) -> bool:
     """Send this node what its family stops it with; has it acknowledged?"""
     answers = []
-    requests = opening.family.stop({node: None}).requests
+    requests = opening.driver.stop({node: None}).requests
     for request in (one for one in requests if one.effect is not Effect.NONE):
         try:
             opening.run(request)
@@ -370,7 +370,7 @@ def _port(bus: str, options: dict[str, str]) -> str:
 
 def _count_others(facts: dict[str, Any], wanted: Wanted, *, all_known: bool) -> None:
     """Add which devices of the machine file were not asked, and what was sent to all that were not."""
-    broadcast = any(not request.expected for request in wanted.family.stop({}).requests)
+    broadcast = any(not request.expected for request in wanted.family.open().stop({}).requests)
     known = [node for axis in understood(_axes_on(wanted.bus), {}).known for node in target(axis).nodes]
     facts["not_asked"] = sorted({*known} - {*facts["acknowledged"], *facts["silent"]})
     facts["others"] = "not asked, broadcast sent" if broadcast else "not asked, no stop sent"

@@ -64,8 +64,19 @@ def agreed(
     consent_to(what, output, yes=False, rehearse=rehearse)
 
 
-def carried_out(bus: Bus, node: int, verb: str, *args: object, output: Output, **extra: object) -> Any:
-    """What the verb of this device returns; its progress as a bar, and what else it has to say as notes."""
+def carried_out(
+    bus: Bus,
+    node: int,
+    verb: str,
+    *args: object,
+    output: Output,
+    report: Any = None,
+    **extra: object,
+) -> Any:
+    """What the verb of this device returns; its progress as a bar, and what else it has to say as notes.
+
+    `report(event)` is called first for each event.
+    """
     one = face(bus, node)
     takes(one, verb, extra)
     function: Callable[..., Any] = getattr(type(one), verb).function
@@ -73,6 +84,8 @@ def carried_out(bus: Bus, node: int, verb: str, *args: object, output: Output, *
     with output.progress(verb.replace("_", " ")) as bar:
 
         def listen(event: object) -> None:
+            if report is not None:
+                report(event)
             if isinstance(event, Progress):
                 bar.advance(event.done, event.total, event.what)
             elif text := say(event):

@@ -18,6 +18,7 @@ from motorbus.cli.ports import seen
 from motorbus.cli.scan import listen
 from motorbus.cli.target import face, nobody, opened, said, target
 from motorbus.core import units
+from motorbus.core.family import AxisDriver
 from motorbus.errors import DeviceError, RequestError
 from motorbus.motion.machine import AxisSpec, BusSpec, Machine
 from motorbus.motion.machine.model import NAME
@@ -210,12 +211,12 @@ def _free(path: Path, force: bool) -> None:
 
 def _met(wanted: Wanted, output: Output) -> list[Met]:
     """Who answers on a bus and can be an axis. Raises NoReply when nobody does, DeviceError when nobody can."""
-    bus, family, nodes = wanted.target
+    bus, _, nodes = wanted.target
     answers: list[Found] = []
     with opened(bus, {}, output) as opening:
         with output.progress(f"scanning {wanted.name}") as bar:
             found = opening.run(
-                family.scan(nodes, (opening.rate,)), report=partial(listen, found=answers, bar=bar)
+                opening.driver.scan(nodes, (opening.rate,)), report=partial(listen, found=answers, bar=bar)
             )
         if not found:
             raise nobody(bus)
@@ -230,13 +231,13 @@ def _met(wanted: Wanted, output: Output) -> list[Met]:
 def _asked(bus: Bus, found: Found, output: Output) -> Met | None:
     """What an axis needs to know of a device; None, with a note, for one that cannot be an axis."""
     identity = found.identity
-    able = bus.family.axis(identity.model) if identity is not None and identity.table else {}
-    if identity is None or not able:
+    able = bus.driver.axis(identity.model) if identity is not None and identity.table else AxisDriver()
+    if identity is None or not able.names:
         what = f"{identity.model} with firmware {identity.firmware}" if identity is not None else "a device"
         output.note(f"note: #{found.node} is {what} of which nobody has said how it moves: it is left out")
         return None
-    limits = bus.run(able["limits"](face(bus, found.node))) if "limits" in able else None
-    return Met(found.node, identity, limits, frozenset(able))
+    limits = bus.run(able.limits(face(bus, found.node))) if "limits" in able else None
+    return Met(found.node, identity, limits, able.names)
 
 
 # -- the file --------------------------------------------------------------------------------------------------

@@ -167,7 +167,7 @@ def _rehearse(hand: InHand, name: str, velocity: float, how: _How, *, show: bool
     from motorbus.motion.moving.jogging import way_of_jog
 
     axis = hand.robot[name]
-    if "train" not in axis.able:
+    if "stream" not in axis.able:
         rehearse(hand, [name], lambda one: one.jog(velocity, how.span, policy=how.policy), show=show)
         return velocity * how.span
     goes, _ = way_of_jog(axis, velocity, how.span)

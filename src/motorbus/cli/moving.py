@@ -187,7 +187,7 @@ def inside(hand: InHand, present: Mapping[str, float], goals: Mapping[str, float
 
     for name, goal in goals.items():
         axis = hand.robot[name]
-        at_once = None if "train" in axis.able else present[name]
+        at_once = None if "stream" in axis.able else present[name]
         limits.check_goal(
             name, axis.spec, goal, measured=at_once, device=axis.bus.run(limits.of_device(axis))
         )

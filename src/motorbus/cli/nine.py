@@ -123,7 +123,7 @@ def found_on(robot: Robot, output: Output) -> dict[str, Found]:
         axes = {axis.spec.node: axis.name for axis in robot.axes.values() if axis.spec.bus == name}
         asked = () if bus.family.link.only else tuple(range(min(axes), max(axes) + 5))
         with output.progress(f"scanning {name}") as bar:
-            told = bus.run(bus.family.scan(asked), report=lambda event, bar=bar: scan.listen(event, [], bar))
+            told = bus.run(bus.driver.scan(asked), report=lambda event, bar=bar: scan.listen(event, [], bar))
         found |= {axes[one.node]: one for one in told if one.node in axes}
     rows = [(name, robot.axes[name].spec.device, *scan.row(one)[1:4]) for name, one in found.items()]
     output.table("Found", ["axis", "device", ">bit/s", "model", "firmware"], rows)

@@ -11,13 +11,7 @@ from motorbus.cli.output import Output
 Flag = Annotated[bool, Parameter(negative="")]
 Silent = Annotated[Output, Parameter(parse=False)]
 """Where the command prints to: given by the program, not by the user."""
-DryRun = Annotated[
-    bool,
-    Parameter(
-        negative="",
-        help="Read as usual; show the frames that would change something, and send none of those.",
-    ),
-]
+DryRun = Annotated[bool, Parameter(negative="", help="Only read; show the frames that it would send.")]
 Duration = Annotated[str, Parameter(help="In so long, as 2s; as quick as the axes may when left out.")]
 Shape = Annotated[
     Literal["trapezoid", "minimum_jerk"], Parameter(help="How each axis speeds up and slows down on its way.")

@@ -189,7 +189,7 @@ def _rows(times: Sequence[float], at: float) -> str:
 
 def _led(hand: InHand, wanted: Trajectory) -> None:
     """Raise RequestError for an axis that goes by a profile of its own, so that nobody can lead it along a file."""
-    if alone := [name for name in wanted.axes if "train" not in hand.robot[name].able]:
+    if alone := [name for name in wanted.axes if "stream" not in hand.robot[name].able]:
         raise RequestError(
             f"{', '.join(alone)}: nobody can lead such a device along a file",
             expected="axes that can be led",

@@ -122,7 +122,7 @@ def _cycles(known: Machine, families: Mapping[str, Family]) -> dict[str, float]:
     found = {}
     for name, bus in known.buses.items():
         axes = {known.axes[axis].node: axis for axis in known.axes_of(name)}
-        said = families[name].devices.assures
+        said = families[name].safety
         if axes and said is not None and said.led:
             counted = count(Wanted(bus.address, axes))
             if counted is not None:

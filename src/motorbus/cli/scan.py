@@ -83,7 +83,7 @@ def scan(
     found: list[Found] | None = None
     notes: list[str] = []
     with opened(wanted.bus, options, output) as opening:
-        operation = opening.family.scan(asked, tried or (opening.rate,))
+        operation = opening.driver.scan(asked, tried or (opening.rate,))
         tell = output.note if len(tried) > 1 else None  # it takes a while: who answers is told at once
         try:
             with output.progress("scanning") as bar:
@@ -97,12 +97,12 @@ def scan(
 
 
 def _rate_heard(wanted: Target, more: bool, options: Mapping[str, str], output: Output) -> Exit:
-    hear = faces.offer(wanted.family.name, "bit_rate_heard")
-    if hear is None or more:
+    detect = faces.offer(wanted.family.name, "detect_bit_rate")
+    if detect is None or more:
         why = "it asks nobody" if more else f"{wanted.family.name} buses have no such search"
         raise RequestError(f"--listen: {why}", expected="a CAN bus, without ids and rates")
     with opened(wanted.bus, options, output) as opening, output.progress("listening") as bar:
-        rate, told = hear(opening, SECONDS, lambda event: _heard(wanted.family.name, [], bar, [], event))
+        rate, told = detect(opening, SECONDS, lambda event: _heard(wanted.family.name, [], bar, [], event))
     heard = {str(one): what for one, what in told.items()}
     output.document("motorbus.scan.rate/1", {"bus": wanted.bus, "bitrate": rate, "heard": heard})
     output.table("", [">bit/s", "heard"], list(heard.items()))

@@ -314,7 +314,7 @@ def _switched(texts: Sequence[str]) -> dict[str, str]:
 def _sorted(family: Family, given: Mapping[str, str]) -> tuple[dict[str, str], dict[str, str]]:
     """What the simulator takes, and what belongs into the address of the bus. Some do both."""
     asked = {name.replace("-", "_"): value for name, value in given.items()}
-    options = {option.name for option in family.link.options}
+    options = {option.name for option in family.simulator_options()}
     settings = {option.name for option in family.link.settings}
     for name in asked:
         if name not in options | settings:
@@ -335,7 +335,7 @@ def _unknown(name: str, family: str, known: Iterable[str]) -> RequestError:
 
 
 def _list(family: Family, output: Output) -> Exit:
-    known = {option.name: option for option in family.link.options}
+    known = {option.name: option for option in family.simulator_options()}
     known |= {option.name: option for option in family.link.settings if option.name not in known}
     facts = [_facts(option) for option in known.values()]
     output.document("motorbus.switches/1", {"switches": facts})

@@ -62,7 +62,7 @@ def stop(
         When everyone has been told to stop, look whether each rests: three fresh readings at one place, over
         a tenth of a second, for 1 s at most.
     dry_run
-        Read as usual; show the frames that would change something, and send none of those.
+        Only read; show the frames that it would send.
     options
         Any option of the bus string, as a flag.
     """

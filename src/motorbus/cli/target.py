@@ -174,7 +174,7 @@ def takes(one: Any, verb: str, options: Iterable[str]) -> None:
 def table_of(one: Any) -> RegisterMap:
     """The register map of a device, by its own firmware. Raises DeviceError when nobody knows it."""
     identity = one.identify()
-    tables: Mapping[str, RegisterMap] = one.bus.family.tables
+    tables: Mapping[str, RegisterMap] = one.bus.family.registers
     known: RegisterMap | None = getattr(one, "table", None) or tables.get(identity.table)
     if known is None:
         raise DeviceError(
@@ -186,7 +186,7 @@ def table_of(one: Any) -> RegisterMap:
 
 def check_names(family: Family, names: Iterable[str]) -> None:
     """Raise RequestError, with suggestions, for a register that no device of this family has."""
-    tables = list(family.tables.values())
+    tables = list(family.registers.values())
     for name in names:
         if not any(name in table for table in tables):
             tables[0][name]
@@ -204,7 +204,7 @@ def everyone(name: str, bus: Bus, nodes: tuple[int, ...], output: Output) -> tup
             elif bus.report is not None:
                 bus.report(event)  # some families tell what they send to find anybody
 
-        found = bus.run(bus.family.scan(), report=listen)
+        found = bus.run(bus.driver.scan(), report=listen)
     if not found:
         raise nobody(name)
     return tuple(one.node for one in found)

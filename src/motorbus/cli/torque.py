@@ -58,7 +58,7 @@ def torque(
     devices
         FAMILY:PORT for every device on the bus, FAMILY:PORT#ID for some, or axes.
     dry_run
-        Read as usual; show the frames that would change something, and send none of those.
+        Only read; show the frames that it would send.
     options
         Any option of the bus string, as a flag.
     """

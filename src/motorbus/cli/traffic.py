@@ -70,7 +70,7 @@ async def _pause() -> None:
 
 def _tell(opening: Bus, bus: str, record: TraceRecord, at: float, output: Output) -> None:
     data = record.data.flat() if isinstance(record.data, CanFrame) else bytes(record.data)
-    for one in opening.family.explain(data):
+    for one in opening.driver.decode(data):
         facts = {"title": one.title, "fault": one.fault, "parts": {p.name: p.meaning for p in one.parts}}
         output.document(
             "motorbus.monitor.heard/1",

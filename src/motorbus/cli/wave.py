@@ -81,7 +81,7 @@ def _found(bus: str, opening: Bus, nodes: Sequence[int], output: Output) -> list
     alone = opening.family.link.only is not None
     asked = () if alone else tuple(range(min(1, *nodes), max(nodes) + 10))
     with output.progress("scanning") as bar:
-        found = opening.run(opening.family.scan(asked), report=lambda event: scan.listen(event, [], bar))
+        found = opening.run(opening.driver.scan(asked), report=lambda event: scan.listen(event, [], bar))
     if not found:
         raise nobody(bus)
     return found
@@ -105,21 +105,21 @@ def _introduce(opening: Bus, found: Sequence[Found], output: Output) -> None:
 def _led(opening: Bus, found: Sequence[Found]) -> PositionStream:
     """These devices, to be asked and told in a loop. Raises RequestError when they are of a kind that cannot be."""
     models = [one.identity.model if one.identity else "" for one in found]
-    able = opening.family.axis(models[0])
-    if "train" not in able:
+    able = opening.driver.axis(models[0])
+    if "stream" not in able:
         raise RequestError(
             f"{opening.family.name}: there is no loop to show of {models[0] or 'these devices'}",
             advice="nothing was sent",
         )
     devices = [face(opening, one.node) for one in found]
-    train: PositionStream = opening.run(able["train"](devices, rate=opening.rate))
+    train: PositionStream = opening.run(able.stream(devices, rate=opening.rate))
     return train
 
 
 def _moved(opening: Bus, train: PositionStream, duration: float, output: Output) -> Course:
     limp = [one for one in (face(opening, node) for node in train.nodes) if hasattr(one, "disable_torque")]
     try:
-        opening.run(train.begin({}))
+        opening.run(train.start({}))
         with output.progress("moving") as bar:
             return _loop(opening, train, duration, bar)
     finally:
@@ -131,7 +131,7 @@ def _loop(opening: Bus, train: PositionStream, duration: float, bar: Bar) -> Cou
     """As fast as the bus allows: all goals out, all positions in."""
     first = _told(opening, train.positions)
     nodes = list(first)
-    air = sum(opening.family.air_time(one, opening.rate) for one in (*train.goals(first), *train.positions))
+    air = sum(opening.driver.air_time(one, opening.rate) for one in (*train.goals(first), *train.positions))
     course = Course([], [[] for _ in nodes], [[] for _ in nodes], air)
     _note(course, 0.0, list(first.values()), list(first.values()))
     began = opening.link.now()

@@ -154,7 +154,7 @@ def _wanted(assignments: Sequence[str], family: Family, raw: bool) -> dict[str, 
     wanted = dict(pairs)
     check_names(family, wanted)
     for name, text in wanted.items():
-        _typed_by_some([table[name] for table in family.tables.values() if name in table], text, raw)
+        _typed_by_some([table[name] for table in family.registers.values() if name in table], text, raw)
     return wanted
 
 

@@ -7,7 +7,7 @@ from typing import Final
 
 from motorbus.core.family import State
 from motorbus.core.steps import Procedure, Runnable, Sleep
-from motorbus.errors import MotionError, MotorbusError
+from motorbus.errors import MotionError, MotorbusError, Stalled
 
 PERIOD: Final = 0.02
 """s between two samples; one axis that is waited for takes a tenth of a bus at most."""
@@ -24,15 +24,15 @@ async def wait_in_position(
     node: int,
     tolerance: float,
     timeout: Callable[[float], float],
-    stalled: Callable[[State], Procedure[MotorbusError]],
+    stalled: Callable[[State], Procedure[MotorbusError]] | None = None,
     progress: float = PROGRESS,
     stall_time: float = STALL_TIME,
 ) -> None:
     """Return when the device is in position: within `tolerance` rad of `goal` and not moving.
 
-    A device that does not report whether it moves must be within tolerance in two samples in a row. Raises the error
-    that `stalled` makes, when its position has not changed by `progress` rad for `stall_time` s; MotionError after the
-    time (s) that `timeout` gives for the distance (rad).
+    A device that does not report whether it moves must be within tolerance in two samples in a row. Raises Stalled, or
+    the error that `stalled` makes, when its position has not changed by `progress` rad for `stall_time` s; MotionError
+    after the time (s) that `timeout` gives for the distance (rad).
     """
     state = await sample()
     here = mark = _position(state)
@@ -47,7 +47,9 @@ async def wait_in_position(
         if abs(here - mark) >= progress:
             mark, progressed = here, state.at
         elif state.at - progressed > stall_time and not looks:
-            raise await stalled(state)
+            if stalled is not None:
+                raise await stalled(state)
+            raise Stalled(f"node {node} stands at {here:.4g} rad, not at {goal:.4g} rad", node=node)
         if state.at - begun > longest:
             raise MotionError(
                 f"node {node} is not in position after {longest:.3g} s: it is at {here:.4g} rad on its way to "

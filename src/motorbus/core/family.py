@@ -1,13 +1,14 @@
 """The contract between a device family and the code that works with any family.
 
-A family is a package with `wire`, `table`, `driver` and `simulator`. Its `__init__` defines `FAMILY`, which implements
-`Family`. Other packages use only what this module describes; `tests/conformance` tests it.
+The `__init__` of a family defines `FAMILY`, a `Family`: facts, and functions that make its parts. `FAMILY.open()` makes
+a `BusDriver` for one open bus; an `AxisDriver` is what one kind of device can do. Other packages use only what this
+module describes; `tests/conformance` tests it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import Enum
 from typing import Any, NamedTuple, Protocol
 
@@ -16,6 +17,7 @@ from motorbus.core.guarantees import Guarantees
 from motorbus.core.register import RegisterMap, Value
 from motorbus.core.request import Data, Event, Request, Response
 from motorbus.core.steps import Procedure, Runnable
+from motorbus.errors import RequestError
 
 
 class Option(NamedTuple):
@@ -33,17 +35,14 @@ class Option(NamedTuple):
     source: str = ""
 
 
-class LinkNeeds(NamedTuple):
+class LinkSpec(NamedTuple):
     """Facts of a family that are needed before a bus is opened.
 
     `kind`      "bytes" or "frames"
     `rate`      default rate (bit/s)
     `rates`     rates (bit/s) that a device may have, for a scan of all rates
-    `options`   options of the simulator: `sim,name=value`
-    `settings`  options of a bus, simulated or not: arguments of `Family.configured`
-    `window`    maximum number of lanes in flight
+    `settings`  options of a bus, simulated or not: arguments of `Family.open`
     `only`      id of the only device on a line of this family; None: there may be several
-    `both_ways` full duplex: a stop waits only for the request being sent, not for its reply
     `stops`     possible actions of an emergency stop on an axis, "torque_off" and "hold", the default first; () if
                 unknown. A family with both has a setting `estop_hold`: the ids that an emergency stop holds
     `captures`  decoders of recordings; None: the receiver decodes them
@@ -52,11 +51,8 @@ class LinkNeeds(NamedTuple):
     kind: str
     rate: int
     rates: tuple[int, ...] = ()
-    options: tuple[Option, ...] = ()
     settings: tuple[Option, ...] = ()
-    window: int = 1
     only: int | None = None
-    both_ways: bool = False
     stops: tuple[str, ...] = ()
     captures: Captures | None = None
 
@@ -145,11 +141,11 @@ class Positions(NamedTuple):
 
 
 class PositionStream(Protocol):
-    """Devices of one bus in a control loop, with all data that a cycle needs; see `Family.axis`.
+    """Devices of one bus in a control loop, with all data that a cycle needs; made by `AxisDriver.stream`.
 
     Its requests can run without reading anything first. Those on different lanes may be in flight at once. Before
-    `begin` runs or goals are sent, nothing is written. If settings of a device are written through the object that
-    `train` was given, goal requests made before are refused; `goals` then uses the new settings or raises
+    `start` runs or goals are sent, nothing is written. If settings of a device are written through the object that
+    `stream` was given, goal requests made before are refused; `goals` then uses the new settings or raises
     RequestError.
     """
 
@@ -165,14 +161,14 @@ class PositionStream(Protocol):
         """
 
     def goals(self, to: Mapping[int, float]) -> Sequence[Request[Any]]:
-        """Requests that order these goals (rad) for some or all nodes; the gate judges them when they leave.
+        """Requests that send these goals (rad) to some or all nodes; the gate checks them when they leave.
 
         Raises LimitExceeded for a goal that is not finite or that no device of this kind can take, RequestError for
         a node that is not one of these.
         """
 
-    def begin(self, speeds: Mapping[int, float]) -> Procedure[None]:
-        """Prepare every node of this train for goals: torque on without a jump.
+    def start(self, speeds: Mapping[int, float]) -> Procedure[None]:
+        """Prepare every node for goals: torque on without a jump.
 
         `speeds` gives a maximum tracking speed (rad/s, above 0) for some nodes. A device rounds it up to a value that
         it supports; a device without such a setting ignores it. A device without torque switch holds its position.
@@ -319,38 +315,86 @@ class Device(Protocol):
     def write(self) -> Callable[..., None]: ...
 
 
-class Devices(NamedTuple):
-    """Device classes of a family, called with a bus and a node id. `assures`: the safety properties of
-    these devices; None if the family declares none.
-    """
+class DeviceTypes(NamedTuple):
+    """Device classes of a family, called with a bus and a node id."""
 
     blocking: Callable[[Any, int], Any]
     awaiting: Callable[[Any, int], Any]
-    assures: Guarantees | None = None
 
 
-class Family(Protocol):
-    """A device family. It has no state, except what `configured` describes."""
+def unsupported(*args: object, **kwargs: object) -> Any:
+    """The function of a capability that a device does not have."""
+    raise RequestError("the device does not support this", advice="nothing was sent")
+
+
+@dataclass(frozen=True, kw_only=True)
+class AxisDriver:
+    """What devices of one model can do, in SI units; a family gives those that the model supports.
+
+    Each is a function of a device (see `DeviceTypes`), several for `stream`, and returns a procedure or a step. `names`
+    are the given ones, and `name in driver` tests for one. Others raise RequestError when called.
+    """
+
+    state: Callable[[Any], Runnable[State]] = unsupported
+    position: Callable[[Any], Runnable[float]] = unsupported
+    velocity: Callable[[Any], Runnable[float]] = unsupported
+    load: Callable[[Any], Runnable[float]] = unsupported
+    current: Callable[[Any], Runnable[float]] = unsupported
+    voltage: Callable[[Any], Runnable[float]] = unsupported
+    temperature: Callable[[Any], Runnable[float]] = unsupported
+    health: Callable[[Any], Runnable[Health]] = unsupported
+    """For an identified device a request that can be kept."""
+    enable_torque: Callable[[Any], Runnable[None]] = unsupported
+    """Torque on without a jump."""
+    disable_torque: Callable[[Any], Runnable[Any]] = unsupported
+    move: Callable[..., Runnable[Any]] = unsupported
+    """move(device, to, *, wait): to a position (rad)."""
+    stop: Callable[[Any], Runnable[Any]] = unsupported
+    """Decelerate and hold; returns a promise (an Enum), see `Stop`."""
+    move_by: Callable[..., Runnable[Any]] = unsupported
+    """move_by(device, angle, *, velocity, wait): rad from the present position."""
+    jog: Callable[..., Runnable[Any]] = unsupported
+    """jog(device, velocity, seconds): turn for a time."""
+    home: Callable[..., Runnable[Any]] = unsupported
+    """home(device, *, deadline): to the home switch."""
+    run: Callable[..., Runnable[Any]] = unsupported
+    """run(device, number, *, timeout): a stored program."""
+    limits: Callable[[Any], Runnable[tuple[float, float]]] = unsupported
+    """Lowest and highest position (rad) in its settings; read if unknown."""
+    travel: Callable[[Any], Runnable[tuple[float, float] | None]] = unsupported
+    """Range (rad) in which its limits must lie; None: unknown."""
+    cap_torque: Callable[[Any, float], Runnable[Any]] = unsupported
+    """Limit of the torque (fraction) until power-off."""
+    cap_current: Callable[[Any, float], Runnable[Any]] = unsupported
+    """Limit of the current (A) until power-off."""
+    stream: Callable[..., Runnable[PositionStream]] = unsupported
+    """stream(devices, *, rate): for a control loop; rate in bit/s."""
+    keep_time: Callable[..., Runnable[Any]] = unsupported
+    """keep_time(device, angle, timing, *, velocity, acceleration) -> Turned: turn by `angle` (rad) with its own
+    profile, begin and end with the other devices of `timing`; at most `velocity` (rad/s) and `acceleration` (rad/s²)
+    where the device supports that."""
+    names: frozenset[str] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        given = [one.name for one in fields(self) if one.init and getattr(self, one.name) is not one.default]
+        object.__setattr__(self, "names", frozenset(given))
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names
+
+
+class BusDriver(Protocol):
+    """A family on one open bus: all that the bus and its users ask. It may keep what it learns on that bus.
+
+    `window`      maximum number of lanes in flight
+    `full_duplex` a stop waits only for the request being sent, not for its reply
+    """
+
+    window: int
+    full_duplex: bool
 
     @property
-    def name(self) -> str:
-        """The scheme of a bus address."""
-
-    @property
-    def link(self) -> LinkNeeds: ...
-
-    @property
-    def tables(self) -> Mapping[str, RegisterMap]:
-        """All register maps, by name."""
-
-    def configured(self, **settings: object) -> Family:
-        """The family with the `link.settings` of one open bus; it may keep what it learns on that bus.
-
-        A family without settings returns itself. Raises RequestError for invalid settings.
-        """
-
-    @property
-    def devices(self) -> Devices: ...
+    def family(self) -> Family: ...
 
     def lane(self, node: int) -> int:
         """The lane of this node. Requests on one lane never overlap; all nodes of a serial line have lane 0."""
@@ -366,9 +410,6 @@ class Family(Protocol):
 
     def echo_test(self) -> Request[Any] | None:
         """A request whose reply has another length than its echo, sent when a bus is opened; None: no echo."""
-
-    def explain(self, data: bytes) -> list[Explanation]:
-        """Explain all frames in these bytes, field by field; a CAN frame is serialized by `CanFrame.flat()`."""
 
     def receiver(self) -> Receiver: ...
 
@@ -393,29 +434,44 @@ class Family(Protocol):
         Reports `Progress`, and `Found` when a device answers, possibly before its identity is read.
         """
 
-    def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:
-        """Capabilities of devices of this model, by name, in SI units; what a model does not support is absent.
+    def axis(self, model: str) -> AxisDriver:
+        """What devices of this model can do; an empty one for an unknown model."""
 
-        Each is a function of a device (see `devices`), or several for `train`, and returns a procedure or a step:
+    def decode(self, data: bytes) -> list[Explanation]:
+        """Explain all frames in these bytes, field by field; a CAN frame is serialized by `CanFrame.flat()`."""
 
-            state position velocity load current voltage temperature    its `State`, or one number
-            health(device)                      its `Health`; for an identified device a request that can be kept
-            enable_torque(device)               torque on without a jump
-            disable_torque(device)              torque off
-            move(device, to, *, wait)           to a position (rad)
-            stop(device)                        decelerate and hold; gives a promise, see `Stop`
-            move_by(device, angle, *, velocity, wait)                   rad from the present position
-            jog(device, velocity, seconds)      turn for a time
-            home(device, *, deadline)           to the home switch
-            run(device, number, *, timeout)     a stored program
-            limits(device)                      lowest and highest position (rad) in its settings; read if unknown
-            travel(device)                      range (rad) in which its limits must lie; None: unknown
-            cap_torque(device, fraction)  cap_current(device, ampere)   limit until power-off
-            train(devices, *, rate) -> PositionStream                 for a control loop; rate in bit/s
-            keep_time(device, angle, timing, *, velocity, acceleration) -> Turned
-                turn by `angle` (rad) with its own profile, begin and end with the other devices of `timing`; at most
-                `velocity` (rad/s) and `acceleration` (rad/s²) where the device supports that
-        """
 
-    def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
-        """A simulated bus with these nodes; "" is the default model of the family."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Family:
+    """A device family: its facts, and functions that make its parts.
+
+    `name`       the scheme of a bus address
+    `registers`  all register maps, by name
+    `safety`     the safety properties of its devices; None if the family declares none
+    `driver`     makes the `BusDriver` of a bus: driver(family, **settings). Raises RequestError for a bad setting
+    `simulator`  makes a simulated bus: simulator(ids, model, **options); model "" is the default model of the family.
+                 Raises RequestError for bad ids, models and options
+    `simulator_options`  the options of `simulator`; a function, so that the simulator is imported only when used
+    `cli`        module with the shell commands of this family; "" without
+    """
+
+    name: str
+    link: LinkSpec
+    registers: Mapping[str, RegisterMap]
+    devices: DeviceTypes
+    driver: Callable[..., BusDriver]
+    simulator: Callable[..., Simulator]
+    simulator_options: Callable[[], tuple[Option, ...]] = tuple
+    safety: Guarantees | None = None
+    cli: str = ""
+
+    def open(self, **settings: object) -> BusDriver:
+        """The driver of one open bus. Raises RequestError for an unknown or invalid setting."""
+        known = [option.name for option in self.link.settings]
+        for name in settings:
+            if name not in known:
+                raise RequestError(
+                    f"a {self.name} bus has no setting {name!r}",
+                    expected=f"one of {', '.join(known)}" if known else "no setting",
+                )
+        return self.driver(self, **settings)

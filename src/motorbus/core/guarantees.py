@@ -32,7 +32,7 @@ class Guarantees(NamedTuple):
     `measured`  the device measures and reports its position
     `limits`    the device keeps travel limits by itself
     `stop`      what an acknowledged stop means
-    `estops`    what an emergency stop means, by its action on an axis (see `LinkNeeds.stops`); key "" where the
+    `estops`    what an emergency stop means, by its action on an axis (see `LinkSpec.stops`); key "" where the
                 action cannot be chosen
     `alone`     what the device does in a loop or a move when its host fails or the cable breaks
     `ends`      every motion ends by itself

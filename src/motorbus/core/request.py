@@ -193,6 +193,13 @@ class Request(Step[T_co]):
         rest = [name for name in Request.__slots__ if name not in own]
         return Request(self.wire, self.expected, decode, **{name: getattr(self, name) for name in rest})
 
+    def convert(self, function: Callable[[T_co], T]) -> Request[T]:
+        """The same request, whose value is `function` of the value of this one."""
+        decode = self.decode
+        if decode is None:
+            raise RequestError(f"{self!r} has no decoder", advice="use with_decoder")
+        return self.with_decoder(lambda response: function(decode(response)))
+
     def __repr__(self) -> str:
         text = self.wire.hex(" ") if isinstance(self.wire, bytes) else repr(self.wire)
         return f"<Request {text}>"

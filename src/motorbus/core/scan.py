@@ -1,12 +1,13 @@
-"""Scan at several bit rates, with the rate of the bus restored."""
+"""Scan all ids, at several bit rates, with the rate of the bus restored."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeVar
 
-from motorbus.core.steps import Emit, Guard, Procedure, SetBitrate
-from motorbus.errors import LinkError, LinkLost
+from motorbus.core.family import Found, Identity
+from motorbus.core.steps import Emit, Guard, Procedure, Progress, Runnable, SetBitrate, catch
+from motorbus.errors import LinkError, LinkLost, MotorbusError
 
 T = TypeVar("T")
 
@@ -46,3 +47,26 @@ async def scan_rates(rates: Sequence[int], scan: Callable[[int], Procedure[list[
             continue
         found += await scan(rate)
     return found
+
+
+async def scan_ids(
+    ids: Sequence[int],
+    rate: int,
+    ping: Callable[[int], Runnable[bool]],
+    identify: Callable[[int], Runnable[Identity]],
+    passes: int = 2,
+) -> list[Found]:
+    """Ping these ids one after the other and identify those that reply; a silent id is pinged in each pass.
+
+    `rate` (bit/s) is the present one. Reports `Progress`, and `Found` at once. A device that cannot be identified is
+    found without identity.
+    """
+    found: dict[int, Found] = {}
+    for number in range(passes):
+        for count, node in enumerate(ids, number * len(ids) + 1):
+            if node not in found and await catch(ping(node)) is True:
+                identity = await catch(identify(node))
+                found[node] = Found(node, rate, None if isinstance(identity, MotorbusError) else identity)
+                await Emit(found[node])
+            await Emit(Progress(count, passes * len(ids), f"{rate} bit/s"))
+    return [found[node] for node in ids if node in found]

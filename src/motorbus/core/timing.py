@@ -1,7 +1,7 @@
 """Synchronised start of devices that move by a profile of their own, and the record of such a movement.
 
 Such a device takes the whole movement in one order and reports nothing while it moves. See `keep_time` in
-`core.family.Family.axis`.
+`core.family.AxisDriver`.
 """
 
 from __future__ import annotations

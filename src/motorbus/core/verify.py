@@ -20,12 +20,13 @@ async def write_verified(
     *,
     node: int,
     what: str,
-    differs: Callable[[T], MotorbusError],
+    differs: Callable[[T], MotorbusError] | None = None,
     tries: int = TRIES,
 ) -> None:
     """Write, read back, and repeat both while the value differs.
 
-    Raises the error that `differs` makes of the last value, OutcomeUnknown when the value cannot be read back.
+    Raises VerificationFailed, or the error that `differs` makes of the last value; OutcomeUnknown when the value cannot
+    be read back.
     """
     for attempt in range(tries):
         await write()
@@ -44,12 +45,15 @@ async def check(
     *,
     node: int,
     what: str,
-    differs: Callable[[T], MotorbusError],
+    differs: Callable[[T], MotorbusError] | None = None,
 ) -> None:
     """Read a value that was written. Raises as `write_verified`."""
     try:
         found = await read()
     except (NoReply, WireError) as error:
         raise unread(error, node=node, what=f"the write of {what}") from error
-    if found != expected:
+    if found == expected:
+        return
+    if differs is not None:
         raise differs(found)
+    raise VerificationFailed(f"node {node}: {what} reads back {found}, not {expected}", node=node)

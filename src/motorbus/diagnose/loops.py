@@ -47,8 +47,9 @@ def count(wanted: Wanted, *, turnaround: float = 0.0) -> Counted | None:
     """
     address = parse_address(wanted.address)
     opening = prepare(address.bus, {})
-    family, rate = opening.family, opening.rate or opening.family.link.rate
-    known = {option.name for option in (*family.link.options, *family.link.settings)} - _NO_HABITS
+    driver, rate = opening.driver, opening.rate or opening.family.link.rate
+    family = opening.family
+    known = {option.name for option in (*family.simulator_options(), *family.link.settings)} - _NO_HABITS
     model = wanted.model or address.options.get("model", "")
     habits: dict[str, Any] = {name: said for name, said in address.options.items() if name in known}
     with (
@@ -60,16 +61,16 @@ def count(wanted: Wanted, *, turnaround: float = 0.0) -> Counted | None:
             return None
         goals, readings = train.goals(_angles(bus, train)), train.positions
     names = tuple(wanted.axes.values())
-    whole = counted(family, rate, (*goals, *readings), names, turnaround)
-    told, asked = (counted(family, rate, part, names).wire for part in (goals, readings))
+    whole = counted(driver, rate, (*goals, *readings), names, turnaround)
+    told, asked = (counted(driver, rate, part, names).wire for part in (goals, readings))
     return Counted(whole, told, asked)
 
 
 def _train(bus: Bus, nodes: Sequence[int], rate: int) -> PositionStream | None:
     """The devices with these ids, as they would be led in a loop at this rate of the bus (bit/s)."""
     devices = [bus.family.devices.blocking(bus, node) for node in nodes]
-    able = bus.family.axis(devices[0].identify().model)
-    return bus.run(able["train"](devices, rate=rate)) if "train" in able else None
+    able = bus.driver.axis(devices[0].identify().model)
+    return bus.run(able.stream(devices, rate=rate)) if "stream" in able else None
 
 
 def _angles(bus: Bus, train: PositionStream) -> dict[int, float]:
@@ -77,7 +78,7 @@ def _angles(bus: Bus, train: PositionStream) -> dict[int, float]:
     found = {}
     for node in train.nodes:
         device = bus.family.devices.blocking(bus, node)
-        able = bus.family.axis(device.identify().model)
-        low, high = bus.run(able["limits"](device)) if "limits" in able else (-inf, inf)
+        able = bus.driver.axis(device.identify().model)
+        low, high = bus.run(able.limits(device)) if "limits" in able else (-inf, inf)
         found[node] = min(max(0.0, low), high)
     return found

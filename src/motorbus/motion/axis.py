@@ -27,9 +27,9 @@ class _Verbs(AxisVerbs):
     stop = ability("stop", axis.stop)
     stopped = ability("stop", standstill.stopped)
     hold = ability(("enable_torque", "stop"), axis.hold)
-    move = ability(("train", "keep_time"), moving.move_axis)
-    move_by = ability(("train", "move_by"), moving.move_by)
-    jog = ability(("train", "jog"), jogging.jog)
+    move = ability(("stream", "keep_time"), moving.move_axis)
+    move_by = ability(("stream", "move_by"), moving.move_by)
+    jog = ability(("stream", "jog"), jogging.jog)
     home = ability("home", reckoning.home)
     run = ability("run", reckoning.run)
 

@@ -13,7 +13,7 @@ from math import inf, isfinite
 from typing import Any, Final
 
 from motorbus.bus.base import BaseBus
-from motorbus.core.family import Family, PositionStream
+from motorbus.core.family import BusDriver, PositionStream
 from motorbus.core.request import ANY, Request
 from motorbus.errors import RequestError
 from motorbus.motion import limits
@@ -109,7 +109,7 @@ def budget(
 
 def divided(axes: Mapping[str, AxisVerbs]) -> tuple[dict[str, AxisVerbs], tuple[str, ...]]:
     """Those that can be led in a loop, and the names of those that cannot."""
-    led = {name: axis for name, axis in axes.items() if "train" in axis.able}
+    led = {name: axis for name, axis in axes.items() if "stream" in axis.able}
     return led, tuple(name for name in axes if name not in led)
 
 
@@ -131,11 +131,11 @@ def bus_budget(
     turnaround: float = 0.0,
 ) -> BusBudget:
     """What a cycle of this train costs on its bus, with goals at these `angles` (rad, by id)."""
-    return counted(bus.family, bus.rate, (*train.goals(angles), *train.positions), names, turnaround)
+    return counted(bus.driver, bus.rate, (*train.goals(angles), *train.positions), names, turnaround)
 
 
 def counted(
-    family: Family,
+    driver: BusDriver,
     bit_rate: int,
     cycle: Sequence[Request[Any]],
     names: Sequence[str],
@@ -143,13 +143,13 @@ def counted(
 ) -> BusBudget:
     """What a cycle of these exchanges costs at `bit_rate` (bit/s)."""
     replies = [0 if one.expected is ANY else len(one.expected) for one in cycle]
-    overlap = len({one.lane for one in cycle}) > 1 and family.link.window > 1
+    overlap = len({one.lane for one in cycle}) > 1 and driver.window > 1
     return BusBudget(
         axes=tuple(names),
         bit_rate=bit_rate,
         requests=len(cycle),
         replies=sum(replies),
-        wire=sum(family.air_time(one, bit_rate) for one in cycle),
+        wire=sum(driver.air_time(one, bit_rate) for one in cycle),
         turnaround=turnaround,
         waits=0.0 if overlap else turnaround * sum(replies),
     )

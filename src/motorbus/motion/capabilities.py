@@ -6,12 +6,12 @@ to raise. Here is what an axis is, and what it tells and is told without moving;
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import wraps
-from typing import TYPE_CHECKING, Any, Concatenate, Final, ParamSpec, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Concatenate, Final, ParamSpec, TypeVar
 
 from motorbus.core.device import device_method
-from motorbus.core.family import Quality, State
+from motorbus.core.family import AxisDriver, Quality, State
 from motorbus.core.steps import Runnable
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion.command import Command
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 P = ParamSpec("P")
 T = TypeVar("T")
 
-Able: TypeAlias = "Mapping[str, Callable[..., Runnable[Any]]]"
-"""What a device can do; see `core.family.Family.axis`."""
 FEEDBACK: Final = "feedback"
 ESTIMATED: Final = "estimated"
 """Which of these is among the capabilities of an axis says whether its position is measured or reckoned."""
@@ -104,7 +102,7 @@ class AxisVerbs:
     (rad of the device); the guard at the gate of its bus judges by what the bus has heard.
     """
 
-    def __init__(self, bus: Any, name: str, spec: AxisSpec, device: Any, able: Able) -> None:
+    def __init__(self, bus: Any, name: str, spec: AxisSpec, device: Any, able: AxisDriver) -> None:
         self.bus = bus
         self.name = name
         self.spec = spec
@@ -118,11 +116,11 @@ class AxisVerbs:
         self.restarts = RestartDetector()
         self.recognised(able)
 
-    def recognised(self, able: Able, model: str = "") -> None:
+    def recognised(self, able: AxisDriver, model: str = "") -> None:
         """It is known now what its device can do, and which model it is."""
-        self.able: Able = able
+        self.able: AxisDriver = able
         self.model = model or self.model
-        self.reckoning = Reckoning() if is_reckoned(able) else None
+        self.reckoning = Reckoning() if is_reckoned(able.names) else None
 
     # -- what costs no frame -------------------------------------------------------------------------------------------
 
@@ -280,7 +278,7 @@ async def state(axis: AxisVerbs) -> State:
 
 
 async def _judged(axis: AxisVerbs) -> tuple[State, Quality]:
-    found: State = await axis.able["state"](axis.device)
+    found: State = await axis.able.state(axis.device)
     if found.position is None:
         return found, found.quality
     return found, axis.track.take(found.position, found.at).quality
@@ -291,36 +289,36 @@ async def position(axis: AxisVerbs) -> float:
 
     A place to which no motor can have come so quickly is told only where a second reading agrees: see `believed`.
     """
-    angle = await believed(axis.track, lambda: axis.able["position"](axis.device))
+    angle = await believed(axis.track, lambda: axis.able.position(axis.device))
     return axis.spec.from_device(angle)
 
 
 async def velocity(axis: AxisVerbs) -> float:
     """How fast it moves, as its device tells (rad/s, m/s)."""
-    return axis.spec.rate_from_device(await axis.able["velocity"](axis.device))
+    return axis.spec.rate_from_device(await axis.able.velocity(axis.device))
 
 
 async def load(axis: AxisVerbs) -> float:
     """What it pushes with: a fraction of the most that its device can, in the direction of the axis."""
-    found: float = await axis.able["load"](axis.device)
+    found: float = await axis.able.load(axis.device)
     return found * axis.spec.sign
 
 
 async def current(axis: AxisVerbs) -> float:
     """The current of its motor (A), in the direction of the axis where the device gives it a sign."""
-    found: float = await axis.able["current"](axis.device)
+    found: float = await axis.able.current(axis.device)
     return found * axis.spec.sign
 
 
 async def voltage(axis: AxisVerbs) -> float:
     """The supply of its device (V)."""
-    found: float = await axis.able["voltage"](axis.device)
+    found: float = await axis.able.voltage(axis.device)
     return found
 
 
 async def temperature(axis: AxisVerbs) -> float:
     """The temperature of its device (°C)."""
-    found: float = await axis.able["temperature"](axis.device)
+    found: float = await axis.able.temperature(axis.device)
     return found
 
 
@@ -352,23 +350,23 @@ async def enable_torque(axis: AxisVerbs) -> None:
 
 async def _given_torque(axis: AxisVerbs) -> None:
     await cap(axis)
-    await axis.able["enable_torque"](axis.device)
+    await axis.able.enable_torque(axis.device)
 
 
 async def cap(axis: AxisVerbs) -> None:
     """Bound what its device pushes with, as the machine file says; nothing is sent where it says nothing."""
     spec = axis.spec
     if spec.torque is not None:
-        await axis.able["cap_torque"](axis.device, spec.torque)
+        await axis.able.cap_torque(axis.device, spec.torque)
     if spec.current is not None:
-        await axis.able["cap_current"](axis.device, spec.current)
+        await axis.able.cap_current(axis.device, spec.current)
 
 
 async def disable_torque(axis: AxisVerbs) -> None:
     """Limp, whatever alarms there are. Raises as the device's own verb when nobody knows whether it is."""
     axis.orders = order = axis.orders + 1
     resting = Resting(axis)
-    await axis.able["disable_torque"](axis.device)
+    await axis.able.disable_torque(axis.device)
     resting.certain()
     if axis.orders == order:  # else somebody has told it something since, and may have given it torque
         axis.engaged = axis.under_way = False
@@ -378,7 +376,7 @@ async def stop(axis: AxisVerbs) -> Enum:
     """Decelerate and stay; gives what the device promises. Raises as the device's own verb when it did not accept."""
     axis.orders = order = axis.orders + 1
     resting = Resting(axis)
-    promise: Enum = await axis.able["stop"](axis.device)
+    promise: Enum = await axis.able.stop(axis.device)
     resting.certain()
     if axis.orders == order:  # else it is the next movement already, which this was not said to
         axis.accepted_stop()

@@ -214,7 +214,7 @@ class Command:
         With `anew` also those for which a stop has left on their bus, where nobody knows whether it was accepted.
         """
         axes = self.untold() if anew else self.held()
-        ended = await gather(*[catch(axis.able["stop"](axis.device)) for axis in axes])
+        ended = await gather(*[catch(axis.able.stop(axis.device)) for axis in axes])
         errors = {
             axis.name: told for axis, told in zip(axes, ended, strict=True) if isinstance(told, MotorbusError)
         }

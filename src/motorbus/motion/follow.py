@@ -155,8 +155,8 @@ def check_pairs(body: Body, pairs: Mapping[str, str]) -> None:
     """Raise RequestError for pairs, leader by follower, of which one cannot follow the other. Nothing is sent."""
     if not pairs:
         raise RequestError("nobody follows anybody", expected="leader and follower, by name", advice=NOTHING)
-    check_able(body, pairs, "train", "followed in a loop")
-    check_able(body, pairs.values(), "train", "led in a loop")
+    check_able(body, pairs, "stream", "followed in a loop")
+    check_able(body, pairs.values(), "stream", "led in a loop")
     followers: dict[str, Any] = {}
     for leader, follower in pairs.items():
         if follower in pairs or follower in followers:

@@ -197,7 +197,7 @@ async def _rest(axis: AxisVerbs) -> Rest:
     """Whether an axis that was stopped rests; raises nothing, for it is let go all the same."""
     if "position" not in axis.able:
         return Rest.UNSEEN
-    told = await catch(watched(lambda: axis.able["position"](axis.device), PATIENCE))
+    told = await catch(watched(lambda: axis.able.position(axis.device), PATIENCE))
     return Rest.UNSEEN if isinstance(told, MotorbusError) else told[0]
 
 

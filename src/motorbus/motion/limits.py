@@ -42,7 +42,7 @@ async def of_device(axis: AxisVerbs) -> Device:
     """The device's own limits (rad of the device), asked of it; None where it has none."""
     if "limits" not in axis.able:
         return None
-    found: Device = await axis.able["limits"](axis.device)
+    found: Device = await axis.able.limits(axis.device)
     return found
 
 

@@ -48,7 +48,7 @@ class _Jog:
                 cause="an order is as far ahead as a cycle is long, and must not be farther",
                 advice="nothing was sent",
             )
-        if "train" not in axis.able and "jog" not in axis.able:
+        if "stream" not in axis.able and "jog" not in axis.able:
             raise RequestError(f"{name}: {axis.spec.device} cannot jog", advice="nothing was sent")
         self._robot = robot
         self._axis = axis
@@ -60,7 +60,7 @@ class _Jog:
 
     @property
     def _led(self) -> bool:
-        return "train" in self._axis.able
+        return "stream" in self._axis.able
 
     def _check_open(self) -> None:
         if not self._open:

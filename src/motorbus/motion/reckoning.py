@@ -165,7 +165,7 @@ async def move_by(axis: AxisVerbs, way: float, *, velocity: float | None = None)
     """
     check_way(axis, way)
     rate = _rate(axis, velocity)
-    return await _gone(axis, axis.able["move_by"](axis.device, way * axis.spec.ratio, velocity=rate), way)
+    return await _gone(axis, axis.able.move_by(axis.device, way * axis.spec.ratio, velocity=rate), way)
 
 
 async def jog(axis: AxisVerbs, velocity: float, seconds: float) -> float:
@@ -177,7 +177,7 @@ async def jog(axis: AxisVerbs, velocity: float, seconds: float) -> float:
     limits.check_velocity(axis.name, axis.spec, velocity)
     way = velocity * seconds
     check_way(axis, way)
-    return await _gone(axis, axis.able["jog"](axis.device, velocity * axis.spec.ratio, seconds), way)
+    return await _gone(axis, axis.able.jog(axis.device, velocity * axis.spec.ratio, seconds), way)
 
 
 async def home(axis: AxisVerbs, *, deadline: float | None = None, velocity: float | None = None) -> float:
@@ -192,7 +192,7 @@ async def home(axis: AxisVerbs, *, deadline: float | None = None, velocity: floa
     if deadline is not None:
         options["deadline"] = deadline
     place = axis.spec.from_device(0.0)
-    await journey(axis, axis.able["home"](axis.device, **options), lambda *_: (place, ""))
+    await journey(axis, axis.able.home(axis.device, **options), lambda *_: (place, ""))
     return place
 
 
@@ -204,7 +204,7 @@ async def run(axis: AxisVerbs, number: int, *, timeout: float | None = None) -> 
     """
     options = {} if timeout is None else {"timeout": timeout}
     moved = f"program {number} has moved it"
-    return await journey(axis, axis.able["run"](axis.device, number, **options), lambda *_: (None, moved))
+    return await journey(axis, axis.able.run(axis.device, number, **options), lambda *_: (None, moved))
 
 
 def check_way(axis: AxisVerbs, way: float) -> None:

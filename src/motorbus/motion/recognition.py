@@ -55,14 +55,14 @@ class Asked(NamedTuple):
 async def _asked(axis: AxisVerbs) -> Asked:
     identify: Runnable[Identity] = type(axis.device).identify.function(axis.device)
     identity = await identify
-    able = axis.bus.family.axis(identity.model)
+    able = axis.bus.driver.axis(identity.model)
     travel: Device = None
     if axis.spec.device_limits is not None and "travel" in able:
-        travel = await able["travel"](axis.device)
+        travel = await able.travel(axis.device)
     if axis.spec.exit != "park" or "limits" not in able:
         return Asked(identity, travel=travel)
     try:
-        limits: Device = await able["limits"](axis.device)
+        limits: Device = await able.limits(axis.device)
     except (RequestError, DeviceError) as error:
         return Asked(identity, error, travel)
     return Asked(identity, limits, travel)
@@ -88,8 +88,8 @@ def _judged(axis: AxisVerbs, told: Any) -> MotorbusError | None:
     if isinstance(told, MotorbusError):
         return told
     model = told.identity.model
-    axis.recognised(axis.bus.family.axis(model), model)
-    if not axis.able:
+    axis.recognised(axis.bus.driver.axis(model), model)
+    if not axis.able.names:
         return RequestError(
             f"{axis.spec.device} is {model}, of which nobody has said what it can do",
             expected="a device that moves",
@@ -105,7 +105,7 @@ def _lacking(axis: AxisVerbs) -> RequestError | None:
         ("torque", "a cap of its torque", spec.torque is not None, ("cap_torque",), "take torque out"),
         ("current", "a cap of its current", spec.current is not None, ("cap_current",), "take current out"),
         ("exit", "a switch for its torque", spec.exit == "torque_off", ("disable_torque",), 'exit = "hold"'),
-        ("exit", "a way to its place", spec.exit == "park", ("train", "keep_time"), 'exit = "hold"'),
+        ("exit", "a way to its place", spec.exit == "park", ("stream", "keep_time"), 'exit = "hold"'),
     )
     for key, what, wanted, needs, instead in wants:
         if wanted and not any(one in able for one in needs):

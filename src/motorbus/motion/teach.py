@@ -60,7 +60,7 @@ def taught(body: Body, names: str | Iterable[str] | None, *, limp: bool) -> tupl
     taught, or when none can be. Nothing is sent."""
     chosen = body.chosen(names)
     if names is not None:
-        check_able(body, chosen, "train", "taught: nothing tells where it is in a loop")
+        check_able(body, chosen, "stream", "taught: nothing tells where it is in a loop")
         if limp:
             check_able(body, chosen, "disable_torque", "taught by hand")
         return tuple(chosen)

@@ -41,7 +41,7 @@ class ByReceiver:
     """Replies and notices as the receiver tells them; the node is the lane where each node has its own."""
 
     def __init__(self, family: Family) -> None:
-        self._receiver = family.receiver()
+        self._receiver = family.open().receiver()
         self._frames = family.link.kind == "frames"
         self._found: list[Event] = []
 

@@ -71,7 +71,7 @@ def _opened(
         journal = kept_for(parse_address(address), options, opening, link)
         bus = kind(
             link,
-            opening.family,
+            opening.driver,
             interlock=Gate(),
             report=report,
             journal=journal,

@@ -15,7 +15,7 @@ def echo_test(bus: BaseBus) -> Request[Any] | None:
     """Log the warnings of the bus; return the request that shows an echo, None where the family needs none."""
     for warning in bus.warnings:
         LOG.warning("%s: %s", bus.link.name, warning)
-    test = bus.family.echo_test()
+    test = bus.driver.echo_test()
     if test is not None:
         bus.expect_echo(test)
     return test

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from motorbus import families
 from motorbus.core import units
-from motorbus.core.family import Family
+from motorbus.core.family import BusDriver, Family
 from motorbus.errors import RequestError
 from motorbus.link.memory import MemoryLink
 from motorbus.session.address import parse_address, parse_ids
@@ -28,15 +28,20 @@ RECONNECT = "reconnect"
 class Opening(NamedTuple):
     """All that is needed to open a bus.
 
-    `family` is configured for this bus; `rate` in bit/s, 0 if not given; `options` are for the simulator or the link.
+    `driver` is that of this bus; `rate` in bit/s, 0 if not given; `options` are for the simulator or the link.
     `reconnect`: a lost port is opened again when it is back.
     """
 
-    family: Family
+    driver: BusDriver
     port: str
     rate: int
     options: dict[str, object]
     reconnect: bool = True
+
+    @property
+    def family(self) -> Family:
+        """The family of the devices."""
+        return self.driver.family
 
 
 def prepare(address: str, options: dict[str, object]) -> Opening:
@@ -52,7 +57,11 @@ def prepare(address: str, options: dict[str, object]) -> Opening:
     simulated = spot.port == "sim"
     if FAULTS in merged and not simulated:
         raise _no_faults(address, spot.port)
-    known = {"ids", "model", FAULTS, *(option.name for option in family.link.options)} if simulated else set()
+    known = (
+        {"ids", "model", FAULTS, *(option.name for option in family.simulator_options())}
+        if simulated
+        else set()
+    )
     rest = {name: value for name, value in merged.items() if name in known or name not in settings}
     unknown = sorted(set(rest) - known)
     if unknown and not spot.port.startswith(ADAPTER):
@@ -60,7 +69,7 @@ def prepare(address: str, options: dict[str, object]) -> Opening:
         here = [option.name for option in family.link.settings]
         usual = [name for name in ("ids", "model", FAULTS) if name in known]
         raise _unknown(address, unknown[0], [word, *usual, *here, *sorted(more), RECONNECT, *sorted(known)])
-    return Opening(family.configured(**settings), spot.port, rate, {**rest, **timing}, reconnect)
+    return Opening(family.open(**settings), spot.port, rate, {**rest, **timing}, reconnect)
 
 
 def simulated(opening: Opening) -> MemoryLink:

@@ -11,7 +11,7 @@ from typing import NamedTuple, Self
 from motorbus import families
 from motorbus.bus.aio import AsyncBus
 from motorbus.bus.blocking import Bus
-from motorbus.core.family import Family
+from motorbus.core.family import AxisDriver, Family
 from motorbus.core.register import shown
 from motorbus.errors import LinkError, MotorbusError, RequestError
 from motorbus.motion.axis import AsyncAxis, Axis
@@ -70,14 +70,14 @@ class Plan(NamedTuple):
     def blocking(self, buses: Mapping[str, Bus]) -> dict[str, Axis]:
         """The axes on these buses, of whose devices nothing is known yet."""
         return {
-            name: Axis(bus, name, spec, bus.family.devices.blocking(bus, spec.node), {})
+            name: Axis(bus, name, spec, bus.family.devices.blocking(bus, spec.node), AxisDriver())
             for name, spec, bus in self._placed(buses)
         }
 
     def awaiting(self, buses: Mapping[str, AsyncBus]) -> dict[str, AsyncAxis]:
         """The same for asyncio."""
         return {
-            name: AsyncAxis(bus, name, spec, bus.family.devices.awaiting(bus, spec.node), {})
+            name: AsyncAxis(bus, name, spec, bus.family.devices.awaiting(bus, spec.node), AxisDriver())
             for name, spec, bus in self._placed(buses)
         }
 

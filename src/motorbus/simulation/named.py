@@ -67,7 +67,7 @@ class Simulation:
         self.pace = False
         named = {option.name for option in family.link.settings}
         self.settings = {option: value for option, value in options.items() if option in named}
-        taken = {option.name for option in family.link.options}
+        taken = {option.name for option in family.simulator_options()}
         options = {
             option: value for option, value in options.items() if option in taken or option not in named
         }

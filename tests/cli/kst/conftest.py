@@ -1,4 +1,4 @@
-"""Simulated CAN servos for the commands of this family: in this process, and on a pseudo-terminal by slcan."""
+"""Simulated CAN servos: in this process, and in a process of their own behind a simulated slcan adapter."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from motorbus.simulation.named import Simulation
 
 @pytest.fixture
 def servos() -> Iterator[Simulation]:
-    """Two servos as the manual says, 37 and 38, in virtual time; `servos.url` is their bus."""
+    """Servos 37 and 38 as in the manual, in virtual time; `servos.url` is their bus."""
     with motorbus.simulate("kst", ids="0x25+0x26") as simulation:
         yield simulation
 
 
 @pytest.fixture
 def newer() -> Iterator[Simulation]:
-    """One servo with newer firmware, 37."""
+    """Servo 37 with newer firmware."""
     with motorbus.simulate("kst", ids="0x25", profile="kst-ext") as simulation:
         yield simulation
 
 
 @pytest.fixture
 def on_slcan(tmp_path: Path, state_folder: Path, patient: None) -> Iterator[Simulated]:
-    """Two servos, 37 and 38, in a process of their own behind a simulated slcan adapter, with a control socket."""
+    """Servos 37 and 38 in a process of their own, with a control socket."""
     control = str(tmp_path / "control")
     with Simulated("kst", ids="0x25+0x26", link=tmp_path / "can", control=control) as simulated:
         yield simulated

@@ -20,7 +20,7 @@ DELAY = wire.encode("set_step_delay", step=1, delay=7)
 
 def seen(withheld: list[bytes], project: int = 2) -> int | None:
     """The delay of step 1 as it would be read, None where nobody can say, -1 where nothing has touched it."""
-    found = as_written(FAMILY, KNOWN, withheld, READ[project])
+    found = as_written(FAMILY.open(), KNOWN, withheld, READ[project])
     if found is None:
         return None
     return decode_image(found[6:]).step(1).delay if found else -1
@@ -39,9 +39,9 @@ def test_edits_show_in_the_project_that_was_selected() -> None:
 def test_what_cannot_be_said_is_not() -> None:
     assert seen([DELAY]) is None, "nobody knows what was selected"
     assert seen([DELAY], project=1) is None
-    assert as_written(FAMILY, {}, [SELECT, DELAY], READ[2]) is None, "it was never read"
-    assert as_written(FAMILY, KNOWN, [SELECT], wire.encode("read_input", port=1)) is None
-    assert as_written(FAMILY, {}, [wire.encode("stop_motor")], READ[1]) == b"", "a stop edits nothing"
+    assert as_written(FAMILY.open(), {}, [SELECT, DELAY], READ[2]) is None, "it was never read"
+    assert as_written(FAMILY.open(), KNOWN, [SELECT], wire.encode("read_input", port=1)) is None
+    assert as_written(FAMILY.open(), {}, [wire.encode("stop_motor")], READ[1]) == b"", "a stop edits nothing"
 
 
 @pytest.mark.parametrize(

@@ -168,7 +168,7 @@ class World:
                 link._alive()
             self.journal(event)
 
-        bus = make_bus(link, FAMILY, journal=record)
+        bus = make_bus(link, FAMILY.open(), journal=record)
         try:
             return operation(bus)
         except MotorbusError as error:

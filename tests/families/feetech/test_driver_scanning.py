@@ -87,7 +87,7 @@ def test_whoever_is_found_may_be_asked_whether_it_is_alone() -> None:
         simulation.simulator.servos[1].raw_position = 700  # type: ignore[attr-defined]
         events: list[object] = []
         with motorbus.open(simulation.url) as bus:
-            found = bus.run(bus.family.scan((1, 2, 3)), report=events.append)
+            found = bus.run(bus.driver.scan((1, 2, 3)), report=events.append)
     assert [(one.node, one.identity is not None) for one in found] == [(1, True), (2, True)]
     assert [event.node for event in events if isinstance(event, Suspicion)] == [1]
 
@@ -113,7 +113,7 @@ def test_every_id_at_every_rate() -> None:
     with motorbus.simulate("feetech", ids="0+253") as simulation, motorbus.open(simulation.url) as bus:
         simulation[253].memory["baud_rate"] = 7
         events: list[object] = []
-        found = bus.run(bus.family.scan((), bus.family.link.rates), report=events.append)
+        found = bus.run(bus.driver.scan((), bus.family.link.rates), report=events.append)
     assert [(one.node, one.rate) for one in found] == [(0, 1_000_000), (253, 38_400)]
     early = events.index(Found(0, 1_000_000, None))
     assert early < 5 < len(events) / 100

@@ -9,7 +9,7 @@ from motorbus.bus.positions import LastPositions, addressed
 from motorbus.core.request import Effect, Priority
 from motorbus.core.steps import Sleep, gather
 from motorbus.errors import ChecksumError, MotorbusError, OutcomeUnknown, RequestError, VerificationFailed
-from motorbus.families.feetech import Feetech
+from motorbus.families.feetech import FAMILY
 from motorbus.families.feetech.driver import Node, disable_torque, disable_torque_all
 from motorbus.families.feetech.driver.node import as_nodes
 from motorbus.families.feetech.driver.torque import all_limp
@@ -43,7 +43,7 @@ def test_a_stranger_is_let_go_with_one_packet_that_passes_everyone() -> None:
 
 
 def test_each_frame_names_whom_it_lets_go_so_that_nobody_else_counts_as_stopped() -> None:
-    silent, known = prepared(2, at_8=0), LastPositions(Feetech(), 1_000_000)
+    silent, known = prepared(2, at_8=0), LastPositions(FAMILY.open(), 1_000_000)
     (let_go, _) = watch(disable_torque(silent), unheard(off(2)), reads(2, 40, 0)).requests
     assert addressed(let_go) == {2}
     (together,) = all_limp(as_nodes([2, 3]))

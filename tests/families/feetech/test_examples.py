@@ -287,7 +287,7 @@ def test_a_goal_outside_the_limits_moves_nothing(bus: Bus, goal: float) -> None:
 
 def test_a_scan_over_rates_leaves_the_bus_at_its_own(sim: Simulation) -> None:
     with motorbus.open(sim.url) as bus:
-        found = bus.run(bus.family.scan((1, 2, 11), (500_000, 1_000_000, 4_800)))
+        found = bus.run(bus.driver.scan((1, 2, 11), (500_000, 1_000_000, 4_800)))
         assert [(one.node, one.rate) for one in found] == [(1, 1_000_000), (2, 1_000_000)]
         assert bus.rate == 1_000_000
         assert motorbus.feetech.Servo(bus, 2).ping()

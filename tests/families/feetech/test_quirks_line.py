@@ -108,9 +108,9 @@ def test_quirk_17_a_scan_asks_id_by_id_at_every_rate() -> None:
     """A broadcast PING finds nothing on some boards and at some rates: huggingface/lerobot#1244, #3394."""
     with bench("7", broadcast_ping="collide") as there:
         there.simulated(7).memory["baud_rate"] = 5
-        assert there.bus.run(FAMILY.scan((7,))) == []
+        assert there.bus.run(FAMILY.open().scan((7,))) == []
         with there.traffic() as sent:
-            found = there.bus.run(FAMILY.scan((6, 7), FAMILY.link.rates))
+            found = there.bus.run(FAMILY.open().scan((6, 7), FAMILY.link.rates))
         assert [(one.node, one.rate) for one in found] == [(7, 76_800)]
         assert [one for one in sent if one[2] == 254] == []  # nothing was broadcast
         assert set(FAMILY.link.rates) == set(BAUD_CODES.values())

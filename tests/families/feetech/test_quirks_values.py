@@ -62,7 +62,7 @@ def test_quirk_12_servos_of_one_bus_may_have_several_firmware_versions() -> None
     huggingface/lerobot#1010, #532, #1793.
     """
     with bench("1-2", firmware="3.9+3.10") as there:
-        found = there.bus.run(FAMILY.scan((1, 2)))
+        found = there.bus.run(FAMILY.open().scan((1, 2)))
         assert [one.identity.firmware for one in found if one.identity] == ["3.9", "3.10"]
         for id in (1, 2):
             servo = there.servo(id)

@@ -112,7 +112,7 @@ class World:
     def host(self, cut: Cut | None = None) -> Provisioned | MotorbusError:
         """A host that provisions, with somebody beside it who takes the supply away when he is asked to."""
         link = self.link = Doomed(self, cut)
-        family = FAMILY.configured()
+        family = FAMILY.open()
         bus = Bus(link, family, interlock=Gate(), report=self._asked)
         try:
             return Servo(bus, OLD).provision(**self.wanted, timeout=5.0)

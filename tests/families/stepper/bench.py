@@ -28,7 +28,7 @@ class Bench:
         self.simulator = simulate((1,), **options)
         self.link = MemoryLink(self.simulator, rate=9600, line=line, pace=pace)
         self.events: list[object] = []
-        family = FAMILY.configured(motor=motor, dump_order=options.get("dump_order", "little"))
+        family = FAMILY.open(motor=motor, dump_order=options.get("dump_order", "little"))
         self.bus = Bus(self.link, family, interlock=Gate(), report=self.events.append)
         self.device = Controller(self.bus)
         self._trace = self.bus.trace.subscribe(limit=1_000_000)

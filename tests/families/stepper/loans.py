@@ -116,7 +116,7 @@ class Line1:
             self.events.append(event)
             self.react(event, bus)
 
-        bus = Bus(link, FAMILY.configured(**self.settings), interlock=Gate(), report=report, journal=record)
+        bus = Bus(link, FAMILY.open(**self.settings), interlock=Gate(), report=report, journal=record)
         trace = bus.trace.subscribe(limit=100_000)
         try:
             return work(Controller(bus))

@@ -56,7 +56,7 @@ class Rig:
         self.simulator = simulate((1,), **options)
         self.line = line
         self.link = MemoryLink(self.simulator, rate=9600, line=line, pace=pace)
-        self.bus = make_bus(self.link, FAMILY.configured(), report=lambda event: None)
+        self.bus = make_bus(self.link, FAMILY.open(), report=lambda event: None)
         self.device = Controller(self.bus)
         self.there = self.simulator.nodes[1]
         self.random = Random(seed)
@@ -66,7 +66,8 @@ class Rig:
 
     def open(self) -> None:
         """Find out about echo, as opening a bus does."""
-        test = FAMILY.echo_test()
+        test = self.bus.driver.echo_test()
+        assert test is not None
         self.bus.expect_echo(test)
         with suppress(MotorbusError):
             self.bus.run(test)
@@ -222,8 +223,10 @@ async def _sent(request: Request[None]) -> Any:
 
 def _longest(request: Request[Any]) -> float:
     """s after which this exchange is over whatever the line does: each try with its quiet time and a probe."""
-    probe = FAMILY.probe(1, 0)
-    quiet = FAMILY.quiet_time(9600)
-    each = [FAMILY.air_time(one, 9600) + FAMILY.turnaround(one) + 0.02 for one in (request, probe)]
+    probe = FAMILY.open().probe(1, 0)
+    quiet = FAMILY.open().quiet_time(9600)
+    each = [
+        FAMILY.open().air_time(one, 9600) + FAMILY.open().turnaround(one) + 0.02 for one in (request, probe)
+    ]
     tries = 1 if request.priority is Priority.STOP else RETRIES + 2
     return tries * (sum(each) + 2 * quiet) + quiet

@@ -205,7 +205,7 @@ def test_it_tells_no_identity_and_none_is_made_up() -> None:
 
 def test_a_scan_says_what_it_sends_before_it_sends_it() -> None:
     with bench() as there:
-        (found,) = there.run(FAMILY.scan())
+        (found,) = there.run(FAMILY.open().scan())
         assert there.events[0] == Sends(bytes.fromhex(READ_1), 9600)
         assert there.events[2] == Found(1, 9600, None)
         assert found.identity == there.device.identify()
@@ -214,14 +214,14 @@ def test_a_scan_says_what_it_sends_before_it_sends_it() -> None:
 def test_nobody_is_asked_twice_and_no_more() -> None:
     with bench() as there:
         there.simulated.unplug()
-        assert there.run(FAMILY.scan()) == []
+        assert there.run(FAMILY.open().scan()) == []
         assert there.sent() == [READ_1, READ_1]
 
 
 @pytest.mark.parametrize("node", [0, 2, 3, True, -1])
 def test_there_is_one_controller_on_a_line_and_it_is_called_1(node: int) -> None:
     with bench() as there:
-        for refused in (lambda: Controller(there.bus, node), lambda: there.run(FAMILY.scan((node,)))):
+        for refused in (lambda: Controller(there.bus, node), lambda: there.run(FAMILY.open().scan((node,)))):
             with pytest.raises(RequestError, match="not the id of a stepper controller"):
                 refused()
         assert there.sent() == []
@@ -230,7 +230,7 @@ def test_there_is_one_controller_on_a_line_and_it_is_called_1(node: int) -> None
 def test_to_find_something_out_nothing_is_sent_that_means_something_to_a_sensor() -> None:
     """An attitude sensor with this header takes 03 and 00 for registers that set its rate and store what it has."""
     with bench() as there:
-        there.run(FAMILY.scan((1,), (9600,)))
+        there.run(FAMILY.open().scan((1,), (9600,)))
         for look in (there.device.ping, there.device.identify, there.device.read, there.device.read_project):
             look()
         there.simulated.unplug()
@@ -238,7 +238,9 @@ def test_to_find_something_out_nothing_is_sent_that_means_something_to_a_sensor(
             assert there.device.ping() is False  # doubtful by now, so it is probed
         looked = there.sent()
         probes = [shown(presence.probe(Node(), attempt)) for attempt in range(64)]
-        test = shown(FAMILY.echo_test())
+        echo_test = FAMILY.open().echo_test()
+        assert echo_test is not None
+        test = shown(echo_test)
     assert {frame[:8] for frame in (*looked, *probes, test)} == {"FF AA 3E"}
 
 
@@ -262,9 +264,9 @@ def test_another_motor_number_stands_in_motor_commands_only() -> None:
 @pytest.mark.parametrize("motor", [0, 256, 0x1E, "three"])
 def test_a_number_that_no_motor_has_is_refused(motor: object) -> None:
     with pytest.raises(RequestError, match="not the number of a motor"):
-        FAMILY.configured(motor=motor)
+        FAMILY.open(motor=motor)
     with pytest.raises(RequestError, match="no setting 'moter'"):
-        FAMILY.configured(moter=3)
+        FAMILY.open(moter=3)
 
 
 def test_a_bus_that_is_opened_for_another_motor_simulates_one() -> None:
@@ -308,9 +310,9 @@ def test_what_it_cannot_do_is_absent() -> None:
 def test_a_command_takes_17_7_ms_of_the_line_and_a_dump_246_9() -> None:
     command = driver.read_input(Node(), 1)
     dump = driver.dump_once(Node(), 1)
-    assert FAMILY.air_time(command, 9600) * 1000 == pytest.approx(17.708, abs=0.001)
-    assert FAMILY.air_time(dump, 9600) * 1000 == pytest.approx(246.875, abs=0.001)
-    assert FAMILY.turnaround(command) == 0.2
-    assert FAMILY.turnaround(dump) + 0.2354167 == pytest.approx(0.6)
-    assert FAMILY.turnaround(Request(b"", reply_within=TimeoutClass.STORE)) == 1.0
-    assert FAMILY.quiet_time(9600) == pytest.approx(0.2354167 + 0.05)
+    assert FAMILY.open().air_time(command, 9600) * 1000 == pytest.approx(17.708, abs=0.001)
+    assert FAMILY.open().air_time(dump, 9600) * 1000 == pytest.approx(246.875, abs=0.001)
+    assert FAMILY.open().turnaround(command) == 0.2
+    assert FAMILY.open().turnaround(dump) + 0.2354167 == pytest.approx(0.6)
+    assert FAMILY.open().turnaround(Request(b"", reply_within=TimeoutClass.STORE)) == 1.0
+    assert FAMILY.open().quiet_time(9600) == pytest.approx(0.2354167 + 0.05)

@@ -347,14 +347,14 @@ def test_with_another_reading_of_the_ramp_it_still_comes_to_its_end(ramp: dict[s
 
 
 def test_an_axis_keeps_time_homes_and_runs_programs_by_its_capabilities() -> None:
-    able = FAMILY.axis("stepper controller")
+    able = FAMILY.open().axis("stepper controller")
     line = paced(home_switch="wired", home_at=-1000)
     partner = Partner(1.0)
     told = line.run(
         lambda device: [
-            device.bus.run(able["keep_time"](device, 1.0, partner, velocity=5.0, acceleration=20.0)),
-            device.bus.run(able["home"](device, deadline=5.0)),
-            device.bus.run(able["run"](device, 1, timeout=9.0)),
+            device.bus.run(able.keep_time(device, 1.0, partner, velocity=5.0, acceleration=20.0)),
+            device.bus.run(able.home(device, deadline=5.0)),
+            device.bus.run(able.run(device, 1, timeout=9.0)),
         ]
     )
     assert isinstance(told, list), told
@@ -363,5 +363,5 @@ def test_an_axis_keeps_time_homes_and_runs_programs_by_its_capabilities() -> Non
     assert isinstance(homed, driver.Homed)
     assert (homed.node, 0 < homed.seconds < 5.0, homed.promise) == (1, True, driver.Promise.STOP_ACCEPTED)
     assert ran.outcome is driver.Outcome.COMPLETED
-    late = line.run(lambda device: device.bus.run(able["home"](device, deadline=0.2)))
+    late = line.run(lambda device: device.bus.run(able.home(device, deadline=0.2)))
     failed(late, NotHomed, "within 0.2 s")

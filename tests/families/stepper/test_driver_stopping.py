@@ -69,7 +69,7 @@ def test_a_jog_is_stopped() -> None:
 
 def test_no_more_is_promised_than_that_it_was_accepted() -> None:
     assert Promise.STOP_ACCEPTED.value.startswith("stop accepted")
-    assert "nothing tells when it rests" in FAMILY.stop({}).promise
+    assert "nothing tells when it rests" in FAMILY.open().stop({}).promise
 
 
 @pytest.mark.parametrize("times", [1, 2, 4])

@@ -7,7 +7,7 @@ import pytest
 import motorbus
 from motorbus import families
 from motorbus.errors import RequestError
-from motorbus.families.stepper import FAMILY, Controller, Stepper
+from motorbus.families.stepper import FAMILY, Controller, StepperDriver
 
 
 def test_it_is_found_by_its_name() -> None:
@@ -22,11 +22,11 @@ def test_what_a_user_needs_is_there() -> None:
 
 
 def test_a_bus_without_settings_speaks_as_the_manual_says() -> None:
-    assert FAMILY.configured().stop({1: None}).requests[1].wire[2] == 3
-    other = FAMILY.configured(motor="5")
-    assert isinstance(other, Stepper)
+    assert FAMILY.open().stop({1: None}).requests[1].wire[2] == 3
+    other = FAMILY.open(motor="5")
+    assert isinstance(other, StepperDriver)
     assert other.stop({1: None}).requests[1].wire[2] == 5
-    assert FAMILY.stop({1: None}).requests[1].wire[2] == 3
+    assert FAMILY.open().stop({1: None}).requests[1].wire[2] == 3
 
 
 def test_each_bus_has_a_memory_of_its_own() -> None:
@@ -37,13 +37,13 @@ def test_each_bus_has_a_memory_of_its_own() -> None:
 
 
 def test_it_is_an_axis_that_moves_by_and_has_no_position() -> None:
-    axis = FAMILY.axis("stepper controller")
-    assert set(axis) == {"move_by", "jog", "home", "keep_time", "run", "stop"}
-    assert FAMILY.axis("") == {}
+    axis = FAMILY.open().axis("stepper controller")
+    assert axis.names == {"move_by", "jog", "home", "keep_time", "run", "stop"}
+    assert not FAMILY.open().axis("").names
 
 
 def test_a_simulation_has_the_motor_of_its_bus() -> None:
-    simulator = FAMILY.configured(motor=7).simulator((1,))
+    simulator = FAMILY.simulator((1,), motor=7)
     simulator.receive(bytes.fromhex("FFAA070D000000000000BD"), 0.0)
     assert [data for _, data in simulator.advance(1.0)] == [bytes.fromhex("FFAA070D0000")]
 
@@ -58,16 +58,16 @@ def test_a_bus_is_told_how_its_dumps_are_to_be_read() -> None:
             assert device.read("step_1_delay") == {"step_1_delay": 1.0}
             assert device.read_project(1).project.microsteps == 8
             dump = device.dump(1)
-    assert FAMILY.configured(dump_order="big").explain(dump)[0].fault == ""
-    named = {part.name: part.meaning for part in FAMILY.configured(dump_order="big").explain(dump)[0].parts}
+    assert FAMILY.open(dump_order="big").decode(dump)[0].fault == ""
+    named = {part.name: part.meaning for part in FAMILY.open(dump_order="big").decode(dump)[0].parts}
     assert (named["microsteps"], named["step_1_delay"]) == ("8", "1000 ms")
 
 
 def test_settings_are_kept_apart_and_checked() -> None:
-    both = FAMILY.configured(motor=7).configured(dump_order="big")
+    both = FAMILY.open(motor=7, dump_order="big")
     assert both.stop({1: None}).requests[1].wire[2] == 7
     with pytest.raises(RequestError, match="dump_order='middle'") as caught:
-        FAMILY.configured(dump_order="middle")
+        FAMILY.open(dump_order="middle")
     assert caught.value.expected == "little or big"
     with pytest.raises(RequestError, match="no setting 'order'"):
-        FAMILY.configured(order="big")
+        FAMILY.open(order="big")

@@ -47,7 +47,7 @@ class Failed(Exception):
 def sdo_decoded(case: SdoCase) -> Outcome:
     """A transfer, as the driver carries it out. The value is the data in hexadecimal."""
     request, node = case.request, Node(case.request.node, BusSettings(sized=True))
-    tries, steps = Tries(KST.configured(), 500_000), iter(case.steps)
+    tries, steps = Tries(KST, 500_000), iter(case.steps)
     row = replace(node.table["present_position"], address=request.index, subindex=request.subindex)
     try:
         if request.kind == "upload":

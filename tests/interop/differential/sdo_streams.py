@@ -28,7 +28,7 @@ TEXT: Final = b"KST-X12 firmware 4.07"
 @cache
 def recorded() -> tuple[SdoCase, ...]:
     """Reads and writes of a simulated servo, objects it lacks among them, and transfers in segments."""
-    bus = make_bus(MemoryLink(FAMILY.simulator((NODE,)), rate=500_000), FAMILY.configured(), gate=False)
+    bus = make_bus(MemoryLink(FAMILY.simulator((NODE,)), rate=500_000), FAMILY.open(), gate=False)
     trace = bus.trace.subscribe()
     reads = [SdoRequest("upload", NODE, index, subindex) for index, subindex in OBJECTS]
     writes = [

@@ -33,7 +33,7 @@ def recorded() -> tuple[Case, ...]:
 def _session(name: str) -> Iterator[Case]:
     model = next(model for model in sorted(MODELS) if MODELS[model].table.name == name)
     bus = make_bus(
-        MemoryLink(FAMILY.simulator(IDS, model), rate=MODELS[model].shipped_rate), FAMILY, gate=False
+        MemoryLink(FAMILY.simulator(IDS, model), rate=MODELS[model].shipped_rate), FAMILY.open(), gate=False
     )
     exclude_echo(bus)
     trace = bus.trace.subscribe()

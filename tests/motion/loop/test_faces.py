@@ -135,7 +135,7 @@ def counted(body: Body, count: int, *, interrupts: bool = False, endless: bool =
     """Count cycles."""
 
     async def asks() -> Any:
-        return await body.axes["a1"].able["position"](body.axes["a1"].device)
+        return await body.axes["a1"].able.position(body.axes["a1"].device)
 
     return Errand(
         Counting(count, interrupts), 100, ("a1",), lambda: Parallel({"arm": asks()}, dict), endless=endless

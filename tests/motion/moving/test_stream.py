@@ -21,7 +21,7 @@ from tests.support.world import set_rate
 
 def train(robot: Robot, bus: str) -> Any:
     axes = [axis for axis in robot.axes.values() if axis.spec.bus == bus]
-    wanted = axes[0].able["train"]([axis.device for axis in axes], rate=robot.buses[bus].rate)
+    wanted = axes[0].able.stream([axis.device for axis in axes], rate=robot.buses[bus].rate)
     return robot[axes[0].name].bus.run(wanted)
 
 

@@ -1,8 +1,8 @@
-"""KST frames that are known from outside this project, kept as data in tests/vectors/kst.
+"""KST frames that are known from outside this project, the data of tests/vectors/kst.
 
-`manual` holds what the KST CAN protocol manual prints, a frame for each number it lets one choose; `further` what
-CiA 301 and public drivers add; `unasked` reports, alarms and what starts them; `invalid` frames that are none. They
-were written by a separate script that knows nothing of motorbus.
+`manual` has what the KST CAN protocol manual prints, `further` what CiA 301 and public drivers add, `unasked` frames
+that servos send unsolicited and the frames that start them, `invalid` frames of no protocol. A script that does not
+use motorbus wrote them.
 """
 
 from __future__ import annotations
@@ -11,20 +11,22 @@ import json
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from motorbus.core.can_frame import CanFrame
+from hypothesis import strategies as st
 
-FOLDER = Path(__file__).parent.parent.parent / "vectors" / "kst"
+from motorbus.core.can_frame import CanFrame
+from motorbus.families.kst import sdo
+
+FOLDER = Path(__file__).parents[2] / "vectors" / "kst"
 
 
 class Vector(NamedTuple):
-    """One frame, which way it goes, whether it is one of this protocol at all, and what its fields say."""
+    """One frame, its direction, whether it is a frame of this protocol, and its fields."""
 
     id: str
     errata: str
     frame: CanFrame
     direction: str
     valid: bool
-    meaning: str
     source: str
     expected: dict[str, Any]
 
@@ -38,30 +40,21 @@ class Vector(NamedTuple):
 
     @property
     def object(self) -> tuple[int, int]:
+        """Index and sub-index."""
         return int(self.expected["index"], 16), int(self.expected["subindex"])
 
 
 def load(name: str) -> list[Vector]:
     """The vectors of one file."""
-    rows = json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
-    return [
-        Vector(
-            row["id"],
-            row["errata"],
-            _frame(row),
-            row["direction"],
-            row["verdict"] == "valid",
-            row["meaning"],
-            row["source"],
-            row["expected"],
+    found = []
+    for row in json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8")):
+        identifier = int(row["can_id"], 16)
+        frame = CanFrame(identifier, bytes.fromhex(row["hex"]), identifier > 0x7FF)
+        valid = row["verdict"] == "valid"
+        found.append(
+            Vector(row["id"], row["errata"], frame, row["direction"], valid, row["source"], row["expected"])
         )
-        for row in rows
-    ]
-
-
-def _frame(row: dict[str, Any]) -> CanFrame:
-    identifier = int(row["can_id"], 16)
-    return CanFrame(identifier, bytes.fromhex(row["hex"]), identifier > 0x7FF)
+    return found
 
 
 MANUAL = load("manual")
@@ -69,12 +62,20 @@ UNASKED = load("unasked")
 ALL = [*MANUAL, *load("further"), *UNASKED, *load("invalid")]
 VALID = [vector for vector in ALL if vector.valid]
 INVALID = [vector for vector in ALL if not vector.valid]
-NOTICES = [vector for vector in UNASKED if vector.direction == "status"]
+NOTIFICATIONS = [vector for vector in UNASKED if vector.direction == "status"]
 STARTS = [vector for vector in UNASKED if vector.direction == "instruction"]
-REPLIES = [vector for vector in VALID if vector.direction == "status" and vector not in NOTICES]
+REPLIES = [vector for vector in VALID if vector.direction == "status" and vector not in NOTIFICATIONS]
 REQUESTS = [vector for vector in VALID if vector.direction == "instruction" and vector not in STARTS]
 
-
-def name_of(value: object) -> str:
-    """How a parametrised test is called."""
-    return value.id if isinstance(value, Vector) else repr(value)
+NODES = st.sampled_from(sdo.NODES)
+FRAMES = st.builds(
+    CanFrame,
+    st.one_of(st.integers(0, 0x7FF), st.integers(0, 0xFFFF_FFFF)),
+    st.binary(max_size=9),
+    st.booleans(),
+) | st.builds(
+    CanFrame,
+    st.sampled_from([0x000, 0x005, 0x585, 0x600, 0x625, 0x705]),
+    st.binary(min_size=8, max_size=8),
+)
+"""Any frame, also an impossible one, often one of this protocol."""

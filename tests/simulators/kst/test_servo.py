@@ -1,124 +1,138 @@
-"""One servo as a test pokes it: supply, restart, starts and reports, alarm, and what it says of itself."""
+"""One simulated servo by its frames: writes, segments, status, settings of newer firmware, supply, reports, alarms."""
 
 from __future__ import annotations
 
-import json
-
 import pytest
 
-from tests.simulators.kst.host import Host
+from tests.simulators.kst.host import MOVE, READ_ID, READ_POSITION, SAVE, SET_ID, Host
 
-READ = "4002600000000000"
-MOVE = "2203600084030000"
-SAVE = "2210100173617665"
-START, STOP = "025#0100", "025#0200"
-NMT_START, NMT_STOP = "000#0125", "000#0225"
-
-
-# --- supply -----------------------------------------------------------------------------------------------------
+READ_STATUS = "4005600000000000"
+READ_VERSION, FIRST, SECOND = "400A100000000000", "6000000000000000", "7000000000000000"
+NO_TRANSFER = "8000000001000405"
+START, STOP, START_STANDARD, STOP_STANDARD = "025#0100", "025#0200", "000#0125", "000#0225"
 
 
-def test_an_unplugged_servo_is_silent_and_comes_back_restarted() -> None:
+def test_write_without_length_ignores_further_bytes() -> None:
     host = Host()
-    host.say("625#2200300026000000")
-    host[0x25].unplug()
-    assert host.say(f"625#{READ}") == []
-    host[0x25].power_cycle()
-    assert host.say(f"625#{READ}") == [], "without its cable a power cycle is none"
-    host[0x25].plug()
-    assert host.say("625#4000300000000000") == ["5A5#4F00300025000000"]
+    assert host.ask("220360000100FFFF") == ["6003600000000000"]
+    assert host[0x25].memory["goal_position"] == 1
 
 
-@pytest.mark.parametrize(("cut", "node"), [("old", 0x25), ("new", 0x26)])
-def test_a_write_to_flash_ends_with_the_supply_however_long_it_is_away(cut: str, node: int) -> None:
-    host = Host(flash_time=0.15, flash_cut=cut)
-    host.say("625#2200300026000000")
-    host.say(f"625#{SAVE}")
-    host[0x25].unplug()
+def test_long_version_comes_in_segments() -> None:
+    host = Host(firmware="0123456789ABCD")
+    assert host.ask(READ_VERSION) == ["410A10000E000000"]
+    assert host.ask(FIRST, SECOND) == ["0030313233343536", "1137383941424344"]
+    assert host.ask(FIRST) == [NO_TRANSFER]
+
+
+@pytest.mark.parametrize(
+    ("request_", "reply"),
+    [
+        ("6000000000000000", "800A100000000305"),
+        ("800A100000000405", ""),
+        (READ_ID, "4F00300025000000"),
+        ("restart", ""),
+    ],
+    ids=["repeated toggle", "abort of the client", "another request", "restart"],
+)
+def test_transfer_of_segments_ends(request_: str, reply: str) -> None:
+    host = Host(firmware="0123456789ABCDEFGHIJ")
+    host.ask(READ_VERSION, FIRST)
+    if request_ == "restart":
+        host.restart()
+    else:
+        assert host.ask(request_) == ([reply] if reply else [])
+    assert host.ask(SECOND) == [NO_TRANSFER]
+
+
+@pytest.mark.parametrize(
+    ("profile", "load", "celsius", "reply"),
+    [
+        ("kst-ext", 0.4, 40.4, "4305600064002800"),
+        ("kst-ext", -0.4, -5, "430560006400FB00"),
+        ("xqpower", 0.4, 25, "43056000E8031900"),
+    ],
+)
+def test_status_has_current_and_temperature(profile: str, load: float, celsius: float, reply: str) -> None:
+    """1 A is 100 or 1000 counts; a current has no sign."""
+    host = Host(profile=profile)
+    host[0x25].load_shaft(load)
+    host[0x25].temperature = celsius
+    assert host.ask(READ_STATUS) == [reply]
+
+
+def test_travel_limits_bound_the_target() -> None:
+    host = Host(profile="kst-ext")
+    host.write(0x300A, -300)
+    host.write(0x300B, 200)
+    for target, reached in ((900, 200), (-900, -300), (150, 150)):
+        assert host.write(0x6003, target) == "6003600000000000"
+        host.wait(2.0)
+        assert (host.read(0x6003), host.read(0x6002)) == (reached, reached)
+
+
+@pytest.mark.parametrize("raw", [0, 1])
+def test_mid_point_makes_the_position_zero_and_moves_nothing(raw: int) -> None:
+    host = Host(profile="kst-ext", position=345)
+    assert host.write(0x3009, raw) == "6009300000000000"
+    assert (host.read(0x6002), host.read(0x6003)) == (0, 0)
+    assert host[0x25].status()["moving"] is False
+    host.restart()
+    assert host.read(0x6002) == 345, "the shaft stands where it stood"
+    host.write(0x3009, raw)
+    host.restart(save=True)
+    assert host.read(0x6002) == 0
+
+
+def test_bit_5_reverses_position_and_target_and_moves_nothing() -> None:
+    host = Host(profile="kst-ext", position=200)
+    assert host.write(0x300F, 0x73) == "600F300000000000"
+    assert host.ask("400F300000000000") == ["4F0F300073000000"]
+    assert (host.read(0x6002), host.read(0x6003)) == (-200, -200)
+    host.write(0x6003, 300)
     host.wait(1.0)
-    host.bus.servos[0].plug()
-    assert host.bus.servos[0].node == node
+    host.write(0x300F, 0x53)
+    assert host.read(0x6002) == -300
+    host.write(0x300A, -500)
+    assert host.read(0x300B) == 1000
+    host.write(0x300F, 0x20)
+    host.write(0x300A, -300)
+    assert (host.read(0x300A), host.read(0x300B)) == (-300, 300), "reversed, one limit changes the other"
 
 
-def test_a_start_during_a_write_to_flash_is_lost() -> None:
-    host = Host(profile="xqpower", flash_time=0.15)
-    host.say(f"625#{SAVE}")
-    host.say(NMT_START)
-    assert host[0x25].started is False
-    host.wait(0.2)
-    host.say(NMT_START)
-    assert host[0x25].started is True
+def test_requests_are_lost_during_a_save() -> None:
+    host = Host(profile="xqpower")
+    host.send(SAVE)
+    assert host.send(READ_POSITION, MOVE, READ_ID, START_STANDARD) == []
+    host.wait(0.129)
+    assert host.send(READ_POSITION) == []
+    host.wait(0.001)
+    assert host.ask(READ_POSITION) == ["4B02600000000000"]
+    assert (host[0x25].memory["goal_position"], host[0x25].status()["started"]) == (0, False)
 
 
-def test_plugging_what_is_plugged_does_nothing() -> None:
+def test_unplugged_servo_is_silent_and_returns_restarted() -> None:
     host = Host()
-    host.say(f"625#{MOVE}")
+    host.ask(SET_ID, MOVE)
     host[0x25].plug()
-    assert host[0x25].memory["goal_position"] == 900
-
-
-@pytest.mark.parametrize("cut", ["unplug", "power_cycle"])
-def test_an_answer_on_its_way_is_lost_with_the_supply(cut: str) -> None:
-    host = Host()
-    assert host.timed(f"625#{READ}", within=0.00005) == []
-    getattr(host[0x25], cut)()
-    assert host.heard(0.1) == []
-
-
-@pytest.mark.parametrize("cut", ["unplug", "power_cycle"])
-def test_without_supply_the_shaft_stays_where_it_is(cut: str) -> None:
-    host = Host()
-    host.say(f"625#{MOVE}")
+    assert host[0x25].memory["goal_position"] == 900, "it was connected"
     host.wait(0.1)
     place = host[0x25].raw_position
-    assert 0 < place < 900
-    getattr(host[0x25], cut)()
-    host.wait(1.0)
-    assert host[0x25].raw_position == place
-    assert host[0x25].motion.moving(host.now) is False
+    host[0x25].unplug()
+    host[0x25].power_cycle()
+    assert host.send(READ_POSITION) == []
+    host[0x25].plug()
+    assert host.ask(READ_ID) == ["4F00300025000000"]
+    assert 0 < place == host[0x25].raw_position < 900
+    assert host[0x25].status()["moving"] is False
 
 
-def test_it_says_of_itself_what_is_in_force_and_what_is_to_come() -> None:
+@pytest.mark.parametrize("cut", ["unplug", "power_cycle"])
+def test_reply_is_lost_with_the_supply(cut: str) -> None:
     host = Host()
-    host.say("625#2200300026000000", "625#2201300007000000", f"625#{MOVE}")
-    status = host[0x25].status()
-    assert json.loads(json.dumps(status)) == status
-    told = {name: status[name] for name in ("node", "pending_node", "bit_rate", "pending_bit_rate", "saved")}
-    assert told == {
-        "node": 37,
-        "pending_node": 38,
-        "bit_rate": 500_000,
-        "pending_bit_rate": 1_000_000,
-        "saved": False,
-    }
-    assert (status["raw_target"], status["moving"], status["plugged"], status["errors"]) == (
-        900,
-        True,
-        True,
-        0,
-    )
-    host.say(f"625#{SAVE}")
-    assert host[0x25].status()["saving"] is True
-
-
-# --- start, stop, reports ---------------------------------------------------------------------------------------
-
-
-def test_a_vendor_start_makes_it_report_where_it_is_until_a_stop() -> None:
-    host = Host(profile="kst-ext", position=-109)
-    assert host.heard(1.0) == []
-    assert host.timed(START, within=0.05) == [(0.02, "5A5#93FF0000"), (0.04, "5A5#93FF0000")]
-    assert host[0x25].status()["reporting"] is True
-    assert host.say(STOP) == []
-    assert host.heard(1.0) == []
-
-
-def test_a_start_for_everyone_is_heeded_and_one_for_another_is_not() -> None:
-    host = Host(1, 2, profile="kst-ext")
-    host.say("003#0100")
-    assert host.heard(0.1) == []
-    host.say("000#0100", "002#0200")
-    assert host.heard(0.02) == ["581#00000000"]
+    assert host.timed(READ_POSITION, within=0.00005) == []
+    getattr(host[0x25], cut)()
+    assert host.wait(0.1) == []
 
 
 @pytest.mark.parametrize(
@@ -129,95 +143,69 @@ def test_a_start_for_everyone_is_heeded_and_one_for_another_is_not() -> None:
         ("kingmax", "profile", True, False),
         ("xqpower", "profile", False, True),
         ("kst", "vendor", True, False),
-        ("kst", "standard", False, True),
         ("kst-ext", "none", False, False),
     ],
 )
-def test_which_start_it_obeys_is_a_matter_of_profile_or_switch(
+def test_start_form_belongs_to_profile_or_option(
     profile: str, nmt: str, vendor: bool, standard: bool
 ) -> None:
-    for text, obeyed in ((START, vendor), (NMT_START, standard)):
-        host = Host(profile=profile, nmt=nmt)
-        host.say(text)
-        assert host[0x25].started is obeyed
-        assert bool(host.heard(0.1)) is obeyed
+    for start, stop, is_started in ((START, STOP, vendor), (START_STANDARD, STOP_STANDARD, standard)):
+        host = Host(profile=profile, nmt=nmt, position=-109)
+        assert host.wait(1.0) == []
+        reports = host.timed(start, within=0.05)
+        assert reports == ([(0.02, "5A5#93FF0000"), (0.04, "5A5#93FF0000")] if is_started else [])
+        assert host[0x25].status()["reporting"] is is_started
+        assert host.send(stop) + host.wait(1.0) == []
+        host.send("026#0100", "000#0126")
+        assert host.wait(1.0) == [], "another node was started"
+        host.send(start)
+        host.restart()
+        assert host.wait(1.0) == []
 
 
-def test_the_interval_is_written_in_milliseconds() -> None:
+def test_report_interval_is_in_milliseconds() -> None:
     host = Host(profile="kst-ext")
-    host.say("625#2200220005000000")
-    assert [round(at, 9) for at, _ in host.timed(START, within=0.016)] == [0.005, 0.01, 0.015]
-    heard = host.timed("625#2200220064000000", within=0.101)
-    assert [(round(at, 9), text) for at, text in heard] == [
-        (0.0001, "5A5#6000220000000000"),
-        (0.1, "5A5#00000000"),
-    ]
-    host.say("625#2200220000000000")
-    assert host.heard(1.0) == []
+    host.ask("2200220005000000")
+    assert [at for at, _ in host.timed(START, within=0.016)] == [0.005, 0.01, 0.015]
+    reports = host.timed("2200220064000000", within=0.101)
+    assert reports == [(0.0001, "5A5#6000220000000000"), (0.1, "5A5#00000000")]
+    host.ask("2200220000000000")
+    assert host.wait(1.0) == []
 
 
-@pytest.mark.parametrize(("written", "kept"), [(0, 10), (1, 10), (9, 10), (10, 10), (255, 255)])
-def test_xqpower_raises_a_short_interval_to_10_ms(written: int, kept: int) -> None:
+def test_xqpower_raises_a_short_interval() -> None:
     host = Host(profile="xqpower")
-    assert host.say(f"625#22002200{written:02X}000000") == ["5A5#6000220000000000"]
-    assert host[0x25].memory["report_interval"] == kept
+    for raw, interval in ((0, 10), (1, 10), (9, 10), (10, 10), (255, 255)):
+        assert host.ask(f"22002200{raw:02X}000000") == ["6000220000000000"]
+        assert host[0x25].memory["report_interval"] == interval
 
 
-def test_reports_of_old_restart_in_silence_and_those_from_power_up_on_with_it() -> None:
-    host = Host(profile="kst-ext")
-    host.say(START)
-    host[0x25].power_cycle()
-    assert host.heard(1.0) == []
-    host = Host(reports_ms="2")
-    host.wait(0.0015)
-    host[0x25].power_cycle()
-    assert [round(at - host.now, 6) for at, _ in host.wait(0.005)] == [-0.003, -0.001]
+def test_xqpower_ignores_targets_unless_started() -> None:
+    host = Host(profile="xqpower")
+    places = []
+    for command in ("", START_STANDARD, STOP_STANDARD):
+        host.send(*filter(None, [command]))
+        host.write(0x6003, 100 if command != STOP_STANDARD else 0)
+        host.wait(1.0)
+        places.append(host[0x25].raw_position)
+    assert places == [0, 100, 100]
 
 
-def test_what_it_says_unasked_has_the_form_of_identifier_it_was_last_asked_in() -> None:
+def test_report_has_the_identifier_format_of_the_last_request() -> None:
     host = Host(reports_ms=5)
-    assert host.heard(0.0051) == ["5A5#00000000"]
-    host.say(f"00000625#{READ}")
-    assert host.heard(0.0051) == ["000005A5#00000000"]
-    assert Host(reports_ms=5, id_format="ext").heard(0.0051)[-1] == "000005A5#00000000"
+    assert host.wait(0.0051) == ["5A5#00000000"]
+    host.send(f"00000625#{READ_ID}")
+    assert host.wait(0.0051) == ["000005A5#00000000"]
+    assert Host(reports_ms=5, id_format="ext").wait(0.0051) == ["000005A5#00000000"]
 
 
-def test_xqpower_acknowledges_positions_and_ignores_them_until_it_is_started() -> None:
-    host = Host(profile="xqpower")
-    assert host.say("625#2203600064000000") == ["5A5#6003600000000000"]
-    host.wait(1.0)
-    assert (host[0x25].raw_position, host[0x25].memory["goal_position"]) == (0, 0)
-    host.say(NMT_START, "625#2203600064000000")
-    host.wait(1.0)
-    assert host[0x25].raw_position == 100
-    host.say(NMT_STOP, "625#2203600000000000")
-    host.wait(1.0)
-    assert host[0x25].raw_position == 100
-
-
-# --- alarm ------------------------------------------------------------------------------------------------------
-
-
-def test_a_supply_that_falls_too_low_is_told_once() -> None:
+def test_low_supply_sends_an_alarm_once() -> None:
     host = Host()
-    host[0x25].voltage = 6.0
-    assert host.heard(1.0) == []
-    host[0x25].voltage = 5.9
-    assert host.heard(1.0) == ["3A5#0A020000"]
-    host[0x25].voltage = 5.5
-    assert host.heard(1.0) == []
-    host[0x25].voltage = 7.0
-    host[0x25].voltage = 5.0
-    assert host.heard(1.0) == ["3A5#0A020000"]
-    assert host[0x25].status()["voltage"] == 5.0
-
-
-def test_an_alarm_can_be_raised_and_an_unplugged_servo_raises_none() -> None:
-    host = Host()
-    host[0x25].alarm()
+    for volts, alarms in ((6.0, 0), (5.9, 1), (5.5, 0), (7.0, 0), (5.0, 1)):
+        host[0x25].voltage = volts
+        assert host.wait(1.0) == ["3A5#0A020000"] * alarms
     host[0x25].alarm(b"\x0a\x01\x00\x00")
-    assert host.heard(0.1) == ["3A5#0A020000", "3A5#0A010000"]
+    assert host.wait(0.1) == ["3A5#0A010000"]
     host[0x25].unplug()
     host[0x25].alarm()
-    host[0x25].voltage = 1.0
-    assert host.heard(0.1) == []
+    assert host.wait(0.1) == []

@@ -21,7 +21,6 @@ from motorbus.families.kst import (
     broadcast_read,
     broadcast_save,
 )
-from motorbus.families.kst.driver.bus import stop
 from motorbus.families.kst.driver.requests import read_register, write_register
 from motorbus.families.kst.profiles import BIT_RATES
 from motorbus.families.kst.simulator import KstBus
@@ -44,7 +43,7 @@ class KstRig:
         assert isinstance(simulator, KstBus)
         self.servos = simulator.nodes
         self.link = self.linked(simulator)
-        self.family = FAMILY.configured(profile=profile)
+        self.family = FAMILY.open(profile=profile)
         self.bus = make_bus(self.link, self.family, report=lambda event: None)
         self.settings = Servo(self.bus, NODE).settings
         self.count = self.here = 0
@@ -224,9 +223,9 @@ def broadcast_saving(rig: KstRig) -> None:
 def stopping(rig: KstRig) -> None:
     """What an emergency stop says to a servo: where are you, and stay there. Success means that this is its target."""
     raw = rig.stir()
-    (ask,) = stop({NODE: None}, rig.settings).requests
+    (ask,) = rig.bus.driver.stop({NODE: None}).requests
     answer: Response = rig.run(ask)
-    (hold,) = stop({NODE: answer}, rig.settings).requests
+    (hold,) = rig.bus.driver.stop({NODE: answer}).requests
     _written(rig, lambda: rig.run(hold), "goal_position", raw)
 
 

@@ -32,7 +32,7 @@ class Rig:
         assert isinstance(self.simulator, FeetechBus)
         self.servos = self.simulator.nodes
         self.link = MemoryLink(self.simulator, line=self.line, **self.options)
-        self.bus = make_bus(self.link, FAMILY)
+        self.bus = make_bus(self.link, FAMILY.open())
         exclude_echo(self.bus)
 
     def put(self, line: Line) -> None:

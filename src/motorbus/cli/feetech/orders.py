@@ -146,7 +146,7 @@ async def _action_all(bus: Bus) -> None:
     everyone = driver.action_all()
     await everyone
     await Sleep(
-        bus.family.air_time(everyone, bus.rate)
+        bus.driver.air_time(everyone, bus.rate)
     )  # nobody answers: let it leave before the port is closed
 
 

@@ -23,12 +23,12 @@ from motorbus.families.stepper.table import (
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from motorbus.core.family import Family
+    from motorbus.core.family import BusDriver
     from motorbus.core.request import Data
 
 
 def as_written(
-    family: Family, read: Mapping[Data, Any], withheld: Iterable[bytes], request: Data
+    driver: BusDriver, read: Mapping[Data, Any], withheld: Iterable[bytes], request: Data
 ) -> bytes | None:
     """The reply to a request after what was withheld; b"" where that makes no difference, None where nobody can say.
 
@@ -37,7 +37,7 @@ def as_written(
     asked = wire.decode_request(request) if isinstance(request, bytes) else None
     if asked is None or asked.command.name != "read_project":
         return None
-    desk = _Desk(getattr(family, "_order", "little"), read)
+    desk = _Desk(getattr(driver, "order", "little"), read)
     for frame in withheld:
         desk.take(frame)
     return desk.dump(asked.values["project"])

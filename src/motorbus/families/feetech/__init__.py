@@ -7,24 +7,24 @@ is what the rest of motorbus knows of these servos.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cached_property
 from typing import Any, Final
 
 from motorbus.core.family import (
-    Devices,
+    AxisDriver,
+    DeviceTypes,
     Explanation,
+    Family,
     Found,
     Identity,
-    LinkNeeds,
+    LinkSpec,
     Option,
     Receiver,
     Simulator,
     Stop,
 )
-from motorbus.core.register import RegisterMap
+from motorbus.core.half_duplex import HalfDuplexSerial
 from motorbus.core.request import Request, Response
 from motorbus.core.steps import Procedure, Runnable
-from motorbus.errors import RequestError
 from motorbus.families.feetech import driver, wire
 from motorbus.families.feetech.driver import (
     AsyncServo,
@@ -60,12 +60,13 @@ from motorbus.families.feetech.driver import (
 )
 from motorbus.families.feetech.driver.assured import ASSURANCE
 from motorbus.families.feetech.table import BAUD_CODES, CONTROL, MODELS, TABLES
+from motorbus.families.feetech.wire.recording import CAPTURES
 
 __all__ = [
     "FAMILY",
     "AsyncServo",
     "Calibration",
-    "Feetech",
+    "FeetechDriver",
     "Gains",
     "GroupResult",
     "Node",
@@ -94,104 +95,49 @@ __all__ = [
     "sync_writer",
 ]
 
-_AXIS: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
-    "state": driver.telemetry,
-    "position": driver.position,
-    "velocity": driver.velocity,
-    "load": driver.load,
-    "current": driver.current,
-    "voltage": driver.voltage,
-    "temperature": driver.temperature,
-    "health": driver.health,
-    "enable_torque": driver.enable_torque,
-    "disable_torque": driver.disable_torque,
-    "move": driver.move,
-    "stop": driver.stop,
-    "limits": driver.limits,
-    "travel": driver.travel,
-    "cap_torque": driver.cap_torque,
-    "cap_current": driver.cap_current,
-    "train": driver.train,
-}
+_AXIS: Final = AxisDriver(
+    state=driver.telemetry,
+    position=driver.position,
+    velocity=driver.velocity,
+    load=driver.load,
+    current=driver.current,
+    voltage=driver.voltage,
+    temperature=driver.temperature,
+    health=driver.health,
+    enable_torque=driver.enable_torque,
+    disable_torque=driver.disable_torque,
+    move=driver.move,
+    stop=driver.stop,
+    limits=driver.limits,
+    travel=driver.travel,
+    cap_torque=driver.cap_torque,
+    cap_current=driver.cap_current,
+    stream=driver.train,
+)
 _ONLY_WHERE: Final[Mapping[str, Callable[[str], object]]] = {
     "current": lambda register_map: TABLES[register_map]["present_current"].unit,
     "cap_torque": lambda register_map: CONTROL[register_map].limit,
     "cap_current": lambda register_map: CONTROL[register_map].current,
 }
-"""What only servos of some maps can, and which maps these are."""
-
-_SETTINGS: Final = (
-    Option(
-        "estop_hold",
-        str,
-        "",
-        "ids of servos that an emergency stop holds where they are, as 1+4, instead of letting them go",
-    ),
-)
+"""Capabilities of servos of some maps only, and which maps these are."""
 
 
-class Feetech:
-    """The family of FEETECH servos; see `motorbus.core.family.Family` for each member."""
+class FeetechDriver(HalfDuplexSerial):
+    """FEETECH servos on one open bus; see `core.family.BusDriver`. `estop_hold`: ids that an emergency stop holds."""
 
-    name: Final = "feetech"
-    tables: Final[Mapping[str, RegisterMap]] = TABLES
-    devices: Final = Devices(Servo, AsyncServo, ASSURANCE)
+    delays = line.DELAYS
+    delay_per_reply = line.RETURN_DELAY
+    broadcast_delay = line.COLLISION
+    broadcast_bytes = line.BROADCAST_BYTES
+    longest_reply = line.LONGEST
+    longest_gap = line.LONGEST_GAP
 
-    def __init__(self, hold: frozenset[int] = frozenset()) -> None:
-        self._hold: Final = hold
-
-    @cached_property
-    def link(self) -> LinkNeeds:
-        from motorbus.families.feetech.simulator import OPTIONS
-        from motorbus.families.feetech.wire.recording import CAPTURES
-
-        usual = BAUD_CODES[0]
-        options = (
-            Option(
-                "baud", int, usual, "rate of the bus in bit/s; servos of the STS series ship with 1000000"
-            ),
-            Option("ids", str, "1", "ids of the simulated servos, as 1-6 or 1+4+7"),
-            Option("model", str, "sts3215", "model of the simulated servos, or one for each joined by +"),
-        )
-        return LinkNeeds(
-            "bytes",
-            usual,
-            tuple(BAUD_CODES.values()),
-            (*options, *OPTIONS),
-            _SETTINGS,
-            stops=("torque_off", "hold"),
-            captures=CAPTURES,
-        )
-
-    def configured(self, **settings: object) -> Feetech:
-        unknown = settings.keys() - {option.name for option in _SETTINGS}
-        if unknown:
-            raise RequestError(
-                f"a feetech bus has no setting {min(unknown)!r}",
-                expected=f"one of {', '.join(option.name for option in _SETTINGS)}",
-            )
-        said: Any = settings.get("estop_hold")
-        return self if said is None else Feetech(holding.held_ids(said))
-
-    def lane(self, node: int) -> int:
-        return 0
-
-    def air_time(self, request: Request[Any], rate: int) -> float:
-        return line.air_time(request, rate)
-
-    def turnaround(self, request: Request[Any]) -> float:
-        return line.turnaround(request)
-
-    def quiet_time(self, rate: int) -> float:
-        return line.quiet_time(rate)
+    def __init__(self, family: Family, estop_hold: Any = None) -> None:
+        super().__init__(family)
+        self._hold: Final = frozenset() if estop_hold is None else holding.held_ids(estop_hold)
 
     def echo_test(self) -> Request[Any]:
         return line.echo_test()
-
-    def explain(self, data: bytes) -> list[Explanation]:
-        from motorbus.families.feetech.explain import explain
-
-        return explain(data)
 
     def receiver(self) -> Receiver:
         return wire.StatusReceiver()
@@ -208,15 +154,62 @@ class Feetech:
     def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Procedure[list[Found]]:
         return scan(ids, rates, polls=driver.GLANCE)
 
-    def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:
+    def axis(self, model: str) -> AxisDriver:
         maps = {name for known in MODELS.values() if known.name == model.upper() for name in known.maps}
         lacks = {name for name, does in _ONLY_WHERE.items() if not all(map(does, maps))}
-        return {name: one for name, one in _AXIS.items() if name not in lacks} if maps else {}
+        given = {name: getattr(_AXIS, name) for name in _AXIS.names - lacks} if maps else {}
+        return AxisDriver(**given)
 
-    def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
-        from motorbus.families.feetech.simulator import simulate
+    def decode(self, data: bytes) -> list[Explanation]:
+        from motorbus.families.feetech.explain import explain
 
-        return simulate(ids, model, **options)
+        return explain(data)
 
 
-FAMILY: Final = Feetech()
+def _simulator(ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
+    from motorbus.families.feetech.simulator import simulate
+
+    return simulate(ids, model, **options)
+
+
+def _simulator_options() -> tuple[Option, ...]:
+    from motorbus.families.feetech.simulator import OPTIONS
+
+    return (
+        Option(
+            "baud",
+            int,
+            BAUD_CODES[0],
+            "rate of the bus in bit/s; servos of the STS series ship with 1000000",
+        ),
+        Option("ids", str, "1", "ids of the simulated servos, as 1-6 or 1+4+7"),
+        Option("model", str, "sts3215", "model of the simulated servos, or one for each joined by +"),
+        *OPTIONS,
+    )
+
+
+_ESTOP_HOLD: Final = Option(
+    "estop_hold",
+    str,
+    "",
+    "ids of servos that an emergency stop holds where they are, as 1+4, instead of letting them go",
+)
+
+FAMILY: Final = Family(
+    name="feetech",
+    link=LinkSpec(
+        "bytes",
+        BAUD_CODES[0],
+        tuple(BAUD_CODES.values()),
+        (_ESTOP_HOLD,),
+        stops=("torque_off", "hold"),
+        captures=CAPTURES,
+    ),
+    registers=TABLES,
+    devices=DeviceTypes(Servo, AsyncServo),
+    driver=FeetechDriver,
+    simulator=_simulator,
+    simulator_options=_simulator_options,
+    safety=ASSURANCE,
+    cli="motorbus.cli.feetech",
+)

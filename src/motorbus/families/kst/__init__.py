@@ -6,28 +6,17 @@ opened with a profile (`kst:PORT,profile=xqpower`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import cached_property
-from typing import Any, Final
+from typing import Final
 
 from motorbus.core.family import (
-    Devices,
-    Explanation,
-    Found,
-    Identity,
-    LinkNeeds,
+    DeviceTypes,
+    Family,
+    LinkSpec,
     Option,
-    Receiver,
     Simulator,
-    Stop,
 )
 from motorbus.core.guarantees import Guarantee, Guarantees, Level
-from motorbus.core.register import RegisterMap
-from motorbus.core.request import Request, Response
 from motorbus.core.scan import Skipped
-from motorbus.core.steps import Procedure, Runnable
-from motorbus.errors import RequestError
-from motorbus.families.kst.driver import bus, feedback, identity, motion, stream
 from motorbus.families.kst.driver.broadcast import (
     broadcast_bit_rate,
     broadcast_node_id,
@@ -35,21 +24,22 @@ from motorbus.families.kst.driver.broadcast import (
     broadcast_read,
     broadcast_save,
 )
+from motorbus.families.kst.driver.bus import KstDriver
 from motorbus.families.kst.driver.feedback import RawStatus, Status
 from motorbus.families.kst.driver.motion import Promise, Started
-from motorbus.families.kst.driver.node import DEFAULT, ID_FORMATS, NMT, SIZED, BusSettings, Node
+from motorbus.families.kst.driver.node import ID_FORMATS, NMT, SIZED, BusSettings, Node
 from motorbus.families.kst.driver.provisioning import PowerCycleNeeded, Provisioned
 from motorbus.families.kst.driver.scan import BitRates, LineActivity, Suspicion, scan, scan_bit_rates
 from motorbus.families.kst.driver.servo import AsyncServo, Servo, settings_of
-from motorbus.families.kst.notifications import BusState, FrameReceiver
 from motorbus.families.kst.profiles import DEFAULT_RATE, PROFILES, RATES, TABLES
+from motorbus.families.kst.recording import CAPTURES
 
 __all__ = [
     "FAMILY",
     "AsyncServo",
     "BitRates",
     "BusSettings",
-    "Kst",
+    "KstDriver",
     "LineActivity",
     "Node",
     "PowerCycleNeeded",
@@ -104,102 +94,27 @@ GUARANTEES: Final = Guarantees(
 )
 """Source: the CAN protocol sheets of the makers: a target position, and no stop, torque switch or heartbeat."""
 
-_AXIS: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
-    "state": feedback.telemetry,
-    "position": feedback.position,
-    "health": feedback.health,
-    "move": motion.move,
-    "stop": motion.stop,
-    "limits": motion.limits,
-    "travel": motion.travel,
-    "train": stream.open_stream,
-}
+
+def _simulator(ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
+    from motorbus.families.kst.simulator import simulate
+
+    return simulate(ids, model, **options)
 
 
-class Kst:
-    """The family of KST CAN servos; see `core.family.Family` for each member."""
+def _simulator_options() -> tuple[Option, ...]:
+    from motorbus.families.kst.simulator import OPTIONS
 
-    name: Final = "kst"
-    tables: Final[Mapping[str, RegisterMap]] = TABLES
-    devices: Final = Devices(Servo, AsyncServo, GUARANTEES)
-
-    def __init__(self, settings: BusSettings = DEFAULT) -> None:
-        self._settings = settings
-
-    @cached_property
-    def link(self) -> LinkNeeds:
-        from motorbus.families.kst.recording import CAPTURES
-        from motorbus.families.kst.simulator import OPTIONS
-
-        return LinkNeeds(
-            "frames",
-            DEFAULT_RATE,
-            RATES,
-            OPTIONS,
-            _SETTINGS,
-            bus.WINDOW,
-            stops=("hold",),
-            captures=CAPTURES,
-        )
-
-    def configured(self, **settings: object) -> Kst:
-        unknown = settings.keys() - {option.name for option in _SETTINGS}
-        if unknown:
-            raise RequestError(
-                f"a kst bus has no setting {min(unknown)!r}",
-                expected=f"one of {', '.join(option.name for option in _SETTINGS)}",
-            )
-        return Kst(self._settings.replace(state=BusState(), **settings))
-
-    def lane(self, node: int) -> int:
-        return node
-
-    def air_time(self, request: Request[Any], rate: int) -> float:
-        return bus.air_time(request, rate)
-
-    def turnaround(self, request: Request[Any]) -> float:
-        return bus.response_delay(request, self._settings.profile.flash_wait)
-
-    def quiet_time(self, rate: int) -> float:
-        return bus.quiet_time(rate)
-
-    def echo_test(self) -> None:
-        return None  # a CAN controller does not receive its own frames
-
-    def explain(self, data: bytes) -> list[Explanation]:
-        from motorbus.families.kst.decode import decode
-
-        return decode(data, self._settings.profile)
-
-    def receiver(self) -> Receiver:
-        return FrameReceiver(self._settings.extended, self._settings.state)
-
-    def probe(self, node: int, attempt: int) -> Request[bool]:
-        return bus.probe(Node(node, self._settings), attempt)
-
-    def stop(self, nodes: Mapping[int, Response | None]) -> Stop:
-        return bus.stop(nodes, self._settings)
-
-    def identify(self, node: int) -> Runnable[Identity]:
-        return identity.identify(Node(node, self._settings))
-
-    def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Procedure[list[Found]]:
-        return scan(ids, rates, self._settings)
-
-    def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:
-        for profile in PROFILES.values():
-            if model in (profile.name, profile.title):
-                if profile.status_row is None:
-                    return _AXIS
-                return {**_AXIS, "current": feedback.current, "temperature": feedback.temperature}
-        return {}
-
-    def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
-        from motorbus.families.kst.simulator import simulate
-
-        if not model:
-            options.setdefault("profile", self._settings.profile.name)
-        return simulate(ids, model, **options)
+    return OPTIONS
 
 
-FAMILY: Final = Kst()
+FAMILY: Final = Family(
+    name="kst",
+    link=LinkSpec("frames", DEFAULT_RATE, RATES, _SETTINGS, stops=("hold",), captures=CAPTURES),
+    registers=TABLES,
+    devices=DeviceTypes(Servo, AsyncServo),
+    driver=KstDriver,
+    simulator=_simulator,
+    simulator_options=_simulator_options,
+    safety=GUARANTEES,
+    cli="motorbus.families.kst.cli",
+)

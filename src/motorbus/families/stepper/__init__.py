@@ -21,26 +21,25 @@ before a motor turns, and `simulator` makes it a device.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from copy import deepcopy
-from functools import cached_property
 from typing import Any, Final
 
 from motorbus.core.family import (
-    Devices,
+    AxisDriver,
+    DeviceTypes,
     Explanation,
+    Family,
     Found,
     Identity,
-    LinkNeeds,
+    LinkSpec,
     Option,
     Receiver,
     Simulator,
     Stop,
 )
-from motorbus.core.register import RegisterMap
 from motorbus.core.request import Request, Response
 from motorbus.core.steps import Procedure, Runnable
-from motorbus.errors import RequestError
 from motorbus.families.stepper import driver, wire
 from motorbus.families.stepper.driver import (
     AsyncController,
@@ -71,7 +70,8 @@ from motorbus.families.stepper.driver.assured import ASSURANCE
 from motorbus.families.stepper.execution import Behaviour
 from motorbus.families.stepper.program import Conditions, Estimate, Finding, Plan, Profile, Program
 from motorbus.families.stepper.program.backups import Backup
-from motorbus.families.stepper.table import RATE, TABLES, Order, checked_order
+from motorbus.families.stepper.table import RATE, TABLES, checked_order
+from motorbus.families.stepper.wire.recording import CAPTURES
 
 __all__ = [
     "FAMILY",
@@ -100,7 +100,7 @@ __all__ = [
     "Ran",
     "Sends",
     "Slowing",
-    "Stepper",
+    "StepperDriver",
     "Unrecorded",
     "Watched",
     "Written",
@@ -116,58 +116,37 @@ _SETTINGS: Final = (
 )  # fmt: skip
 
 
-_AXIS: Final[Mapping[str, Callable[..., Runnable[Any]]]] = {
-    "move_by": driver.move_by,
-    "jog": driver.jog,
-    "home": driver.home,
-    "keep_time": driver.keep_time,
-    "run": driver.run,
-    "stop": driver.stop,
-}
-"""No position and no move to one: there is none to ask for."""
+_AXIS: Final = AxisDriver(
+    move_by=driver.move_by,
+    jog=driver.jog,
+    home=driver.home,
+    keep_time=driver.keep_time,
+    run=driver.run,
+    stop=driver.stop,
+)
+"""The controller reports no position, so it has no move to one."""
 
 
-class Stepper:
-    """The family of the stepper controller; see `motorbus.core.family.Family` for each member.
+class StepperDriver:
+    """A stepper controller on one open bus; see `core.family.BusDriver`. `memory` keeps what was sent on it."""
 
-    `FAMILY` keeps nothing; one that is configured for a bus keeps what was said on it, see `driver.Memory`.
-    """
+    window = 1
+    full_duplex = True
 
-    name: Final = "stepper"
-    tables: Final[Mapping[str, RegisterMap]] = TABLES
-    devices: Final = Devices(Controller, AsyncController, ASSURANCE)
+    def __init__(self, family: Family, motor: object = wire.MOTOR, dump_order: object = "little") -> None:
+        self.family = family
+        self.motor = driver.checked_motor(motor)
+        self.order = checked_order(dump_order)
+        self.memory = driver.Memory()
 
-    def __init__(
-        self,
-        motor: int = wire.MOTOR,
-        dump_order: Order = "little",
-        memory: driver.Memory | None = None,
-    ) -> None:
-        self._motor = motor
-        self._order = dump_order
-        self._memory = memory
-
-    @cached_property
-    def link(self) -> LinkNeeds:
-        from motorbus.families.stepper.simulator import OPTIONS
-        from motorbus.families.stepper.wire.recording import CAPTURES
-
-        return LinkNeeds(
-            "bytes", RATE, (RATE,), OPTIONS, _SETTINGS, only=wire.ONLY, both_ways=True, captures=CAPTURES
-        )
-
-    def configured(self, **settings: object) -> Stepper:
-        for name in settings.keys() - {"motor", "dump_order"}:
-            raise RequestError(f"a stepper bus has no setting {name!r}", expected="motor or dump_order")
-        motor, order = settings.get("motor", self._motor), settings.get("dump_order", self._order)
-        return Stepper(driver.checked_motor(motor), checked_order(order), driver.Memory())
-
-    def __copy__(self) -> Stepper:
-        """The same with a memory of its own, as it is now: what is only rehearsed was not said."""
-        return Stepper(self._motor, self._order, deepcopy(self._memory))
+    def __copy__(self) -> StepperDriver:
+        """A copy with a memory of its own: what a dry run sends is not remembered."""
+        copied = StepperDriver(self.family, self.motor, self.order)
+        copied.memory = deepcopy(self.memory)
+        return copied
 
     def _node(self, node: int = wire.ONLY) -> driver.Node:
-        return driver.Node(node, self._motor, self._order, self._memory)
+        return driver.Node(node, self.motor, self.order, self.memory)
 
     def lane(self, node: int) -> int:
         return 0
@@ -184,11 +163,6 @@ class Stepper:
     def echo_test(self) -> Request[bytes]:
         return driver.dump_once(self._node(), 1)
 
-    def explain(self, data: bytes) -> list[Explanation]:
-        from motorbus.families.stepper.explain import explain
-
-        return explain(data, self._order)
-
     def receiver(self) -> Receiver:
         return wire.Receiver()
 
@@ -196,22 +170,43 @@ class Stepper:
         return presence.probe(self._node(node), attempt)
 
     def stop(self, nodes: Mapping[int, Response | None]) -> Stop:
-        return stopping.stop_all(nodes, self._motor)
+        return stopping.stop_all(nodes, self.motor)
 
     def identify(self, node: int) -> Runnable[Identity]:
         return driver.identify(self._node(node))
 
     def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Procedure[list[Found]]:
-        return driver.scan(ids, rates, self._motor)
+        return driver.scan(ids, rates, self.motor)
 
-    def axis(self, model: str) -> Mapping[str, Callable[..., Runnable[Any]]]:
-        return _AXIS if model == presence.MODEL else {}
+    def axis(self, model: str) -> AxisDriver:
+        return _AXIS if model == presence.MODEL else AxisDriver()
 
-    def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
-        from motorbus.families.stepper.simulator import simulate
+    def decode(self, data: bytes) -> list[Explanation]:
+        from motorbus.families.stepper.explain import explain
 
-        options = {"motor": self._motor, "dump_order": self._order, **options}
-        return simulate(ids, model, **options)
+        return explain(data, self.order)
 
 
-FAMILY: Final = Stepper()
+def _simulator(ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
+    from motorbus.families.stepper.simulator import simulate
+
+    return simulate(ids, model, **options)
+
+
+def _simulator_options() -> tuple[Option, ...]:
+    from motorbus.families.stepper.simulator import OPTIONS
+
+    return OPTIONS
+
+
+FAMILY: Final = Family(
+    name="stepper",
+    link=LinkSpec("bytes", RATE, (RATE,), _SETTINGS, only=wire.ONLY, captures=CAPTURES),
+    registers=TABLES,
+    devices=DeviceTypes(Controller, AsyncController),
+    driver=StepperDriver,
+    simulator=_simulator,
+    simulator_options=_simulator_options,
+    safety=ASSURANCE,
+    cli="motorbus.cli.stepper",
+)

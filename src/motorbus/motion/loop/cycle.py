@@ -354,13 +354,13 @@ async def _begun(train: PositionStream, command: Command, watch: Watch | None) -
         for axis in command.axes:
             await cap(axis)
         speeds = {axis.spec.node: axis.spec.rate_to_device(axis.spec.max_velocity) for axis in command.axes}
-        await train.begin({node: abs(speed) for node, speed in speeds.items()})
+        await train.start({node: abs(speed) for node, speed in speeds.items()})
 
     try:
         await command.watched(ready())
         if watch is not None:
             await watch.begin(command.axes)
-        return list(await gather(*[axis.able["position"](axis.device) for axis in command.axes]))
+        return list(await gather(*[axis.able.position(axis.device) for axis in command.axes]))
     except BaseException:
         for axis in command.held():  # they may have torque, and go nowhere
             axis.arrives()
@@ -369,7 +369,7 @@ async def _begun(train: PositionStream, command: Command, watch: Watch | None) -
 
 async def train_of(bus: BaseBus, axes: Sequence[AxisVerbs]) -> PositionStream:
     """These axes of one bus, ready to be asked and told in a loop; nothing is written."""
-    train: PositionStream = await axes[0].able["train"]([axis.device for axis in axes], rate=bus.rate)
+    train: PositionStream = await axes[0].able.stream([axis.device for axis in axes], rate=bus.rate)
     return train
 
 

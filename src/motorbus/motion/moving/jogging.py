@@ -28,7 +28,7 @@ async def jog(axis: AxisVerbs, velocity: float, seconds: float, *, policy: Polic
     instead, which is told before it moves (`Clamped`); one that stands there, or beyond, stays and gets no torque.
     """
     check_policy(policy)
-    if "train" not in axis.able:
+    if "stream" not in axis.able:
         _check_led(axis, policy)
         return await reckoning.jog(axis, velocity, seconds)
     way, _ = way_of_jog(axis, velocity, seconds)
@@ -60,7 +60,7 @@ def way_of_jog(axis: AxisVerbs, velocity: float, seconds: float) -> tuple[float,
 
 async def _clamped(axis: AxisVerbs, way: float) -> Clamped | None:
     """How far a jog may lead it where that is less than the whole way: nowhere, where it stands at the end already."""
-    here = axis.spec.from_device(await axis.able["position"](axis.device))
+    here = axis.spec.from_device(await axis.able.position(axis.device))
     device = await limits.of_device(axis)
     to = here + way
     _, told = kept(axis.name, axis.spec, to, policy="clamp", device=device)

@@ -183,7 +183,7 @@ def _parties(axes: Mapping[str, AxisVerbs]) -> dict[str, list[AxisVerbs]]:
     """
     found: dict[str, list[AxisVerbs]] = {}
     for name, axis in axes.items():
-        if "train" in axis.able:
+        if "stream" in axis.able:
             found.setdefault(axis.spec.bus, []).append(axis)
         elif "keep_time" in axis.able:
             found[name] = [axis]
@@ -193,7 +193,7 @@ def _parties(axes: Mapping[str, AxisVerbs]) -> dict[str, list[AxisVerbs]]:
                 expected="a device that takes goals, or one that can keep time with others",
                 advice=f"leave it out; {NOTHING}",
             )
-    return dict(sorted(found.items(), key=lambda one: "train" not in one[1][0].able))
+    return dict(sorted(found.items(), key=lambda one: "stream" not in one[1][0].able))
 
 
 def _interrupted(error: BaseException) -> Interrupted:

@@ -49,7 +49,7 @@ NEAR: Final = 3
 
 async def part(journey: Journey, party: str, axes: Sequence[AxisVerbs]) -> Gone:
     """One part of a journey, from the first look to the arrival. Whatever ends it early, its axes are told to stop."""
-    led = "train" in axes[0].able
+    led = "stream" in axes[0].able
     work: LedPart | OwnPart = LedPart(journey, party, axes) if led else OwnPart(journey, party, axes[0])
     journey.commands.append(work.command)
     await with_cleanup(_failing(journey, axes, work.run()), lambda: _ended(journey, work))
@@ -147,7 +147,7 @@ class LedPart:
         """Those who are led, with all known of them that a cycle needs."""
         axes = self._axes
         try:
-            return await axes[0].able["train"]([axis.device for axis in axes], rate=self._bus.rate)
+            return await axes[0].able.stream([axis.device for axis in axes], rate=self._bus.rate)
         except NoReply as error:
             silent = [axis for axis in axes if axis.spec.node == error.node]
             if not silent:
@@ -204,7 +204,7 @@ class LedPart:
         for axis in self._axes:
             await single.cap(axis)
         speeds = {axis.spec.node: axis.spec.rate_to_device(axis.spec.max_velocity) for axis in self._axes}
-        await train.begin({node: abs(speed) for node, speed in speeds.items()})
+        await train.start({node: abs(speed) for node, speed in speeds.items()})
 
 
 class OwnPart:
@@ -248,7 +248,7 @@ class OwnPart:
         axis, spec, movement = self._axis, self._axis.spec, Movement()
         try:
             self.command.depart(movement)
-            turned: Turned = await axis.able["keep_time"](
+            turned: Turned = await axis.able.keep_time(
                 axis.device,
                 way * spec.ratio,
                 self._timing,

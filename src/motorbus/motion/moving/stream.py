@@ -105,7 +105,7 @@ def rate_for(
     RequestError for a rate that is none, or more than the wire carries.
     """
     cycle = (*train.goals(angles), *train.positions)
-    highest = 1 / sum(bus.family.air_time(one, bus.rate) for one in cycle)
+    highest = 1 / sum(bus.driver.air_time(one, bus.rate) for one in cycle)
     if asked is None:
         asked = min(USUAL, max(SHARE * highest, limits.SLOWEST))
     if not limits.SLOWEST <= asked <= highest:
@@ -189,7 +189,7 @@ class Stream:
 
     def lead(self, bus: BaseBus) -> float:
         """s before the start at which the first goals must leave, so that they have arrived then."""
-        return sum(bus.family.air_time(one, bus.rate) for one in self._train.goals(self._goals(0.0)))
+        return sum(bus.driver.air_time(one, bus.rate) for one in self._train.goals(self._goals(0.0)))
 
     async def run(self, start: float, lead: float = 0.0) -> Streamed:
         """Lead them along the course, which begins at `start` (s on the link's clock), and see them arrive.

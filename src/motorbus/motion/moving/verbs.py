@@ -84,7 +84,7 @@ class PointToPoint(NamedTuple):
         goals = {name: goal(facts[name].position) for name, goal in self.goals.items()}
         for name, goal in goals.items():
             axis, fact = self.axes[name], facts[name]
-            at_once = None if "train" in axis.able else fact.position
+            at_once = None if "stream" in axis.able else fact.position
             limits.check_goal(name, axis.spec, goal, measured=at_once, device=fact.device)
         moves = {name: Move(facts[name].position, goal, self.limits[name]) for name, goal in goals.items()}
         whole = synchronised(moves, kind=self.kind, duration=duration)
@@ -232,7 +232,7 @@ def _replayed(
     first = way.positions(0.0)
     axes = {name: body.axis(name) for name in first}
     for name, axis in axes.items():
-        if "train" not in axis.able:
+        if "stream" not in axis.able:
             raise RequestError(
                 f"{name} cannot go along a trajectory: {axis.spec.device} moves by a profile of its own",
                 expected="axes that can be led",
@@ -274,7 +274,7 @@ async def move_by(axis: AxisVerbs, way: float, *, velocity: float | None = None)
     Returns the way that was gone: measured, or *estimated* where the device does not tell where it is. Such an axis may
     be moved by a way also while nobody knows where it is. Raises as `move`.
     """
-    if "train" not in axis.able:
+    if "stream" not in axis.able:
         return await reckoning.move_by(axis, way, velocity=velocity)
     limits.check_finite(axis.name, "way", way)
     own = limits.limits_for(axis.name, axis.spec, velocity=velocity)

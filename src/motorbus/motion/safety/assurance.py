@@ -75,7 +75,7 @@ def assured(
     machine: Machine, families: Mapping[str, Family], cycles: Mapping[str, float] | None = None
 ) -> Assured:
     """What is guaranteed of this machine, and what not. `families` by the names of its buses; `cycles` are s by bus."""
-    said = {bus: family.devices.assures for bus, family in families.items()}
+    said = {bus: family.safety for bus, family in families.items()}
     axes = tuple(
         _bounded(name, spec, families[spec.bus], said[spec.bus], (cycles or {}).get(spec.bus, 1 / USUAL))
         for name, spec in machine.axes.items()

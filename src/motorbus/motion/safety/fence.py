@@ -93,8 +93,7 @@ def guard(axis: AxisVerbs) -> Guard:
     """The guard over one axis."""
     if axis.reckoning is not None:
         return _reckoned(axis, axis.reckoning)
-    position = axis.able.get("position")
-    ask = None if position is None else partial(position, axis.device)
+    ask = partial(axis.able.position, axis.device) if "position" in axis.able else None
     return _guard(axis.name, axis.spec, ask, partial(_ordered, axis))
 
 

@@ -106,7 +106,7 @@ async def looked_after(axis: AxisVerbs, now: float) -> None:
     """
     if not axis.engaged or "health" not in axis.able or now - axis.restarts.at < HEALTH:
         return
-    found = await catch(axis.able["health"](axis.device))
+    found = await catch(axis.able.health(axis.device))
     if isinstance(found, Health) and looked_at(axis, found) is not None:
         await Emit(FaultNoted(axis.name, why(axis)))
 
@@ -129,7 +129,7 @@ async def kept(axis: AxisVerbs) -> None:
     """Of an axis that was told to hold: raise Faulted where its device has not kept its torque."""
     if "health" not in axis.able:
         return
-    found = await catch(axis.able["health"](axis.device))
+    found = await catch(axis.able.health(axis.device))
     if isinstance(found, Health) and (error := looked_at(axis, found)) is not None:
         await Emit(FaultNoted(axis.name, why(axis)))
         raise error

@@ -109,7 +109,7 @@ async def seen(axis: AxisVerbs, promise: Enum, patience: float = PATIENCE) -> St
     """Look at an axis that was stopped, until it is seen to rest or for `patience` s; its silence is no error."""
     if "position" not in axis.able:
         return Stopped(promise, Rest.UNSEEN)
-    rest, place = await watched(lambda: axis.able["position"](axis.device), patience)
+    rest, place = await watched(lambda: axis.able.position(axis.device), patience)
     return Stopped(promise, rest, None if place is None else axis.spec.from_device(place))
 
 

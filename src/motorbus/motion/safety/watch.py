@@ -68,7 +68,7 @@ class Watch:
             self.dismiss(node)
             self._strains[node] = Strain() if axis.spec.guard else None
             self._turns.appendleft(node)
-            told = await catch(axis.able["health"](axis.device))
+            told = await catch(axis.able.health(axis.device))
             await self._took(node, told, NOBODY, await Sleep(0))
 
     def dismiss(self, node: int) -> None:
@@ -97,7 +97,7 @@ class Watch:
         overdue = now >= self._last.get(node, -inf) + OVERDUE * HEALTH
         if slack <= 0.0 and not overdue:
             return None
-        wanted = self._axes[node].able["health"](self._axes[node].device)
+        wanted = self._axes[node].able.health(self._axes[node].device)
         if not isinstance(
             wanted, Request
         ):  # others set it up anew, and it is not known well enough for the moment
@@ -163,7 +163,7 @@ class Watch:
         if node in self._strains:
             self._turns.remove(node)
             self._turns.appendleft(node)
-            told = await catch(axis.able["health"](axis.device))
+            told = await catch(axis.able.health(axis.device))
             await self._took(node, told, NOBODY, await Sleep(0))
 
     async def _took(
@@ -196,11 +196,11 @@ class Watch:
         self._next = inf if first is None else max(self._last.get(first, -inf) + HEALTH, self._free)
 
     def _cost(self, node: int) -> float:
-        wanted = self._axes[node].able["health"](self._axes[node].device)
+        wanted = self._axes[node].able.health(self._axes[node].device)
         return self._air(wanted) if isinstance(wanted, Request) else 0.0
 
     def _air(self, request: Request[Health]) -> float:
-        return self._bus.family.air_time(request, self._bus.rate)
+        return self._bus.driver.air_time(request, self._bus.rate)
 
 
 def _overloaded(axis: AxisVerbs, strain: Strain, now: float) -> Overloaded:

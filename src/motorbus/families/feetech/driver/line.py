@@ -7,18 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import cache
-from typing import Any, Final
+from typing import Final
 
 from motorbus.core.family import Stop
-from motorbus.core.request import ANY, Expected, Priority, Request, Response, TimeoutClass
+from motorbus.core.request import Expected, Priority, Request, Response, TimeoutClass
 from motorbus.core.setpoint import torque_off
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.holding import PROMISE, holds
 from motorbus.families.feetech.driver.motion import Promise
 from motorbus.families.feetech.driver.torque import LIMP
 
-BITS: Final = 10
-"""On the wire for each byte: start, eight of data, stop. Source: FEETECH protocol manual V1.01."""
 RETURN_DELAY: Final = 254 * 2e-6
 """s; the longest pause before a reply that register 7 can ask for. Source: STS3215 memory table V3.6."""
 PROCESSING: Final = 0.001
@@ -31,11 +29,22 @@ STORE: Final = 0.100
 COLLISION: Final = 0.8
 """s in which all servos have answered a broadcast PING at 1 Mbaud. Source: rustypot."""
 
-_LONGEST: Final = wire.MAX_LENGTH + 4
+DELAYS: Final = {
+    TimeoutClass.REPLY: PROCESSING,
+    TimeoutClass.SCAN: SCAN - RETURN_DELAY,
+    TimeoutClass.STORE: STORE,
+}
+"""s between request and reply, without the return delay of each reply."""
+BROADCAST_BYTES: Final = (wire.MAX_ID + 1) * wire.OVERHEAD
+LONGEST: Final = wire.MAX_LENGTH + 4
+"""Bytes of the longest reply."""
 _ADAPTER: Final = 0.016
 """s; latency timer of an FTDI adapter as shipped. Source: ROBOTIS-GIT/DynamixelSDK#330."""
 _SCHEDULING: Final = 0.005
 """s; how late a loaded host may run between two bytes that belong together."""
+
+LONGEST_GAP: Final = RETURN_DELAY + 2 * _ADAPTER + _SCHEDULING
+"""s: a return delay, the latency timer of the adapter both ways, and a margin for the host."""
 
 AT_ONCE: Final = 60
 """Servos that one frame of a stop lets go: 128 bytes, so that what comes next never waits long."""
@@ -43,35 +52,6 @@ ID: Final = 5
 PROBES: Final = (3, 9, 10, 12, 13, 14, *range(16, 27))
 """Bytes a probe reads from register 5 on. Never 2, whose reply is as long as the echo of its request, and none
 of the lengths in common use: 1, 2, 4, 5 (identify), 6, 7 (commands), 8, 11, 15 (feedback), 40 (settings)."""
-
-
-def air_time(request: Request[Any], rate: int) -> float:
-    """s on the wire for the request and all replies due; nothing for pauses, which may be none (register 7)."""
-    if request.expected is ANY:
-        replies = (wire.MAX_ID + 1) * wire.OVERHEAD
-    else:
-        replies = 0
-        for _, _, length in request.expected:
-            replies += length
-    return (len(request.wire) + replies) * BITS / rate
-
-
-def turnaround(request: Request[Any]) -> float:
-    """s that servos may think: once about the request, and a return delay before each reply."""
-    if request.expected is ANY:
-        return COLLISION
-    if request.reply_within is TimeoutClass.SCAN:
-        return SCAN
-    thinking = PROCESSING if request.reply_within is TimeoutClass.REPLY else STORE
-    return thinking + RETURN_DELAY * len(request.expected)
-
-
-def quiet_time(rate: int) -> float:
-    """s after which nothing of an old exchange can still be under way: about 40 ms at 1 Mbaud.
-
-    The longest reply, a return delay, the latency timer of the adapter both ways, and a margin for the host.
-    """
-    return _LONGEST * BITS / rate + RETURN_DELAY + 2 * _ADAPTER + _SCHEDULING
 
 
 def echo_test() -> Request[None]:

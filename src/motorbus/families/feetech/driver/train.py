@@ -104,7 +104,7 @@ class Train:
             self._ids = tuple(to)
         return [packet.exchange(to) for packet in self._packets]
 
-    async def begin(self, speeds: Mapping[int, float]) -> None:
+    async def start(self, speeds: Mapping[int, float]) -> None:
         """Torque on without a jump, one after the other, and nothing set that would hold back who follows goals.
 
         A servo is bound by its speed (rad/s, above 0), rounded up to what its register can say; one without is as
@@ -116,7 +116,7 @@ class Train:
             _check_speed(self._servo(id), speed)
         errors = []
         for id, node in self._servos.items():
-            failure = await catch(_begin(node, speeds.get(id)))
+            failure = await catch(_start(node, speeds.get(id)))
             if failure is not None:
                 errors.append(failure)
         raise_first(errors)
@@ -132,10 +132,10 @@ class Train:
             ) from None
 
 
-# -- begin ---------------------------------------------------------------------------------------------------
+# -- start ---------------------------------------------------------------------------------------------------
 
 
-async def _begin(node: Node, speed: float | None) -> None:
+async def _start(node: Node, speed: float | None) -> None:
     """In any other than position mode the greatest velocity would be an order to turn: so that is looked at anew."""
     table = await asked_anew(node)
     _refuse_unless_led_by_position(node)

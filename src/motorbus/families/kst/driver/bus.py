@@ -1,4 +1,4 @@
-"""What a bus asks of this family: times, probe, stop.
+"""The driver of one open bus: times, probe, stop, and what its devices can do.
 
 All times come with their source; none was measured on hardware.
 """
@@ -6,20 +6,26 @@ All times come with their source; none was measured on hardware.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Final
 
 from motorbus.core.can_bits import least
 from motorbus.core.can_frame import CanFrame
-from motorbus.core.family import Stop
+from motorbus.core.family import AxisDriver, Explanation, Family, Found, Identity, Receiver, Stop
 from motorbus.core.register import changed
 from motorbus.core.request import ANY, EVERY_LANE, Priority, Request, Response, TimeoutClass
+from motorbus.core.steps import Procedure, Runnable
 from motorbus.families.kst import sdo
+from motorbus.families.kst.driver import feedback, identity, motion
 from motorbus.families.kst.driver.motion import Promise, hold
-from motorbus.families.kst.driver.node import BusSettings, Node
+from motorbus.families.kst.driver.node import DEFAULT, Node
 from motorbus.families.kst.driver.requests import acknowledged, decoded, upload
+from motorbus.families.kst.driver.scan import scan
 from motorbus.families.kst.driver.settings import LISTEN
+from motorbus.families.kst.driver.stream import open_stream
+from motorbus.families.kst.notifications import BusState, FrameReceiver
+from motorbus.families.kst.profiles import PROFILES
 
-WINDOW: Final = 16  # nodes in flight at once; four to ten fill any CAN bus
 STUFFING: Final = 1.1
 """Bits on the wire per bit of a frame: over all nodes and positions, frames of this protocol have 118 to 126 bits where
 111 are without stuffing."""
@@ -34,61 +40,111 @@ QUIET: Final = 0.020
 FRAMES_IN_ADAPTER: Final = 5  # frames of one node that an adapter may hold # assumption
 
 
-def air_time(request: Request[Any], rate: int) -> float:
-    """s on the wire for the request and all replies, with typical stuffing; a broadcast has up to 127 replies."""
-    frame = request.wire
-    assert isinstance(frame, CanFrame)
-    bits = least(len(frame.data), frame.extended)
-    if request.expected is ANY:
-        bits += (len(sdo.NODES) if request.lane == EVERY_LANE else 1) * least(sdo.LENGTH, frame.extended)
-    else:
-        bits += sum(least(expected.length, frame.extended) for expected in request.expected)
-    return bits * STUFFING / rate
+_AXIS: Final = AxisDriver(
+    state=feedback.telemetry,
+    position=feedback.position,
+    health=feedback.health,
+    move=motion.move,
+    stop=motion.stop,
+    limits=motion.limits,
+    travel=motion.travel,
+    stream=open_stream,
+)
 
 
-def response_delay(request: Request[Any], flash_wait: float) -> float:
-    """Maximum s before the reply; after a save the time to listen and the write to flash."""
-    if request.reply_within is TimeoutClass.STORE:
-        return LISTEN + flash_wait
-    if request.lane == EVERY_LANE:
-        return BROADCAST_TIME
-    return SCAN_DELAY if request.reply_within is TimeoutClass.SCAN else REPLY_DELAY
+class KstDriver:
+    """KST servos on one open bus; see `core.family.BusDriver`. The keywords are those of `BusSettings`."""
 
+    window = 16
+    """Four to ten nodes in flight fill any CAN bus."""
+    full_duplex = False
 
-def quiet_time(rate: int) -> float:
-    """s after which no reply to an earlier request can still arrive."""
-    return QUIET + FRAMES_IN_ADAPTER * least(sdo.LENGTH, True) * STUFFING / rate
+    def __init__(self, family: Family, **settings: object) -> None:
+        self.family = family
+        self.settings = DEFAULT.replace(state=BusState(), **settings)
 
+    def lane(self, node: int) -> int:
+        return node
 
-def probe(node: Node, attempt: int) -> Request[bool]:
-    """Read the node id, the version, or a sub-index of the node id that no servo has, in turn.
+    def air_time(self, request: Request[Any], rate: int) -> float:
+        """s on the wire for the request and all replies, with typical stuffing; a broadcast has up to 127 replies."""
+        frame = request.wire
+        assert isinstance(frame, CanFrame)
+        bits = least(len(frame.data), frame.extended)
+        if request.expected is ANY:
+            bits += (len(sdo.NODES) if request.lane == EVERY_LANE else 1) * least(sdo.LENGTH, frame.extended)
+        else:
+            bits += sum(least(expected.length, frame.extended) for expected in request.expected)
+        return bits * STUFFING / rate
 
-    True if the reply names that object and, for the id, has a valid one (before a restart not that of the node).
-    """
-    turn, kind = divmod(attempt, 3)
-    node_id = node.table["node_id"]
-    rows = node_id, node.table["firmware_version"], changed(node_id, subindex=1 + turn % 254)
-    row = rows[kind]
+    def turnaround(self, request: Request[Any]) -> float:
+        """Maximum s before the reply; after a save the time to listen and the write to flash."""
+        if request.reply_within is TimeoutClass.STORE:
+            return LISTEN + self.settings.profile.flash_wait
+        if request.lane == EVERY_LANE:
+            return BROADCAST_TIME
+        return SCAN_DELAY if request.reply_within is TimeoutClass.SCAN else REPLY_DELAY
 
-    def decode(answer: Response) -> bool:
-        for reply in decoded(answer):
-            if (reply.index, reply.subindex) == (row.address, row.subindex) and reply.kind != "download":
-                return kind != 0 or reply.kind != "upload" or reply.data[0] in sdo.NODES
-        return False
+    def quiet_time(self, rate: int) -> float:
+        """s after which no reply to an earlier request can still arrive."""
+        return QUIET + FRAMES_IN_ADAPTER * least(sdo.LENGTH, True) * STUFFING / rate
 
-    return upload(node, row, decode)
+    def echo_test(self) -> None:
+        """None: a CAN controller does not receive its own frames."""
 
+    def receiver(self) -> Receiver:
+        return FrameReceiver(self.settings.extended, self.settings.state)
 
-def stop(nodes: Mapping[int, Response | None], settings: BusSettings) -> Stop:
-    """Target := position for each node whose position is known; the others are asked for it."""
-    requests: list[Request[Response]] = []
-    for node in (Node(number, settings) for number in sorted(nodes)):
-        row, answer = node.table["present_position"], nodes[node.node]
-        replies = decoded(answer) if answer is not None else []
-        here = [reply.data[:2] for reply in replies if reply.kind == "upload" and reply.index == row.address]
-        if here:
-            requests += hold(node, row.decode(here[0]), Priority.STOP)
-            continue
-        decode = acknowledged(node, row)
-        requests.append(upload(node, row, decode, priority=Priority.STOP, reports_position=True))
-    return Stop(tuple(requests), Promise.HOLD_REQUESTED.value)
+    def probe(self, node: int, attempt: int) -> Request[bool]:
+        """Read the node id, the version, or a sub-index of the node id that no servo has, in turn.
+
+        True if the reply names that object and, for the id, has a valid one (before a restart not that of the node).
+        """
+        servo = Node(node, self.settings)
+        turn, kind = divmod(attempt, 3)
+        node_id = servo.table["node_id"]
+        rows = node_id, servo.table["firmware_version"], changed(node_id, subindex=1 + turn % 254)
+        row = rows[kind]
+
+        def decode(answer: Response) -> bool:
+            for reply in decoded(answer):
+                if (reply.index, reply.subindex) == (row.address, row.subindex) and reply.kind != "download":
+                    return kind != 0 or reply.kind != "upload" or reply.data[0] in sdo.NODES
+            return False
+
+        return upload(servo, row, decode)
+
+    def stop(self, nodes: Mapping[int, Response | None]) -> Stop:
+        """Target := position for each node whose position is known; the others are asked for it."""
+        requests: list[Request[Response]] = []
+        for node in (Node(number, self.settings) for number in sorted(nodes)):
+            row, answer = node.table["present_position"], nodes[node.node]
+            replies = decoded(answer) if answer is not None else []
+            here = [
+                reply.data[:2] for reply in replies if reply.kind == "upload" and reply.index == row.address
+            ]
+            if here:
+                requests += hold(node, row.decode(here[0]), Priority.STOP)
+            else:
+                decode = acknowledged(node, row)
+                requests.append(upload(node, row, decode, priority=Priority.STOP, reports_position=True))
+        return Stop(tuple(requests), Promise.HOLD_REQUESTED.value)
+
+    def identify(self, node: int) -> Runnable[Identity]:
+        return identity.identify(Node(node, self.settings))
+
+    def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Procedure[list[Found]]:
+        return scan(ids, rates, self.settings)
+
+    def axis(self, model: str) -> AxisDriver:
+        for profile in PROFILES.values():
+            if model in (profile.name, profile.title):
+                if profile.status_row is None:
+                    return _AXIS
+                return replace(_AXIS, current=feedback.current, temperature=feedback.temperature)
+        return AxisDriver()
+
+    def decode(self, data: bytes) -> list[Explanation]:
+        from motorbus.families.kst.decode import decode
+
+        return decode(data, self.settings.profile)

@@ -70,12 +70,12 @@ class AsyncServo(ServoMethods, AsyncDevice):
         AsyncDevice.__init__(self, bus)
 
 
-def settings_of(family: object) -> BusSettings:
-    """The settings of a bus with this (configured) family; those of the manual otherwise."""
-    found = getattr(family, "_settings", None)
+def settings_of(bus: object) -> BusSettings:
+    """The settings of this bus; those of the manual where it is no KST bus."""
+    found = getattr(getattr(bus, "driver", None), "settings", None)
     return found if isinstance(found, BusSettings) else DEFAULT
 
 
 def _settings(bus: object, profile: str) -> BusSettings:
-    found = settings_of(getattr(bus, "family", None))
+    found = settings_of(bus)
     return found.replace(profile=profile) if profile else found

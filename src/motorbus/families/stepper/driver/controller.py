@@ -110,6 +110,6 @@ class AsyncController(ControllerMethods, AsyncDevice):
 
 def _spoken(bus: object) -> tuple[int, Order, Memory | None]:
     """How this bus was opened: the motor's number, the order of bytes in dumps, and what was said on it so far."""
-    family = getattr(bus, "family", None)
-    order: Order = getattr(family, "_order", "little")
-    return getattr(family, "_motor", wire.MOTOR), order, getattr(family, "_memory", None)
+    driver = getattr(bus, "driver", None)
+    order: Order = getattr(driver, "order", "little")
+    return getattr(driver, "motor", wire.MOTOR), order, getattr(driver, "memory", None)

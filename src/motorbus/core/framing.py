@@ -1,0 +1,88 @@
+"""Find frames in a stream of bytes: a header, a length, a checksum."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from motorbus.core.request import Data, Event, Noise, Reply
+
+
+class FrameParser:
+    """Splits a stream into frames and noise; every byte is in exactly one of them, in order.
+
+    `headers`  the bytes with which a frame begins, one of several
+    `length`   bytes of a whole frame by its first bytes; None: more bytes are needed; 0: it is no frame. At most 4096
+    `is_valid` whether the checksum of a whole frame is correct
+    """
+
+    def __init__(
+        self,
+        headers: tuple[bytes, ...],
+        length: Callable[[bytes], int | None],
+        is_valid: Callable[[bytes], bool],
+    ) -> None:
+        self._headers: Final = headers
+        self._length: Final = length
+        self._is_valid: Final = is_valid
+        self._buffer = b""
+
+    @property
+    def held(self) -> int:
+        """Number of bytes of an incomplete frame."""
+        return len(self._buffer)
+
+    def feed(self, data: bytes, *, end: bool = False) -> list[tuple[bytes, str]]:
+        """Take bytes; return frames with "", and noise with its fault, "framing" or "checksum".
+
+        `end`: no more bytes follow, so an incomplete frame is noise.
+        """
+        found: list[tuple[bytes, str]] = []
+        buffer, start, noise, fault = self._buffer + data, 0, 0, "framing"
+        while start < len(buffer):
+            size = self._size(buffer[start:])
+            if (size is None or size > len(buffer) - start) and not end:
+                break
+            frame = buffer[start : start + size] if size and size <= len(buffer) - start else b""
+            if frame and self._is_valid(frame):
+                if noise < start:
+                    found.append((buffer[noise:start], fault))
+                found.append((frame, ""))
+                start = noise = start + len(frame)
+                fault = "framing"
+            else:
+                fault = "checksum" if frame else fault
+                start += 1
+        if noise < start:
+            found.append((buffer[noise:start], fault))
+        self._buffer = buffer[start:]
+        return found
+
+    def _size(self, data: bytes) -> int | None:
+        """Bytes of the frame at the start of `data`; None: unknown yet, 0: no frame."""
+        if data.startswith(self._headers):
+            return self._length(data)
+        return None if any(header.startswith(data) for header in self._headers) else 0
+
+
+class FrameReceiver:
+    """A `core.family.Receiver` of replies on a line with one lane; `key` identifies the reply by its frame."""
+
+    def __init__(self, parser: FrameParser, key: Callable[[bytes], int]) -> None:
+        self._parser: Final = parser
+        self._key: Final = key
+
+    @property
+    def held(self) -> int:
+        return self._parser.held
+
+    def feed(self, data: Data) -> list[Event]:
+        if not isinstance(data, bytes):
+            return [Noise(data.data, "foreign")]
+        return self._events(self._parser.feed(data))
+
+    def flush(self) -> list[Event]:
+        return self._events(self._parser.feed(b"", end=True))
+
+    def _events(self, found: list[tuple[bytes, str]]) -> list[Event]:
+        return [Noise(data, fault) if fault else Reply(0, self._key(data), data) for data, fault in found]

@@ -1,0 +1,97 @@
+"""Defaults of a `BusDriver` for a half-duplex serial line: one request at a time, ten bits for each byte."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Final
+
+from motorbus.core.family import Family, Found, Identity
+from motorbus.core.request import ANY, Request, TimeoutClass
+from motorbus.core.scan import BitrateRestored, scan_ids, scan_rates
+from motorbus.core.steps import Exclusive, Procedure, Runnable, SetBitrate
+
+BITS: Final = 10
+"""Bits of a byte on the wire: start, eight of data, stop."""
+
+
+class HalfDuplexSerial:
+    """Base of serial drivers; a subclass adds `receiver probe stop identify axis decode`, its ids and its figures."""
+
+    window = 1
+    full_duplex = False
+    ids: ClassVar[Sequence[int]] = range(1, 254)
+    """All ids that a device can have."""
+    delays: ClassVar[Mapping[TimeoutClass, float]] = {
+        TimeoutClass.REPLY: 0.005,
+        TimeoutClass.SCAN: 0.010,
+        TimeoutClass.STORE: 0.100,
+    }
+    """Maximum s of a device between request and reply."""
+    delay_per_reply: ClassVar[float] = 0.0
+    """Maximum s added by each device that replies."""
+    broadcast_delay: ClassVar[float] = 0.5
+    """s in which all devices have replied to a request that expects `ANY`."""
+    broadcast_bytes: ClassVar[int] = 1024
+    """Bytes of all these replies."""
+    longest_reply: ClassVar[int] = 256
+    """Bytes."""
+    longest_gap: ClassVar[float] = 0.040
+    """s that a device, the adapter and the host together may hold back a reply."""
+
+    def __init__(self, family: Family) -> None:
+        self.family = family
+
+    def lane(self, node: int) -> int:
+        """All nodes share one lane."""
+        return 0
+
+    def air_time(self, request: Request[Any], rate: int) -> float:
+        """s on the wire of the request and its replies."""
+        replies = 0
+        if request.expected is ANY:
+            replies = self.broadcast_bytes
+        else:
+            for _, _, length in request.expected:
+                replies += length
+        return (len(request.wire) + replies) * BITS / rate
+
+    def turnaround(self, request: Request[Any]) -> float:
+        """s of devices before and between their replies."""
+        if request.expected is ANY:
+            return self.broadcast_delay
+        return self.delays[request.reply_within] + self.delay_per_reply * len(request.expected)
+
+    def quiet_time(self, rate: int) -> float:
+        """s after which no part of an old reply can arrive."""
+        return self.longest_reply * BITS / rate + self.longest_gap
+
+    def echo_test(self) -> Request[Any] | None:
+        """The first probe of node 1: its echo has another length than its reply."""
+        return self.probe(1, 0)
+
+    async def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> list[Found]:
+        """Probe each id twice; see `BusDriver.scan`."""
+        present = await SetBitrate(0)
+        if not rates:
+            return await self._scan(ids, present)
+        return await Exclusive(self._scan_rates(ids, rates))
+
+    async def _scan_rates(self, ids: tuple[int, ...], rates: tuple[int, ...]) -> list[Found]:
+        async with BitrateRestored():
+            return await scan_rates(rates, lambda rate: self._scan(ids, rate))
+
+    def _scan(self, ids: tuple[int, ...], rate: int) -> Procedure[list[Found]]:
+        def ping(node: int) -> Request[bool]:
+            probe = self.probe(node, 0)
+            within = TimeoutClass.SCAN
+            return Request(probe.wire, probe.expected, probe.decode, reply_within=within, repeatable=True)
+
+        return scan_ids(ids or tuple(self.ids), rate, ping, self.identify)
+
+    def probe(self, node: int, attempt: int) -> Request[bool]:
+        """See `BusDriver.probe`."""
+        raise NotImplementedError
+
+    def identify(self, node: int) -> Runnable[Identity]:
+        """See `BusDriver.identify`."""
+        raise NotImplementedError

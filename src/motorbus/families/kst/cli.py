@@ -1,0 +1,523 @@
+"""The commands `motorbus kst ...`, and the functions that common commands use of this family (`motorbus.cli.faces`)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from cyclopts import App, Group, Parameter
+
+from motorbus.cli import consent, dry, files, identity, quantity, several, target
+from motorbus.cli.device_command import DeviceCommand
+from motorbus.cli.exits import Exit
+from motorbus.cli.parameters import DryRun, Flag, Silent
+from motorbus.core import units
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.family import BusDriver
+from motorbus.core.interrupted import Moving, stopped_if_interrupted
+from motorbus.core.register import Register
+from motorbus.core.scan import Skipped
+from motorbus.core.steps import Progress, gather
+from motorbus.errors import RequestError
+from motorbus.families.kst import notifications, sdo
+from motorbus.families.kst.driver import feedback, motion, provisioning
+from motorbus.families.kst.driver.broadcast import broadcast_read
+from motorbus.families.kst.driver.bus import KstDriver
+from motorbus.families.kst.driver.node import checked_id
+from motorbus.families.kst.driver.scan import Suspicion, scan_bit_rates
+from motorbus.families.kst.driver.servo import Servo, settings_of
+from motorbus.families.kst.profiles import PROFILES, bit_rate_code, current, temperature, version_text
+
+Device = Annotated[str, Parameter(name="BUS#ID", help="As kst:can://slcan/dev/ttyACM0#0x25.")]
+Switch = Literal["on", "off"]
+Yes = Annotated[Flag, Parameter(help="Do not ask before a permanent change.")]
+BusOption = Annotated[str, Parameter(help="Any option of the bus, as --profile kst-ext.")]
+
+app = App(
+    name="kst",
+    help="What only kst devices can do.",
+    help_epilogue="",
+    group_arguments=Group.create_default_parameters(),
+)
+ServoCommand = partial(DeviceCommand, "kst", Servo)
+
+
+def command(usage: str, text: str, *examples: str) -> Callable[[Callable[..., Exit]], Callable[..., Exit]]:
+    """Register a command; usage and examples stand without `motorbus kst`."""
+    lines = [f"    motorbus kst {example}" for example in examples]
+    epilogue = "\n".join([text, "", "Examples:", "", *lines]).lstrip()
+    return partial(app.command, usage=f"Usage: motorbus kst {usage} [OPTIONS]", help_epilogue=epilogue)
+
+
+def label(node: int) -> str:
+    """A servo in a sentence: #37 (0x25)."""
+    return f"#{node} (0x{node:02X})"
+
+
+@command(
+    "position BUS#ID [VALUE]",
+    "Rounded to the servo's tenth of a degree, halves away from zero.",
+    "position kst:can://slcan/dev/ttyACM0#0x25 10.9deg",
+    "position kst:sim,ids=0x25#0x25 -30deg --wait",
+    "position kst:sim,ids=0x25#0x25 90deg --dry-run",
+)
+def position(
+    address: Device,
+    value: Annotated[str, Parameter(name="VALUE", help="Target in rad, or as 90deg; without it, read.")] = "",
+    /,
+    *,
+    wait: Annotated[Flag, Parameter(help="Return when the servo has arrived.")] = False,
+    yes: Annotated[Flag, Parameter(help="Do not ask before a move of over 180 degrees.")] = False,
+    dry_run: DryRun = False,
+    output: Silent,
+    **options: BusOption,
+) -> Exit:
+    """Read the position of a servo, or move it."""
+    run = ServoCommand("position", address, output, options, dry_run=dry_run)
+    if not value:
+        here = run.read(lambda servo: servo.position())
+        return run.show({"position": here}, units.show(here, "position"))
+    goal = units.parse(value, "position")
+    if dry_run:
+        run.write(lambda servo: servo.move(goal, wait=False))
+        return Exit.OK
+    with target.opened(run.bus, options, output) as bus:
+        servo = Servo(bus, run.node)
+        rehearse = partial(Servo(dry.DryBus(bus), run.node).move, goal, wait=False)
+        consent.consent_to_ways([(servo, goal)], output, yes=yes, rehearse=rehearse)
+        servo.move(goal, wait=wait)
+        here = servo.position()
+    shown = {"goal": units.show(goal, "position"), "position": units.show(here, "position")}
+    return run.show({"goal": goal, "position": here}, **shown)
+
+
+@command(
+    "status BUS#ID",
+    "By the profile `kst`, the manual, a status is two bytes without a meaning, read\n"
+    "by the frame that reads the position. Other profiles: current and temperature.",
+    "status kst:can://slcan/dev/ttyACM0#0x25",
+    "status kst:sim,ids=0x25,profile=kst-ext#0x25",
+)
+def status(address: Device, /, *, output: Silent, **options: BusOption) -> Exit:
+    """Read the status of a servo."""
+    run = ServoCommand("status", address, output, options)
+    found = run.read(lambda servo: servo.status())
+    if isinstance(found, feedback.RawStatus):
+        run.show(found._asdict(), X1=f"0x{found.x1:02X}", X2=f"0x{found.x2:02X}")
+        output.note(f"warning: {found.warning}")
+        return Exit.OK
+    names = ("current", "temperature")
+    return run.show(found._asdict(), **{name: units.show(getattr(found, name), name) for name in names})
+
+
+@command(
+    "version BUS#ID", "", "version kst:can://slcan/dev/ttyACM0#0x25", "version kst:sim,ids=0x25#0x25 --json"
+)
+def version(address: Device, /, *, output: Silent, **options: BusOption) -> Exit:
+    """Read the firmware version of a servo."""
+    run = ServoCommand("version", address, output, options)
+    text = run.read(lambda servo: servo.version())
+    return run.show({"version": text}, text)
+
+
+@command(
+    "node-id BUS#ID [NEW]",
+    "A new id takes effect after `motorbus kst save` and a power cycle.",
+    "node-id kst:can://slcan/dev/ttyACM0#0x25",
+    "node-id kst:can://slcan/dev/ttyACM0#0x25 0x26 --yes",
+    "node-id kst:sim,ids=0x25#0x25 0x26 --dry-run",
+)
+def node_id(
+    address: Device,
+    new: Annotated[str, Parameter(name="NEW", help="New id, 1 to 127; without it, read.")] = "",
+    /,
+    *,
+    yes: Yes = False,
+    dry_run: DryRun = False,
+    output: Silent,
+    **options: BusOption,
+) -> Exit:
+    """Read the id that a servo has or will have, or write another one."""
+    run = ServoCommand("node-id", address, output, options, dry_run=dry_run, yes=yes)
+    if not new:
+        found = run.read(lambda servo: servo.node_id())
+        pending = "" if found == run.node else f"; it answers as {run.label} until it is restarted"
+        return run.show({"reads_back": found}, f"{label(found)}{pending}")
+    wanted = checked_id(identity.id_said(new))
+    run.write(lambda servo: servo.set_node_id(wanted), f"write the id {label(wanted)}")
+    return show_pending(run, address, wanted, f"the id {label(wanted)}")
+
+
+@command(
+    "bit-rate BUS#ID [RATE]",
+    "A new rate takes effect after `motorbus kst save` and a power cycle.",
+    "bit-rate kst:can://slcan/dev/ttyACM0#0x25",
+    "bit-rate kst:can://slcan/dev/ttyACM0#0x25 1000000 --yes",
+    "bit-rate kst:sim,ids=0x25#0x25 250k --dry-run",
+)
+def bit_rate(
+    address: Device,
+    rate: Annotated[str, Parameter(name="RATE", help="20k 50k 100k 125k 250k 500k 800k or 1000k")] = "",
+    /,
+    *,
+    yes: Yes = False,
+    dry_run: DryRun = False,
+    output: Silent,
+    **options: BusOption,
+) -> Exit:
+    """Read the bit rate that a servo will have, or write another one."""
+    run = ServoCommand("bit-rate", address, output, options, dry_run=dry_run, yes=yes)
+    if not rate:
+        found = run.read(lambda servo: servo.bit_rate())
+        text = f"{found} bit/s" if found else "not readable: the manual has no command for it"
+        return run.show({"bitrate": found}, text)
+    wanted = parse_bit_rate(rate)
+    run.write(lambda servo: servo.set_bit_rate(wanted), f"write the bit rate {wanted} bit/s")
+    return show_pending(run, address, wanted, f"the bit rate {wanted} bit/s")
+
+
+def show_pending(run: DeviceCommand[Servo], address: str, wanted: int, value: str) -> Exit:
+    """Show what was written and takes effect after a save and a restart."""
+    text = f"written: {run.label} has {value} after `motorbus kst save {address}` and a power cycle"
+    facts = {"new": wanted, "in_force": False, "next": ["save", "power-cycle"]}
+    return run.show(facts, f"{text}; without a save it is lost")
+
+
+def parse_bit_rate(text: str) -> int:
+    """Parse 500000, 500k or 1M. Raises RequestError for a rate that these servos do not have."""
+    rate = units.rate(text)
+    bit_rate_code(rate)
+    return rate
+
+
+@command(
+    "save BUS#ID",
+    "A save has no reply; only a power cycle shows what was saved.",
+    "save kst:can://slcan/dev/ttyACM0#0x25 --yes",
+    "save kst:sim,ids=0x25#0x25 --dry-run",
+)
+def save(
+    address: Device, /, *, yes: Yes = False, dry_run: DryRun = False, output: Silent, **options: BusOption
+) -> Exit:
+    """Save id, bit rate, limits and function bits of a servo."""
+    run = ServoCommand("save", address, output, options, dry_run=dry_run, yes=yes)
+    run.write(lambda servo: servo.save(), "save its settings")
+    text = f"sent to {run.label}; a save has no reply: only a power cycle shows what was saved"
+    return run.show({"sent": True, "confirmed": None}, text)
+
+
+@command(
+    "provision BUS#ID",
+    "Connect one servo at a time. After an interrupt, give the same command again.",
+    "provision kst:can://slcan/dev/ttyACM0#0x25 --new-bitrate 1M",
+    "provision kst:sim,ids=0x25#0x25 --new-id 0x26 --dry-run",
+)
+def provision(
+    address: Device,
+    /,
+    *,
+    new_id: Annotated[str, Parameter(help="New id, 1 to 127.")] = "",
+    new_bitrate: Annotated[str, Parameter(help="New bit rate, as 1000000 or 1M.")] = "",
+    timeout: Annotated[str, Parameter(help="Time to wait for the power cycle.")] = "120s",
+    yes: Yes = False,
+    dry_run: DryRun = False,
+    output: Silent,
+    **options: BusOption,
+) -> Exit:
+    """Write id and bit rate, save, wait for a power cycle, and verify."""
+    run = ServoCommand("provision", address, output, options, dry_run=dry_run, yes=yes)
+    wanted: dict[str, int] = {}
+    if new_id:
+        wanted["new_id"] = checked_id(identity.id_said(new_id))
+    if new_bitrate:
+        wanted["new_rate"] = parse_bit_rate(new_bitrate)
+    if not wanted:
+        raise RequestError("no new id and no new bit rate", expected="--new-id, --new-bitrate, or both")
+    seconds = units.parse(timeout, "time")
+
+    def write(servo: Servo) -> None:
+        """What `provision` writes, without its checks."""
+        if "new_id" in wanted:
+            servo.set_node_id(wanted["new_id"])
+        if "new_rate" in wanted:
+            servo.set_bit_rate(wanted["new_rate"])
+        servo.save()
+
+    if dry_run:
+        run.write(write)
+        output.text("then: power cycle, and a check of the new values")
+        return Exit.OK
+    values = [f"the id {label(wanted['new_id'])}"] if new_id else []
+    values += [f"the bit rate {wanted['new_rate']} bit/s"] if new_bitrate else []
+
+    def show_step(event: object) -> None:
+        if isinstance(event, Progress):
+            output.document(run.schema, {"event": "progress", **event._asdict()})
+        if isinstance(event, provisioning.PowerCycleNeeded):
+            output.document(run.schema, {"event": "power-cycle", **event._asdict()})
+
+    with target.opened(run.bus, options, output) as bus:
+        rehearse = partial(write, Servo(dry.DryBus(bus), run.node))
+        question = f"{run.label}: write and save {' and '.join(values)}"
+        consent.consent_to(question, output, yes=yes, rehearse=rehearse)
+        done: provisioning.Provisioned = identity.carried_out(
+            bus, run.node, "provision", output=output, report=show_step, timeout=seconds, **wanted
+        )
+    result = "had these values already" if done.resumed else "came back after the power cycle"
+    text = f"{label(done.node)} {result}: it answers at {done.rate} bit/s, firmware {done.firmware}"
+    facts = {"bitrate": done.rate, "firmware": done.firmware, "resumed": done.resumed}
+    return run.show({"event": "provisioned", "from": run.node, "id": done.node, **facts}, text)
+
+
+@command(
+    "reports on|off BUS#ID",
+    "Not in the manual; a profile without it refuses. By the profile xqpower, `on`\n"
+    "also lets the servo move, and after `off` it ignores positions.",
+    "reports on kst:can://slcan/dev/ttyACM0#1 --profile kst-ext",
+    "reports on kst:sim,profile=kst-ext#1 --interval 10ms",
+    "reports off kst:sim,profile=kst-ext#1",
+)
+def reports(
+    switch: Switch,
+    address: Device,
+    /,
+    *,
+    interval: Annotated[str, Parameter(help="Time between two reports, as 10ms.")] = "",
+    dry_run: DryRun = False,
+    output: Silent,
+    **options: BusOption,
+) -> Exit:
+    """Start or stop the position reports of a servo."""
+    run = ServoCommand("reports", address, output, options, dry_run=dry_run)
+    seconds = units.parse(interval, "time") if interval else None
+    on = switch == "on"
+    run.write(lambda servo: servo.start_reports(seconds) if on else servo.stop_reports())
+    text = f"reports of {run.label} switched {switch}; the servo does not acknowledge this"
+    return run.show({"reports": on, "interval": seconds}, text)
+
+
+@command(
+    "mid-point BUS#ID",
+    "Keep clear: the servo may move to its old target. Not in the manual; a profile\nwithout it refuses.",
+    "mid-point kst:sim,profile=kst-ext#1 --yes",
+    "mid-point kst:sim,profile=kst-ext#1 --dry-run",
+)
+def mid_point(
+    address: Device, /, *, yes: Yes = False, dry_run: DryRun = False, output: Silent, **options: BusOption
+) -> Exit:
+    """Make the present position of a servo its zero, and save it."""
+    run = ServoCommand("mid-point", address, output, options, dry_run=dry_run, yes=yes)
+    here = run.write(lambda servo: servo.set_mid_point(), "make its present position its zero, and save it")
+    if dry_run:
+        return Exit.OK
+    text = f"{run.label} reads {units.show(here, 'position')} at its new zero; the save has no reply"
+    return run.show({"position": here}, text)
+
+
+@command(
+    "limits BUS#ID [LOW HIGH]",
+    "Not in the manual; a profile without it refuses.",
+    "limits kst:sim,profile=kst-ext#1",
+    "limits kst:sim,profile=kst-ext#1 -45deg 45deg --yes",
+)
+def limits(
+    address: Device,
+    low: Annotated[str, Parameter(name="LOW", help="At most 0, in rad or as -45deg.")] = "",
+    high: Annotated[str, Parameter(name="HIGH", help="At least 0.")] = "",
+    /,
+    *,
+    yes: Yes = False,
+    dry_run: DryRun = False,
+    output: Silent,
+    **options: BusOption,
+) -> Exit:
+    """Read the travel limits of a servo, or write and save them."""
+    run = ServoCommand("limits", address, output, options, dry_run=dry_run, yes=yes)
+    if bool(low) != bool(high):
+        raise RequestError("one limit alone", expected="both, as -45deg 45deg", advice="nothing was sent")
+    if low:
+        bounds = units.parse(low, "position"), units.parse(high, "position")
+        run.write(lambda servo: servo.set_travel_limits(*bounds), "write and save its travel limits")
+    else:
+        bounds = run.read(lambda servo: servo.travel_limits())
+    shown = {"low": units.show(bounds[0], "position"), "high": units.show(bounds[1], "position")}
+    return run.show({"low": bounds[0], "high": bounds[1]}, **shown)
+
+
+@command(
+    "reverse BUS#ID [on|off]",
+    "It reverses the rotation. Some firmware undoes it at a restart. Not in the\n"
+    "manual; a profile without it refuses.",
+    "reverse kst:sim,profile=kst-ext#1",
+    "reverse kst:sim,profile=kst-ext#1 on --yes",
+)
+def reverse(
+    address: Device,
+    switch: Switch | None = None,
+    /,
+    *,
+    yes: Yes = False,
+    dry_run: DryRun = False,
+    output: Silent,
+    **options: BusOption,
+) -> Exit:
+    """Read the reverse bit of a servo, or write and save it."""
+    run = ServoCommand("reverse", address, output, options, dry_run=dry_run, yes=yes)
+    if switch is None:
+        on = run.read(lambda servo: servo.reversed())
+    else:
+        on = switch == "on"
+        run.write(lambda servo: servo.set_reversed(on), f"switch its reverse bit {switch}, and save it")
+    return run.show({"reversed": on}, f"{run.label} turns {'in reverse' if on else 'as shipped'}")
+
+
+@command("eds", "", "eds --output kst.eds", "eds --profile xqpower --with-mandatory > xqpower.eds")
+def eds(
+    *,
+    profile: Annotated[str, Parameter(help=f"One of {', '.join(PROFILES)}.")] = "kst",
+    node: Annotated[str, Parameter(help="The id in the sheet.")] = "0x25",
+    with_mandatory: Annotated[Flag, Parameter(help="Add three objects of CiA 301 that they lack.")] = False,
+    output_: Annotated[Path | None, Parameter(help="File to write; without it, stdout.")] = None,
+    output: Silent,
+) -> Exit:
+    """Write an electronic data sheet (CiA 306) for CANopen tools."""
+    from motorbus.families.kst import eds as sheets
+
+    if profile not in PROFILES:
+        raise RequestError(f"there is no profile {profile!r}", expected=f"one of {', '.join(PROFILES)}")
+    number = checked_id(identity.id_said(node))
+    name = output_.name if output_ else ""
+    text = sheets.eds(PROFILES[profile], node_id=number, with_mandatory=with_mandatory, file_name=name)
+    if output_ is None:
+        output.document("motorbus.kst.eds/1", {"profile": profile, "file": None, "eds": text})
+        output.text(text.rstrip("\n"))
+        return Exit.OK
+    with files.usable(output_, "written"):
+        output_.write_text(text, encoding="ascii", newline="\r\n")
+    output.document("motorbus.kst.eds/1", {"profile": profile, "file": str(output_)})
+    output.text(f"written: {output_}")
+    return Exit.OK
+
+
+# -- functions for common commands, see motorbus.cli.faces -------------------------------------------------------------
+
+COMMANDS: Final = {
+    "set_node_id()": "`motorbus kst node-id BUS#ID NEW`",
+    "set_node_id(": "`motorbus kst node-id BUS#ID {}`",
+    "set_bit_rate()": "`motorbus kst bit-rate BUS#ID RATE`",
+    "provision()": "`motorbus kst provision`",
+    "save()": "`motorbus kst save`",
+    "set_mid_point()": "`motorbus kst mid-point`",
+    "set_reversed()": "`motorbus kst reverse BUS#ID on|off`",
+    "set_reversed(False)": "`motorbus kst reverse BUS#ID off`",
+    "reversed()": "`motorbus kst reverse BUS#ID`",
+    "isolated=True": "`motorbus scan BUS --bitrate all`",
+}
+CUT_OFF: Final = (
+    "repeat `motorbus set-id`, `motorbus set-baud` or `motorbus kst provision`: it reads the state of the servo and "
+    "continues; nothing was sent"
+)
+
+
+def say(event: object) -> str:
+    """The text of an event of a scan or of `provision`; "" if it has none."""
+    if isinstance(event, Suspicion):
+        place = f"#{event.node} " if event.node else ""
+        return f"{place}at {event.rate} bit/s: {event.what}"
+    if isinstance(event, Skipped):
+        return f"nothing was sent at {event.rate} bit/s: {event.why}"
+    if isinstance(event, provisioning.PowerCycleNeeded):
+        return "switch the supply of this servo off and on again now"
+    return ""
+
+
+def meaning(row: Register, raw: int) -> str:
+    """The raw value of an object in words."""
+    if row.name in ("firmware_version", "software_version"):
+        return version_text(raw.to_bytes(row.size, "little"))
+    for profile in PROFILES.values():
+        if row is profile.status_row:
+            amperes, celsius = current(profile, raw), temperature(raw)
+            return f"{units.show(amperes, 'current')}, {units.show(celsius, 'temperature')}"
+    return quantity.meaning(row, raw)
+
+
+def ping_everyone(bus: Any) -> list[int]:
+    """The ids of the servos that answer one broadcast read."""
+    return sorted(bus.run(broadcast_read("node_id", settings_of(bus))))
+
+
+def detect_bit_rate(
+    bus: Any, seconds: float, report: Callable[[object], None]
+) -> tuple[int | None, dict[int, str]]:
+    """Listen `seconds` at each bit rate; the rate of the bus, and the activity at each rate.
+
+    A rate that the adapter lacks is reported. Raises RequestError if it can listen at none.
+    """
+    skipped: dict[int, str] = {}
+
+    def take(event: object) -> None:
+        if isinstance(event, Skipped):
+            skipped[event.rate] = f"not listened to: {event.why}"
+        report(event)
+
+    found = bus.run(scan_bit_rates(settings_of(bus), seconds=seconds), report=take)
+    activity = skipped | {rate: one.value for rate, one in found.activity.items()}
+    return found.rate, {rate: activity[rate] for rate in bus.family.link.rates if rate in activity}
+
+
+def budget_frames(driver: BusDriver, node: int) -> Mapping[str, tuple[Sequence[CanFrame], ...]]:
+    """Requests and replies of a control loop, for every position: `write` a target, `read` the position."""
+    assert isinstance(driver, KstDriver)
+    settings = driver.settings
+    extended, sized = settings.extended, settings.sized
+    goal, present = settings.profile.table["goal_position"], settings.profile.table["present_position"]
+    written, read = (node, goal.address, 0), (node, present.address, 0)
+    positions = [goal.encode(raw) for raw in range(goal.low, goal.high + 1)]
+    goals = [sdo.encode_download(*written, data, sized=sized, extended=extended) for data in positions]
+    replies = [sdo.encode_upload_reply(*read, data, extended=extended) for data in positions]
+    return {
+        "write": (goals, [sdo.encode_download_reply(*written, extended=extended)]),
+        "read": ([sdo.encode_upload(*read, extended=extended)], replies),
+    }
+
+
+def report_frames(driver: BusDriver, node: int) -> list[CanFrame]:
+    """A report of every position."""
+    assert isinstance(driver, KstDriver)
+    settings = driver.settings
+    profile, extended = settings.profile, settings.extended
+    form = profile.report_forms[0] if profile.report_forms else "sdo"
+    positions = range(-profile.limit, profile.limit + 1)
+    return [notifications.encode_report(node, raw, form=form, extended=extended) for raw in positions]
+
+
+def move_together(bus: Any, goals: Mapping[int, float], *, wait: bool = True) -> None:
+    """Move servos to these targets (rad by id) after all are checked; if one does not answer, all stop.
+
+    Errors as `Servo.move` raises.
+    """
+    several.carried_out(bus, _move_together([Servo(bus, node) for node in goals], list(goals.values()), wait))
+
+
+async def _move_together(servos: Sequence[Servo], positions: Sequence[float], wait: bool) -> None:
+    pairs = [
+        (servo, await motion.setpoint(servo, motion.target(servo, position)))
+        for servo, position in zip(servos, positions, strict=True)
+    ]
+    if not wait:
+        for servo, goal in pairs:
+            await motion.send_target(servo, goal)
+        return
+
+    async def send_and_wait() -> None:
+        for number, (servo, goal) in enumerate(pairs):
+            send = motion.send_target(servo, goal)
+            await (several.or_all_stop(send) if number else send)
+        arrivals = [motion.wait_arrival(servo, goal.value, motion.TOLERANCE, None) for servo, goal in pairs]
+        await gather(*map(several.or_all_stop, arrivals))
+
+    moving = [Moving(one, partial(motion.stop, one), partial(feedback.position, one)) for one in servos]
+    await stopped_if_interrupted(send_and_wait(), *moving)

@@ -1,0 +1,69 @@
+"""Impossible and unsafe requests to CAN servos: one error, its exit code, and no write on the bus."""
+
+from __future__ import annotations
+
+import pytest
+
+from motorbus.simulation.named import Simulation
+from tests.cli.conftest import Run
+
+pytestmark = pytest.mark.usefixtures("state_folder")
+
+READS = ("#40", "#60", "#70")
+"""Specifiers of SDO requests that read."""
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        ("kst position BUS#0 1", 2, "0 addresses all servos"),
+        ("kst position BUS#37+38 1", 2, "exactly one device"),
+        ("kst position feetech:sim#1", 2, "no kst bus"),
+        ("kst position BUS#9", 5, "did not answer"),
+        ("kst position BUS#37 90.06deg", 8, "out of range"),
+        ("kst position BUS#37 nan", 2, "not a number"),
+        ("kst position BUS#37 10kg", 2, "unit 'kg'"),
+        ("kst position BUS#37 --dry-run", 2, "only reads"),
+        ("kst node-id BUS#37 39", 8, "--yes"),
+        ("kst node-id BUS#37 38 --yes", 2, "is taken"),
+        ("kst node-id BUS#37 0 --yes", 2, "0 addresses all servos"),
+        ("kst node-id BUS#37 me --yes", 2, "not an id"),
+        ("kst bit-rate BUS#37 1M", 8, "--yes"),
+        ("kst bit-rate BUS#37 123 --yes", 2, "no rate"),
+        ("kst bit-rate BUS#37 fast --yes", 2, "not a rate"),
+        ("kst save BUS#37", 8, "--yes"),
+        ("kst provision BUS#37 --yes", 2, "--new-id"),
+        ("kst provision BUS#37 --new-id 39", 8, "--yes"),
+        ("kst provision BUS#37 --new-id 38 --yes", 2, "is taken"),
+        ("kst provision BUS#37 --new-id 128 --yes", 2, "not the id of a servo"),
+        ("kst provision BUS#37 --new-id 39 --timeout 0s --yes", 2, "timeout"),
+        ("kst limits BUS#37", 2, "profile"),
+        ("kst reverse BUS#37 on --yes", 2, "profile"),
+        ("kst mid-point BUS#37 --yes", 2, "profile"),
+        ("kst reports on BUS#37", 2, "profile"),
+        ("kst limits EXT#37 -1 1", 8, "--yes"),
+        ("kst limits EXT#37 -1 --yes", 2, "one limit alone"),
+        ("kst reverse EXT#37 on", 8, "--yes"),
+        ("kst mid-point EXT#37", 8, "--yes"),
+        ("kst eds --profile acme", 2, "no profile 'acme'"),
+        ("read BUS#37 status --profile kst-ext", 7, "does not exist"),
+        ("move BUS#37+38=200deg --yes", 8, "out of range"),
+        ("write BUS#37 present_position=1", 2, "present_position"),
+        ("write BUS#37 node_id=38 --yes", 2, "motorbus kst node-id"),
+        ("write BUS#37 goal_position=901raw --expert", 8, "out of range"),
+        ("read BUS#37 --id-format wide", 2, "id_format=wide"),
+        ("scan kst:can://slcan/dev/no-such-port", 3, "no-such-port"),
+        ("scan kst:/dev/ttyACM0", 2, "can://"),
+    ],
+)
+def test_refused_request_writes_nothing(
+    words: str, code: int, message: str, servos: Simulation, newer: Simulation, run: Run
+) -> None:
+    before = dict(servos[37].memory), dict(newer[37].memory)
+    ran = run(*words.replace("BUS", servos.url).replace("EXT", newer.url).split(), "-vv")
+    assert (ran.code, ran.out) == (code, "")
+    assert ran.err.count("error: ") == 1
+    assert message in ran.err
+    sent = [line for line in ran.err.splitlines() if " tx " in line]
+    assert [line for line in sent if not any(read in line for read in READS)] == []
+    assert (dict(servos[37].memory), dict(newer[37].memory)) == before

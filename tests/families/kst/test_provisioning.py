@@ -1,0 +1,204 @@
+"""Provisioning of a servo: from the first read to the check after the restart, beside other servos, interrupted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf
+from typing import Any
+
+import pytest
+
+from motorbus.core.request import Data
+from motorbus.core.steps import Progress
+from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown, RequestError, VerificationFailed
+from motorbus.families.kst import PowerCycleNeeded, Provisioned
+from motorbus.link.base import PerfectLine
+from motorbus.link.memory import MemoryLink
+from tests.families.kst.bench import Answers, Bench, NoErrorFrames, NoListening
+from tests.support.world import is_listening
+
+CHANGES: list[dict[str, Any]] = [{"new_id": 9}, {"new_rate": 250_000}, {"new_id": 9, "new_rate": 1_000_000}]
+
+
+class Timed(MemoryLink):
+    """A link that calls `then` at the time `when` (s)."""
+
+    when = inf
+    then: Callable[[], object]
+
+    def read(self, until: float) -> list[Data]:
+        if self.now() >= self.when:
+            self.when = inf
+            self.then()
+        return super().read(until)
+
+
+@pytest.mark.parametrize("change", CHANGES, ids=str)
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"pending_id": "active"},
+        {"profile": "xqpower"},
+        {"settings": {"id_format": "ext"}, "id_format": "ext"},
+        {"link": NoListening},
+    ],
+    ids=str,
+)
+def test_provision_writes_saves_and_verifies_after_the_restart(
+    options: dict[str, Any], change: dict[str, Any]
+) -> None:
+    with Bench(**options) as bench:
+        bench.on_power_cycle()
+        node, rate = change.get("new_id", 5), change.get("new_rate", 500_000)
+        result = bench.servo().provision(**change)
+        assert result == Provisioned(node, rate, "1.00", False)
+        (servo,) = bench.simulator.servos
+        assert (servo.node, servo.bit_rate) == (node, rate)
+        assert bench.of(PowerCycleNeeded) == [PowerCycleNeeded(5, node, rate)]
+        assert [event.done for event in bench.of(Progress)] == [0, 1, 2, 3, 4]
+        assert (bench.bus.rate, bench.link.rate, is_listening(bench.bus)) == (500_000, 500_000, False)
+        bench.sent()
+        assert bench.servo().provision(**change) == result._replace(resumed=True)
+        assert bench.written() == []
+
+
+@pytest.mark.parametrize(
+    ("ids", "options", "change", "text"),
+    [
+        ((5, 9), {}, CHANGES[0], r"0x09 \(9\) is taken"),
+        ((5, 5), {}, CHANGES[0], r"two servos .* 0x05 \(5\)"),
+        ((5, 5), {"line": NoErrorFrames()}, CHANGES[0], r"two servos .* 0x05 \(5\)"),
+        ((5,), {"duplicate": "5", "duplicate_delay": 0.0003}, CHANGES[0], r"two servos .* 0x05 \(5\)"),
+        ((5, 6, 9), {}, CHANGES[1], r"not alone: 0x06 \(6\), 0x09 \(9\) would stay at 500000"),
+        ((6,), {"reports_ms": 20}, CHANGES[1], "nothing is sent at 250000"),
+        ((6,), {}, CHANGES[2], r"no servo answers as 0x05 \(5\) or 0x09 \(9\)"),
+    ],
+)
+def test_provision_writes_nothing_where_it_would_do_harm(
+    ids: tuple[int, ...], options: dict[str, Any], change: dict[str, Any], text: str
+) -> None:
+    with Bench(*ids, **options) as bench:
+        bench.simulator.servos[-1].raw_position = 7
+        with pytest.raises((RequestError, NoReply), match=text):
+            bench.servo().provision(**change)
+        assert bench.written() == []
+        assert bench.bus.rate == bench.link.rate == 500_000
+        assert "reports_ms" not in options or bench[6].status()["errors"] == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "pending", "seconds"),
+    [
+        (CHANGES[0], "pending", 1.0),
+        (CHANGES[0], "active", 1.0),
+        (CHANGES[1], "pending", 1.0),
+        (CHANGES[2], "pending", 0.0),
+    ],
+    ids=str,
+)
+def test_power_loss_during_the_save_is_never_reported_as_saved(
+    change: dict[str, Any], pending: str, seconds: float
+) -> None:
+    with Bench(flash_time=2.0, pending_id=pending, link=Timed) as bench:
+        (servo,) = bench.simulator.servos
+
+        def cut() -> None:
+            servo.unplug()
+            bench.link.then, bench.link.when = servo.plug, bench.link.now() + seconds
+
+        bench.on_power_cycle(cut)
+        with pytest.raises(VerificationFailed, match="came back as it was") as raised:
+            bench.servo().provision(**change)
+        assert "call provision again" in raised.value.advice
+        assert max(event.done for event in bench.of(Progress)) == 2
+        assert (servo.node, servo.bit_rate) == (5, 500_000)
+
+
+@pytest.mark.parametrize("loses_power", [False, True])
+@pytest.mark.parametrize("done", [0, 1, 2, 3, 4])
+def test_interrupted_provision_restores_the_rate_and_resumes(done: int, loses_power: bool) -> None:
+    with Bench() as bench:
+        (servo,) = bench.simulator.servos
+
+        def interrupt(event: object) -> None:
+            if isinstance(event, PowerCycleNeeded):
+                servo.power_cycle()
+            if isinstance(event, Progress) and event.done == done:
+                raise KeyboardInterrupt
+
+        bench.on = interrupt
+        with pytest.raises(KeyboardInterrupt):
+            bench.servo().provision(**CHANGES[2])
+        assert (bench.bus.rate, bench.link.rate, bench.link.listen_only) == (500_000, 500_000, False)
+        if loses_power:
+            servo.power_cycle()
+        bench.on_power_cycle()
+        assert bench.servo().provision(**CHANGES[2])[:2] == (9, 1_000_000)
+
+
+def test_id_written_before_is_not_saved_by_mistake() -> None:
+    with Bench() as bench:
+        bench.servo().set_node_id(7)
+        bench.on_power_cycle()
+        assert bench.servo().provision(new_rate=250_000).node == 5
+        assert bench.simulator.servos[0].node == 5
+
+
+def test_silence_without_a_restart_is_no_restart() -> None:
+    looks = {"605#4000300000000000": ["", "", "", "", "585#4F00300009000000"]}
+    with Bench() as bench:
+        bench.on_power_cycle(lambda: setattr(bench.link, "line", Answers(looks)))
+        with pytest.raises(OutcomeUnknown, match="did not come back"):
+            bench.servo().provision(new_id=9, timeout=3.0)
+        bench.link.line = PerfectLine()
+        bench[5].power_cycle()
+        assert bench.servo().provision(new_id=9).resumed is True
+
+
+@pytest.mark.parametrize(
+    ("ids", "restarts", "error", "text"),
+    [
+        ((5, 9), False, OutcomeUnknown, "did not come back"),
+        ((5, 9), True, VerificationFailed, r"two servos answer as 0x09 \(9\)"),
+        ((5, 5), True, OutcomeUnknown, "which of them is the servo"),
+    ],
+)
+def test_servo_that_joins_during_the_restart_is_not_mistaken(
+    ids: tuple[int, ...], restarts: bool, error: type[MotorbusError], text: str
+) -> None:
+    with Bench(*ids, link=Timed) as bench:
+        first, second = bench.simulator.servos
+        second.raw_position = 77
+        second.unplug()
+
+        def plug_both() -> None:
+            first.plug()
+            second.plug()
+
+        def join() -> None:
+            if restarts:
+                first.unplug()
+            bench.link.then = plug_both
+            bench.link.when = bench.link.now() + 1.0
+
+        bench.on_power_cycle(join)
+        with pytest.raises(error, match=text) as raised:
+            bench.servo().provision(new_id=9, timeout=2.0)
+        assert raised.value.advice
+        second.unplug()
+        bench.on_power_cycle()
+        assert bench.servo().provision(new_id=9)[:2] == (9, 500_000)
+
+
+@pytest.mark.parametrize("ids", [(5,), (5, 6)])
+def test_wait_for_the_restart_disturbs_no_servo_at_the_old_rate(ids: tuple[int, ...]) -> None:
+    """The new rate is tried while the servo is silent and no other one sends."""
+    with Bench(*ids, profile="kst-ext", broadcast_read=False) as bench:
+        if 6 in ids:
+            bench.servo(6).start_reports(0.02)
+        bench.on_power_cycle(bench[5].unplug if 6 in ids else lambda: None)
+        with pytest.raises(OutcomeUnknown):
+            bench.servo().provision(new_rate=250_000, timeout=3.0)
+        assert bench[ids[-1]].status()["errors"] == 0
+        assert (bench.bus.rate, is_listening(bench.bus)) == (500_000, False)

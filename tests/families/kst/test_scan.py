@@ -1,0 +1,133 @@
+"""Scan of ids and search for the bit rate: what is sent, what is reported, what is left undisturbed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pytest
+
+from motorbus.core.family import Found
+from motorbus.core.steps import Progress
+from motorbus.errors import LinkError, LinkLost, RequestError
+from motorbus.families.kst import LineActivity, Skipped, Suspicion, scan, scan_bit_rates
+from motorbus.families.kst.profiles import RATES
+from motorbus.link.memory import MemoryLink
+from tests.families.kst.bench import Bench, NoErrorFrames, NoListening
+
+ALL = "600#4000300000000000"
+
+
+def run_scan(bench: Bench, ids: Sequence[int] = (), rates: Sequence[int] = ()) -> list[tuple[int, int]]:
+    """The nodes that the scan finds, with their rates."""
+    return [(one.node, one.rate) for one in bench.bus.run(scan(ids, rates, bench.settings))]
+
+
+def test_scan_sends_one_broadcast_and_reads_silent_ids_twice() -> None:
+    with Bench(1, 37, 127) as bench:
+        found = [(1, 500_000), (37, 500_000), (127, 500_000)]
+        assert run_scan(bench) == found
+        frames = bench.sent()
+        assert (frames[0], len(frames)) == (ALL, 1 + 2 * 124 + 3 * 3)
+        assert bench.events[:3] == [Found(*one, None) for one in found]
+        progress = [event.done for event in bench.of(Progress)]
+        assert progress == sorted(progress)
+        assert bench.link.now() < 0.5
+        assert run_scan(bench, (37, 38)) == [(37, 500_000)]
+        assert ALL not in bench.sent()
+        with pytest.raises(RequestError):
+            run_scan(bench, (0,))
+
+
+@pytest.mark.parametrize("ids", [(), (5,)])
+def test_scan_reports_an_id_that_needs_a_restart(ids: tuple[int, ...]) -> None:
+    with Bench() as bench:
+        bench.servo().set_node_id(9)
+        (found,) = bench.bus.run(bench.bus.driver.scan(ids))
+        assert found.identity is not None
+        assert found.identity.details["reads_back_id"] == 9
+        (suspicion,) = bench.of(Suspicion)
+        assert suspicion.node == 5
+        assert "reads back the id 9" in suspicion.what
+
+
+def test_scan_suspects_duplicates_without_bus_errors() -> None:
+    with Bench(5, 5, 6, line=NoErrorFrames()) as bench:
+        bench.simulator.servos[1].raw_position = 3
+        assert run_scan(bench) == [(5, 500_000), (6, 500_000)]
+        (suspicion,) = bench.of(Suspicion)
+        assert "its position never" in suspicion.what
+
+
+@pytest.mark.parametrize(("sent", "accepted"), [("std", "ext"), ("ext", "std")])
+def test_scan_without_a_reply_names_the_other_id_format(sent: str, accepted: str) -> None:
+    with Bench(settings={"id_format": sent}, id_format=accepted) as bench:
+        assert run_scan(bench) == []
+        (suspicion,) = bench.of(Suspicion)
+        assert "id_format=ext" in suspicion.what
+
+
+def test_scan_of_a_silent_bus_loses_one_frame_at_each_named_rate() -> None:
+    with Bench(bit_rate=250_000) as bench:
+        wrong = [rate for rate in RATES if rate not in (250_000, 500_000)]
+        assert run_scan(bench, (5,), (*wrong, 250_000)) == [(5, 250_000)]
+        assert [one[:2] for one in bench.of(Suspicion)] == [(0, rate) for rate in wrong]
+        assert bench[5].status()["errors"] == len(wrong)
+    with Bench(bit_rate=250_000, link=NoListening) as bench:
+        assert run_scan(bench, (5,), (125_000, 250_000)) == [(5, 250_000)]
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_traffic_shows_the_rate_without_a_frame_sent(rate: int) -> None:
+    with Bench(bit_rate=rate, reports_ms=100, profile="kst-ext") as bench:
+        found = bench.bus.run(scan_bit_rates(bench.settings))
+        assert (found.rate, found.activity[rate]) == (rate, LineActivity.TRAFFIC)
+        assert {found.activity[one] for one in RATES if one < rate} <= {LineActivity.ERRORS}
+        assert (bench.sent(), bench[5].status()["errors"], bench.bus.rate) == ([], 0, 500_000)
+
+
+def test_silent_bus_is_sent_to_only_where_it_is_isolated() -> None:
+    with Bench(bit_rate=125_000) as bench:
+        found = bench.bus.run(scan_bit_rates(bench.settings))
+        assert (found.rate, set(found.activity.values())) == (None, {LineActivity.SILENCE})
+        assert bench.sent() == []
+        found = bench.bus.run(scan_bit_rates(bench.settings, isolated=True))
+        assert (found.rate, [one.node for one in found.found]) == (125_000, [5])
+        assert bench.servo().ping() is False, "the bus has its rate again"
+        bench[5].unplug()
+        assert bench.bus.run(scan_bit_rates(bench.settings, isolated=True)).rate is None
+
+
+def test_adapter_that_cannot_listen_needs_an_isolated_bus() -> None:
+    with Bench(bit_rate=125_000, link=NoListening) as bench:
+        with pytest.raises(RequestError, match="cannot listen"):
+            bench.bus.run(scan_bit_rates(bench.settings))
+        assert bench.sent() == []
+        assert bench.bus.run(scan_bit_rates(bench.settings, isolated=True)).rate == 125_000
+
+
+class Without800k(MemoryLink):
+    """An adapter that lacks a rate, as slcan."""
+
+    def tune(self, rate: int, listen_only: bool = False) -> None:
+        if rate == 800_000:
+            raise LinkError("this adapter has no such rate")
+        super().tune(rate, listen_only)
+
+
+def test_rate_that_the_adapter_lacks_is_skipped() -> None:
+    with Bench(bit_rate=1_000_000, reports_ms=10.0, link=Without800k) as bench:
+        found = bench.bus.run(scan_bit_rates(bench.settings))
+        assert (found.rate, 800_000 in found.activity) == (1_000_000, False)
+        assert bench.of(Skipped) == [Skipped(800_000, "this adapter has no such rate")]
+
+
+def test_search_ends_with_a_lost_adapter_or_an_impossible_argument() -> None:
+    with Bench() as bench:
+        for seconds in (0.0, -1.0, float("nan"), float("inf")):
+            with pytest.raises(RequestError, match="seconds"):
+                bench.bus.run(scan_bit_rates(bench.settings, seconds=seconds))
+        with pytest.raises(RequestError, match="no rate"):
+            bench.bus.run(scan_bit_rates(bench.settings, rates=(9600,)))
+        bench.link.unplug(0.5)
+        with pytest.raises(LinkLost):
+            bench.bus.run(scan_bit_rates(bench.settings))

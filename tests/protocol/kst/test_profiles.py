@@ -1,0 +1,202 @@
+"""Object dictionaries against a list of this file, profiles, and angles against exact arithmetic."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import inf, nan, pi, radians
+
+import pytest
+
+from motorbus.core.register import Access, Coding, Storage
+from motorbus.core.request import Effect
+from motorbus.core.units import parse
+from motorbus.errors import RequestError
+from motorbus.families.kst.profiles import (
+    BIT_RATES,
+    DEFAULT_NODE,
+    DEFAULT_RATE,
+    PROFILES,
+    RATES,
+    REVERSED,
+    SAVE,
+    TABLES,
+    Profile,
+    bit_rate_code,
+    current,
+    temperature,
+    to_raw,
+    version_text,
+)
+
+R, W, RW = Access.READ, Access.WRITE, Access.READ_WRITE
+WORD = 0xFFFFFFFF
+
+# name: index, sub-index, bytes, signed, access, lowest, highest, as shipped
+MANUAL: dict[str, tuple[int, int, int, bool, Access, int, int, int | None]] = {
+    "firmware_version": (0x100A, 0, 4, False, R, 0, WORD, None),
+    "store": (0x1010, 1, 4, False, W, 0, WORD, None),
+    "node_id": (0x3000, 0, 1, False, RW, 1, 127, 0x25),
+    "bit_rate_code": (0x3001, 0, 1, False, W, 0, 7, 5),
+    "present_position": (0x6002, 0, 2, True, R, -900, 900, None),
+    "goal_position": (0x6003, 0, 2, True, RW, -900, 900, None),
+}
+EXTENDED = {
+    **MANUAL,
+    "present_position": (0x6002, 0, 2, True, R, -1000, 1000, None),
+    "goal_position": (0x6003, 0, 2, True, RW, -1000, 1000, None),
+    "software_version": (0x100B, 0, 4, False, R, 0, WORD, None),
+    "report_interval": (0x2200, 0, 1, False, W, 1, 255, None),
+    "mid_point": (0x3009, 0, 4, False, W, 0, 1, None),
+    "negative_limit": (0x300A, 0, 2, True, RW, -1000, 0, None),
+    "positive_limit": (0x300B, 0, 2, True, RW, 0, 1000, None),
+    "function_enable": (0x300F, 0, 1, False, RW, 0, 255, None),
+    "status": (0x6005, 0, 4, False, R, 0, WORD, None),
+}
+XQPOWER = {
+    **MANUAL,
+    "present_position": (0x6002, 0, 2, True, R, -800, 800, None),
+    "goal_position": (0x6003, 0, 2, True, RW, -800, 800, None),
+    "report_interval": (0x2200, 0, 1, False, W, 10, 255, None),
+    "mid_point": EXTENDED["mid_point"],
+    "status": EXTENDED["status"],
+}
+OBJECTS = {"kst": MANUAL, "kst-ext": EXTENDED, "kingmax": EXTENDED, "xqpower": XQPOWER}
+EFFECTS = {
+    "goal_position": Effect.MOTION,
+    **dict.fromkeys(("node_id", "bit_rate_code"), Effect.IDENTITY),
+    **dict.fromkeys(
+        ("store", "mid_point", "negative_limit", "positive_limit", "function_enable"), Effect.PERSISTENT
+    ),
+}
+PROTECTED = "firmware_version software_version store node_id bit_rate_code mid_point function_enable"
+
+every_profile = pytest.mark.parametrize("profile", PROFILES.values(), ids=list(PROFILES))
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_dictionary_has_the_objects_of_its_sources(name: str) -> None:
+    found = {
+        row.name: (
+            row.address,
+            row.subindex,
+            row.size,
+            row.coding is Coding.TWOS_COMPLEMENT,
+            row.access,
+            row.low,
+            row.high,
+            row.default,
+        )
+        for row in TABLES[name].values()
+    }
+    assert found == OBJECTS[name]
+    assert [row[:2] for row in found.values()] == sorted(row[:2] for row in found.values())
+    assert list(PROFILES) == list(TABLES) == list(OBJECTS)
+
+
+@every_profile
+def test_rows_have_effect_protection_scale_and_source(profile: Profile) -> None:
+    for row in profile.table.values():
+        assert row.effect is EFFECTS.get(row.name, Effect.NONE), row.name
+        assert row.protected == (row.name in PROTECTED.split()), row.name
+        assert row.storage is not Storage.RAM or row.effect in {Effect.NONE, Effect.MOTION}, row.name
+        if row.unit == "rad":
+            assert row.scale == pi / 180 / profile.counts_per_degree
+        assert len(row.source) > 20
+        assert profile.name != "kst" or row.source.startswith("KST CAN protocol manual")
+        assert not row.conflict or "Chosen: " in row.conflict
+
+
+def test_bit_rates_and_values_with_names_are_those_of_the_manual() -> None:
+    kilobits = [20, 50, 100, 125, 250, 500, 800, 1000]
+    assert dict(BIT_RATES) == {code: rate * 1000 for code, rate in enumerate(kilobits)}
+    assert [bit_rate_code(rate) for rate in RATES] == list(range(8))
+    assert (BIT_RATES[5], DEFAULT_NODE) == (DEFAULT_RATE, 0x25) == (500_000, 37)
+    for rate in (0, 10_000, 5, True):
+        with pytest.raises(RequestError, match="no rate"):
+            bit_rate_code(rate)
+    for table in TABLES.values():
+        assert table["bit_rate_code"].choices[6] == "800000 bit/s"
+        assert table["store"].choices == {SAVE: "save"}
+        assert table["store"].encode(SAVE) == b"save"
+    assert TABLES["kst-ext"]["function_enable"].bits == {REVERSED: "reversed"} == {5: "reversed"}
+
+
+def test_profiles_have_the_values_of_their_sources() -> None:
+    found = {
+        one.name: (
+            one.vendor,
+            one.counts_per_degree,
+            one.limit,
+            one.current_scale,
+            one.nmt,
+            one.report_forms,
+            (one.mid_point_value, one.mid_point_wait, one.flash_wait),
+        )
+        for one in PROFILES.values()
+    }
+    assert found == {
+        "kst": ("KST", 10, 900, 0.01, "none", (), (0, 0.15, 0.15)),
+        "kst-ext": ("KST", 10, 1000, 0.01, "vendor", ("sdo",), (0, 0.15, 0.15)),
+        "kingmax": ("Kingmax", 10, 1000, 0.01, "vendor", ("sdo",), (0, 0.15, 0.15)),
+        "xqpower": ("XQPOWER", 18, 800, 0.001, "standard", ("sdo", "pdo"), (1, 0.5, 0.15)),
+    }
+    for one in PROFILES.values():
+        assert (one.table, one.status_row) == (TABLES[one.name], one.table.at(0x6005, 0))
+        names = ("firmware_version", "software_version")
+        assert list(one.version_rows) == [one.table[name] for name in names if name in one.table]
+
+
+@every_profile
+def test_angle_is_rounded_as_in_exact_arithmetic(profile: Profile) -> None:
+    """All raw values, all halves and quarters between, in radians made in three ways."""
+    row = profile.table["goal_position"]
+    for quarter in range(-4 * profile.limit - 1, 4 * profile.limit + 2):
+        angle = float(Fraction(quarter, 4 * profile.counts_per_degree))
+        nearest = int(abs(Fraction(quarter, 4)) + Fraction(1, 2)) * (1 if quarter > 0 else -1)
+        raws = {
+            to_raw(profile, radians(angle)),
+            to_raw(profile, parse(f"{angle!r}deg", "position")),
+            to_raw(profile, parse(f"{radians(angle)!r} rad", "position")),
+        }
+        assert raws == {nearest}, angle
+        assert to_raw(profile, row.to_value(nearest)) == nearest
+
+
+@every_profile
+def test_angle_outside_the_range_is_refused(profile: Profile) -> None:
+    half = float(Fraction(2 * profile.limit + 1, 2 * profile.counts_per_degree))
+    for angle in (half, -half, 200.0, -200.0, 1e9, 1e200):
+        with pytest.raises(RequestError, match=r"goal_position: .* is out of range") as raised:
+            to_raw(profile, radians(angle))
+        assert f"raw {-profile.limit} to {profile.limit}" in raised.value.expected
+    for angle in (nan, inf, -inf, 1e308, -1e308):
+        with pytest.raises(RequestError, match=r"goal_position: .* is (not a finite angle|out of range)"):
+            to_raw(profile, angle)
+
+
+VERSIONS = {
+    b"V1.2": "V1.2",
+    b"1.0\0": "1.0",
+    b"KST servo 2.10\0": "KST servo 2.10",
+    b"A\0\0B": "41 00 00 42",
+    b"\0\0\0\0": "00 00 00 00",
+    b"    ": "20 20 20 20",
+    b"V1\n2": "56 31 0A 32",
+    b"\xe912\0": "E9 31 32 00",
+    b"": "",
+}
+
+
+def test_version_is_text_or_hexadecimal() -> None:
+    assert {data: version_text(data) for data in VERSIONS} == VERSIONS
+
+
+@pytest.mark.parametrize(
+    ("data", "counts", "celsius"),
+    [("00000000", 0, 0), ("39012800", 313, 40), ("ffff7fff", 65535, 127), ("01808055", 32769, -128)],
+)
+def test_status_holds_current_and_temperature(data: str, counts: int, celsius: int) -> None:
+    for name, scale in (("kst-ext", 0.01), ("kingmax", 0.01), ("xqpower", 0.001)):
+        raw = PROFILES[name].table["status"].decode(bytes.fromhex(data))
+        assert current(PROFILES[name], raw) == pytest.approx(counts * scale, rel=1e-12)
+        assert temperature(raw) == celsius
