@@ -208,7 +208,7 @@ class Profile:
 
     @property
     def limit(self) -> int:
-        """The greatest raw position, either way."""
+        """The largest raw position, either way."""
         return self.table["goal_position"].high
 
     @property
@@ -279,8 +279,7 @@ def to_raw(profile: Profile, radians: float, row: str = "goal_position") -> int:
     """Angle (rad) -> nearest raw value of this row; half a count rounds away from zero, exactly as in decimal.
 
     10.85° is 108.5 counts and must become 109; in binary radians it is 108.49999999999999, so the value is first
-    rounded to a millionth of a count. Raises RequestError outside the range of the row, or for a value that is not
-    finite.
+    rounded to a millionth of a count. Raises RequestError outside the range of the row.
     """
     register = profile.table[row]
     counts = profile.counts_per_degree * degrees(radians)
@@ -320,7 +319,5 @@ def bit_rate_code(rate: int) -> int:
     for code, known in BIT_RATES.items():
         if known == rate and not isinstance(rate, bool):
             return code
-    raise RequestError(
-        f"{rate!r} bit/s is no rate of these servos",
-        expected=f"one of {', '.join(map(str, RATES))}",
-    )
+    rates = ", ".join(map(str, RATES))
+    raise RequestError(f"{rate!r} bit/s is no rate of these servos", expected=f"one of {rates}")
