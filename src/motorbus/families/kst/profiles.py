@@ -152,27 +152,22 @@ KINGMAX: Final = KST_EXT.derive(
 XQPOWER: Final = KST_EXT.derive(
     "xqpower",
     changed(
-        KST_EXT["report_interval"],
-        low=10,
-        source=XQPOWER_DRIVER,
+        KST_EXT["report_interval"], low=10, source=XQPOWER_DRIVER,
         note="less than 10 ms is raised to 10 ms by the servo",
     ),
     changed(
-        KST_EXT["mid_point"],
-        source=XQPOWER_DRIVER,
+        KST_EXT["mid_point"], source=XQPOWER_DRIVER,
         conflict="the PX4 module: writes 1 without a length; the tools: four bytes with it. Chosen: the tools",
         note="makes the present position the zero, and is then to be saved",
     ),
     changed(
-        KST_EXT["status"],
-        source=XQPOWER_DRIVER,
-        conflict="",
+        KST_EXT["status"], source=XQPOWER_DRIVER, conflict="",
         note="bytes 0 and 1 current (1 mA, unsigned), byte 2 temperature (°C, signed), byte 3 unused",
     ),
     *_reaching(KST, 800, pi / 3240, f"{XQPOWER_DRIVER} (18 counts per degree, by test on hardware)"),
     without=("software_version", "negative_limit", "positive_limit", "function_enable"),
     title="XQPOWER CAN servo",
-)
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
