@@ -34,9 +34,10 @@ class PoweredDevice:
             self.power_on()
 
     def power_cycle(self) -> None:
-        """Take the supply away and give it back at once."""
-        self.power_off()
-        self.power_on()
+        """Take the supply away and give it back at once; no effect without a supply."""
+        if self.plugged:
+            self.power_off()
+            self.power_on()
 
 
 D = TypeVar("D", bound=PoweredDevice)

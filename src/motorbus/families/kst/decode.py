@@ -30,6 +30,7 @@ BUS_ERRORS: Final = (
     "the controller was restarted",
 )
 """Bits of the identifier of an error frame, from bit 0 (SocketCAN)."""
+SHAPES: Final = {"report": ": a position (2) and two zeros", "heartbeat": ": 0, 4, 5 or 127"}
 NMT: Final = {0x80: "be pre-operational", 0x81: "restart", 0x82: "restart communication"}
 """Commands of network management (CiA 301) besides start and stop."""
 
@@ -270,19 +271,16 @@ class _Frame:
         return f"to {_name(start.node)}: {verb}, in {by}"
 
     def _foreign(self, node: int, base: int) -> str:
-        number = self.frame.id & 0x1FFF_FFFF
-        if not self.frame.extended and number > 0x7FF:
-            self.fault = f"identifier 0x{number:X} does not fit 11 bits"
+        kind, length = notifications.NOTIFICATIONS.get(base, ("", 0))
+        self.fault = "no frame of this protocol has this identifier"
+        if not self.frame.extended and self.frame.id & 0x1FFF_FFFF > 0x7FF:
+            self.fault = "the identifier does not fit 11 bits"
         elif self.frame.id & REMOTE_FLAG:
             self.fault = "a remote frame: this protocol has none"
         elif base == 0:
             self.fault = "no start or stop (01 00, 02 00) and no command of network management"
-        elif base in notifications.NOTIFICATIONS and node:
-            kind, length = notifications.NOTIFICATIONS[base]
-            details = {"report": ": a position (2) and two zeros", "heartbeat": ": 0, 4, 5 or 127"}
-            self.fault = f"a {kind} has {counted(length)}{details.get(kind, '')}"
-        else:
-            self.fault = "no frame of this protocol has this identifier"
+        elif kind and node:
+            self.fault = f"a {kind} has {counted(length)}{SHAPES.get(kind, '')}"
         return "no frame of this protocol"
 
 

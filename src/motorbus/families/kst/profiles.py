@@ -152,27 +152,22 @@ KINGMAX: Final = KST_EXT.derive(
 XQPOWER: Final = KST_EXT.derive(
     "xqpower",
     changed(
-        KST_EXT["report_interval"],
-        low=10,
-        source=XQPOWER_DRIVER,
+        KST_EXT["report_interval"], low=10, source=XQPOWER_DRIVER,
         note="less than 10 ms is raised to 10 ms by the servo",
     ),
     changed(
-        KST_EXT["mid_point"],
-        source=XQPOWER_DRIVER,
+        KST_EXT["mid_point"], source=XQPOWER_DRIVER,
         conflict="the PX4 module: writes 1 without a length; the tools: four bytes with it. Chosen: the tools",
         note="makes the present position the zero, and is then to be saved",
     ),
     changed(
-        KST_EXT["status"],
-        source=XQPOWER_DRIVER,
-        conflict="",
+        KST_EXT["status"], source=XQPOWER_DRIVER, conflict="",
         note="bytes 0 and 1 current (1 mA, unsigned), byte 2 temperature (°C, signed), byte 3 unused",
     ),
     *_reaching(KST, 800, pi / 3240, f"{XQPOWER_DRIVER} (18 counts per degree, by test on hardware)"),
     without=("software_version", "negative_limit", "positive_limit", "function_enable"),
     title="XQPOWER CAN servo",
-)
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -208,7 +203,7 @@ class Profile:
 
     @property
     def limit(self) -> int:
-        """The greatest raw position, either way."""
+        """The largest raw position, either way."""
         return self.table["goal_position"].high
 
     @property
@@ -279,8 +274,7 @@ def to_raw(profile: Profile, radians: float, row: str = "goal_position") -> int:
     """Angle (rad) -> nearest raw value of this row; half a count rounds away from zero, exactly as in decimal.
 
     10.85° is 108.5 counts and must become 109; in binary radians it is 108.49999999999999, so the value is first
-    rounded to a millionth of a count. Raises RequestError outside the range of the row, or for a value that is not
-    finite.
+    rounded to a millionth of a count. Raises RequestError outside the range of the row.
     """
     register = profile.table[row]
     counts = profile.counts_per_degree * degrees(radians)
@@ -320,7 +314,5 @@ def bit_rate_code(rate: int) -> int:
     for code, known in BIT_RATES.items():
         if known == rate and not isinstance(rate, bool):
             return code
-    raise RequestError(
-        f"{rate!r} bit/s is no rate of these servos",
-        expected=f"one of {', '.join(map(str, RATES))}",
-    )
+    rates = ", ".join(map(str, RATES))
+    raise RequestError(f"{rate!r} bit/s is no rate of these servos", expected=f"one of {rates}")

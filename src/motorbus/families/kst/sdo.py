@@ -255,8 +255,8 @@ class Key:
         if not isinstance(other, Key):
             return NotImplemented
         if self.kind == other.kind:
-            mine, theirs = (self.index, self.subindex), (other.index, other.subindex)
-            return mine == theirs and self.toggle == other.toggle
+            same_object = self.index == other.index and self.subindex == other.subindex
+            return same_object and self.toggle == other.toggle
         abort, request = (self, other) if self.kind == "abort" else (other, self)
         if abort.kind != "abort":
             return False

@@ -25,17 +25,16 @@ METHODS: Final[Mapping[str, str]] = {
 
 
 async def read(node: Node, /, *names: str) -> dict[str, Value]:
-    """Objects in API units by name; all that this servo has without a name.
+    """Objects in API units by name; without a name all that this servo has.
 
-    Raises RequestError for an unknown or write-only name (nothing is sent), DeviceError for a named object that the
-    servo refuses; unnamed objects that it lacks are left out.
+    Raises RequestError for an unknown or write-only name, DeviceError for a named object that the servo refuses.
     """
     raws = await read_raw(node, *names)
     return {name: node.value(node.table[name], raw) for name, raw in raws.items()}
 
 
 async def read_raw(node: Node, /, *names: str) -> dict[str, int]:
-    """Objects as raw values by name; all that this servo has without a name. Raises as `read`."""
+    """Objects as raw values by name; see `read`."""
     found: dict[str, int] = {}
     for row in readable_rows(node.table, names):
         request = read_register(node, row, int, reports_position=row.name == "present_position")
@@ -50,9 +49,8 @@ async def read_raw(node: Node, /, *names: str) -> dict[str, int]:
 async def write(node: Node, /, **values: Value) -> None:
     """Write objects by name, in API units; all values are checked before the first is sent.
 
-    A value that survives power-off is read back, saved, and read back again. Raises RequestError for what cannot be
-    written by name, LimitExceeded for a target outside the limits, VerificationFailed when a value reads back
-    different.
+    A value that survives power-off is written by `store`. Raises RequestError for what cannot be written by name,
+    LimitExceeded for a target outside the limits.
     """
 
     def to_raw(row: Register, value: Value) -> int:

@@ -23,10 +23,9 @@ from motorbus.families.kst.profiles import SAVE, bit_rate_code
 
 
 async def broadcast_read(name: str, settings: BusSettings = DEFAULT) -> dict[int, Value]:
-    """An object of all servos, in API units, by node.
+    """An object of all servos, in API units, by node. Raises RequestError for an unknown or write-only object.
 
     A servo is missing that refuses it, is silent, sends another size, or sends two values (two servos with one id).
-    Raises RequestError for an object that is unknown or write-only.
     """
     row = settings.profile.table[name]
     if not row.readable:
@@ -47,10 +46,9 @@ async def broadcast_read(name: str, settings: BusSettings = DEFAULT) -> dict[int
 async def broadcast_position(
     to: float, nodes: Sequence[int], settings: BusSettings = DEFAULT
 ) -> tuple[int, ...]:
-    """Send all servos to `to` rad; return the nodes that acknowledged.
+    """Send all servos to `to` rad; return the nodes that acknowledged. Errors and start rule as in `move`.
 
-    `nodes` are the servos that the gate checks: name all on the bus, because all move. Raises RequestError for no node,
-    LimitExceeded as `move`. Where the profile has a start rule, a start to all is sent first and reported.
+    `nodes` are the servos that the gate checks: name all on the bus, because all move.
     """
     checked = checked_ids(nodes)
     if not checked:

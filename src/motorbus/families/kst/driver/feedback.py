@@ -85,9 +85,9 @@ async def telemetry(node: Node) -> State:
 
 
 def health(node: Node) -> Request[Health]:
-    """Current (A), temperature (°C) and recent alarms; by a profile without a status object the position (rad).
+    """Current (A), temperature (°C), recent alarms, or, without a status object, the position (rad).
 
-    `restarts` counts the boot messages (CiA 301) received from the node; no source says that these servos send one.
+    `restarts` counts boot messages (CiA 301); no source says that these servos send one.
     """
     status_row, bus = node.profile.status_row, node.settings.state
     row = status_row or node.table["present_position"]

@@ -1,13 +1,11 @@
 """Identity, node id and bit rate of a servo, and whether one servo or two answer to an id.
 
 No servo reports its maker or model, so its model is the profile of the bus. A node id or bit rate written here takes
-effect after a save and a restart, and no command restarts a servo: `provision` does all of it. Source: KST CAN protocol
-manual, commands 1, 2, 4 and 8.
+effect after a save and a restart: `provision` does all of it. Source: KST CAN protocol manual, commands 1, 2, 4 and 8.
 
-Two servos with one id reply at slightly different times, which gives two replies, or at the same time: equal replies
-then merge into one frame, unequal ones break each other. So several objects that seldom agree are read again and
-again, and bus errors meanwhile count as a second servo. Most slcan adapters report no bus errors: there, a position
-that never comes from a servo whose id always comes counts as two.
+Two servos with one id send two replies, or at the same time equal ones, which merge, or unequal ones, which break each
+other. So several objects that seldom agree are read repeatedly, and bus errors meanwhile count as a second servo. Most
+slcan adapters report no bus errors: there, an id that always comes with a position that never comes counts as two.
 """
 
 from __future__ import annotations
@@ -57,10 +55,7 @@ async def identify(node: Node) -> Identity:
 
 
 async def version(node: Node) -> str:
-    """The firmware version as text, from 0x100A or where newer firmware has it; as hex where it is no text.
-
-    Raises DeviceError when the servo has none of these objects.
-    """
+    """The firmware version as text, from 0x100A or 0x100B; as hex where it is no text. Raises DeviceError without."""
     *rows, last = node.profile.version_rows
     for row in rows:
         try:
@@ -87,9 +82,8 @@ def node_id(node: Node) -> Request[int]:
 async def set_node_id(node: Node, new: int) -> None:
     """Give it another id, 1 to 127: it takes effect after save() and a restart, and is lost at one without a save.
 
-    Raises RequestError for another new id (nothing is sent), two servos with this id or an id in use (nothing is
-    written); NoReply; VerificationFailed when it reads back neither. To swap two ids, give one of them a third one
-    first.
+    Raises RequestError (nothing is written) for an impossible id, two servos with this id, or an id in use; NoReply;
+    VerificationFailed when it reads back neither. To swap two ids, give one of them a third one first.
     """
     checked_id(new)
     if not await Exclusive(answers_alone(node)):
@@ -135,10 +129,7 @@ async def bit_rate(node: Node) -> int | None:
 
 
 def set_bit_rate(node: Node, rate: int) -> Request[None]:
-    """Give it another bit rate (bit/s): it takes effect after save() and a restart, and is lost at a restart without.
-
-    Raises RequestError for a rate that these servos do not have.
-    """
+    """Give it another bit rate (bit/s) of `RATES`: it takes effect after save() and a restart, and is lost without."""
     row = node.table["bit_rate_code"]
     return write_register(node, row, bit_rate_code(rate), priority=Priority.CONFIGURATION)
 

@@ -1,8 +1,8 @@
 """Move and stop.
 
-These servos have one motion command, a target position that takes effect at once, at their own speed. They have no
-torque switch and no stop: a stop makes the present position the target. Some makers ignore targets until the servo is
-started. Source: KST CAN protocol manual, command 5; the start rule: a public XQPOWER module.
+The one motion command is a target position that takes effect at once, at the servo's own speed. A stop makes the
+present position the target; torque stays on. Some makers ignore targets until the servo is started. Source: KST CAN
+protocol manual, command 5; the start rule: a public XQPOWER module.
 """
 
 from __future__ import annotations
@@ -135,10 +135,7 @@ async def start(node: Node, goal: Setpoint | None = None) -> None:
 
 
 def start_request(node: Node, on: bool, goal: Setpoint | None = None) -> Request[object]:
-    """Start or stop, in the form of this bus; it has no reply.
-
-    Where it lets a servo move it has the effect of torque on, with a `goal` that of motion.
-    """
+    """Start or stop, in the form of this bus; it has no reply. A start that lets a servo move counts as torque on."""
     form = node.settings.nmt
     frame = encode_start(form, node.node, on, extended=node.settings.extended)
     effect = Effect.NONE

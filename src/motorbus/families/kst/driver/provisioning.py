@@ -1,9 +1,9 @@
 """Give a servo its id and its bit rate, from the first read to the check after the restart.
 
-A new id or rate takes effect after a save and a restart; the save has no reply; no command restarts a servo, so the
-user does; two servos with one id cannot be distinguished afterwards; power may fail at any moment. So the state is
-always found by reading: a call after an interrupt continues from the present state. "Saved" is reported only when the
-servo has come back with the new values. Source: KST CAN protocol manual, commands 1 to 4.
+A new id or rate takes effect after a save, which has no reply, and a restart, which the user makes; power may fail at
+any moment. So the state is always found by reading: a call after an interrupt continues from the present state, and
+success is reported only when the servo has come back with the new values. Source: KST CAN protocol manual, commands 1
+to 4.
 """
 
 from __future__ import annotations
@@ -78,13 +78,11 @@ async def provision(
     """Give this servo another id, another bit rate (bit/s), or both, and wait until it comes back with them.
 
     Checks that one servo answers alone and that the new id is free; writes, reads back, saves; reports
-    `PowerCycleNeeded`; waits at most `timeout` s; verifies. It may be called again at any point. At a new rate the
-    adapter listens first.
+    `PowerCycleNeeded`; waits at most `timeout` s; verifies. It may be called again at any point.
 
-    Raises RequestError (nothing is written) for an invalid id or rate, an id in use, two servos with one id, or
-    another rate while other servos are on the bus; NoReply; VerificationFailed when it comes back with the old
-    values, or beside another servo with its new id; OutcomeUnknown when it does not come back in time, or answers to
-    both ids.
+    Raises RequestError (nothing is written) for an invalid id or rate, an id in use, two servos with one id, or a new
+    rate while other servos are on the bus; NoReply; VerificationFailed when it comes back with the old values, or
+    beside another servo with its new id; OutcomeUnknown when it does not come back in time, or answers to both ids.
     """
     if new_id is None and new_rate is None:
         raise RequestError("nothing to provision", expected="new_id=, new_rate=, or both")

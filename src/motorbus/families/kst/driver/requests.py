@@ -126,7 +126,8 @@ def write_register(
 def accepted(node: Node, row: Register, answer: Response) -> SdoReply:
     """The decoded reply. Raises DeviceError for an abort."""
     node.at = answer.at
-    (reply,) = decoded(answer)
+    reply = sdo.decode_reply(answer.replies[0].data)
+    assert reply is not None  # a receiver makes no reply of an invalid frame
     if reply.kind == "abort":
         raise refused(node, row, reply)
     return reply

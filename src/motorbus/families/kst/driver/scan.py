@@ -3,9 +3,9 @@
 A scan reads the node id, first by one broadcast that all servos answer, then of each silent id. It writes nothing: a
 write to the target position presets the encoder of some servos. An abort counts as presence.
 
-A frame at a wrong bit rate breaks the traffic of the others. So at an unknown rate the adapter first listens, without
-acknowledging: a whole frame proves the rate, errors disprove it, silence proves nothing. Some adapters (slcan) report
-no errors. Source of the broadcast: a public demo driver; the rest: CiA 301.
+A frame at a wrong bit rate breaks the traffic of the others. So at another rate the adapter first listens, without
+acknowledging: a whole frame proves the rate, errors disprove it, silence proves nothing; slcan reports no errors.
+Source of the broadcast: a public demo driver; the rest: CiA 301.
 """
 
 from __future__ import annotations
@@ -70,8 +70,7 @@ async def scan(
     """All servos that answer, with their identity. `ids` (): all; `rates` (): the present one.
 
     At another rate than the present one the adapter listens first; a rate at which errors show that the bus is in use
-    is left out (`Skipped`). One broadcast is sent first there, and no more if it was broken. The rate is restored.
-    Reports `Found`, `Progress` and `Suspicion`.
+    is `Skipped`, and nothing follows a first broadcast that is broken. Reports `Found`, `Progress` and `Suspicion`.
     """
     asked = checked_ids(ids or sdo.NODES)
     present = await SetBitrate(0)
@@ -99,9 +98,9 @@ async def scan_bit_rates(
 ) -> BitRates:
     """Find the bit rate of a bus: listen `seconds` at each rate, then, only with `isolated`, send.
 
-    The search ends at a rate with a whole frame. If all are silent, nothing is sent unless the caller says that the
-    bus is isolated: no machine depends on it. A rate that the adapter lacks is reported as `Skipped`. The rate is
-    restored. Raises RequestError for an impossible rate, and for an adapter that cannot listen, unless `isolated`.
+    The search ends at a rate with a whole frame. `isolated` says that no machine depends on this bus. A rate that the
+    adapter lacks is `Skipped`. Raises RequestError for an impossible rate, and, unless `isolated`, for an adapter that
+    cannot listen.
     """
     for rate in rates:
         bit_rate_code(rate)
@@ -154,10 +153,7 @@ async def listen(settings: BusSettings, rate: int, seconds: float) -> LineActivi
 
 
 async def set_named_rate(settings: BusSettings, rate: int) -> None:
-    """Set a rate that the caller has named, after listening where the adapter can.
-
-    Raises RequestError when errors show that the bus is in use at another rate.
-    """
+    """Set this rate after listening, if the adapter can. Raises RequestError if the bus is in use at another rate."""
     activity = await catch(listen(settings, rate, SHORT_LISTEN))
     if isinstance(activity, LinkLost):
         raise activity

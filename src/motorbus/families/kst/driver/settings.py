@@ -1,11 +1,9 @@
 """Settings that survive power-off, and reports.
 
-These servos have no EEPROM lock. A save has no reply (manual), requests during the write to flash are lost or
-answered with transitional values, and some writes fail or are undone. So a value is written, read back, saved, and read
-back again; that it is saved shows after a restart, which only `provision` waits for. Source: KST CAN protocol manual,
-command 3; a public flight-controller driver for the wait, the reading back, three tries.
-
-The manual has no settings but id and bit rate; a profile without one raises RequestError and names those that have it.
+A save has no reply, requests during the write to flash are lost or answered with transitional values, and some writes
+fail or are undone. So a value is written, read back, saved, and read back again; that it is saved shows after a restart
+only. Source: KST CAN protocol manual, command 3; a public flight-controller driver for the wait and the reading back.
+The manual has none of these settings; a profile without one raises RequestError and names those that have it.
 """
 
 from __future__ import annotations
@@ -32,8 +30,7 @@ LISTEN: Final = 0.020
 def save(node: Node) -> Request[None]:
     """Store node id, bit rate, travel limits and function bits; never the target position.
 
-    The request holds the lane of the node for `LISTEN` and the write to flash. No reply is expected; an abort raises
-    DeviceError. Whether the values are stored shows after a restart only.
+    The request holds the lane of the node until flash is written. No reply is expected; an abort raises DeviceError.
     """
     row = node.table["store"]
 
@@ -57,8 +54,8 @@ def save(node: Node) -> Request[None]:
 async def store(node: Node, values: Sequence[tuple[Register, int]]) -> None:
     """Write these rows, read them back, save, and read them back again, with the bus reserved.
 
-    If all rows read as wanted and this node has written none of them since its last save, nothing is written, because
-    flash wears. Raises VerificationFailed when a row reads back different after three tries, or after the save.
+    Nothing is written if all rows read so and this node has written none of them since its last save: flash wears.
+    Raises VerificationFailed when a row reads back different after three tries, or after the save.
     """
     names = {row.name for row, _ in values}
     reads = [partial(read_register, node, row, int) for row, _ in values]
@@ -104,9 +101,9 @@ def _differs(node: Node, row: Register, raw: int, found: int) -> VerificationFai
 async def set_mid_point(node: Node) -> float:
     """Make the present position the zero and save it; return the position (rad) read afterwards, about 0.
 
-    If the servo reads 0 already and this node has no unsaved mid point, nothing is written, because flash wears. No
-    source says whether the servo then moves to its old target: keep clear, and send a target next. A latched stop
-    refuses the request; it is never repeated, so OutcomeUnknown says that the servo may have received it.
+    Nothing is written if the servo reads 0 and this node has no unsaved mid point: flash wears. No source says whether
+    the servo then moves to its old target: keep clear, and send a target next. The request is never repeated:
+    OutcomeUnknown says that the servo may have received it.
     """
     row, profile = feature_row(node, "mid_point", "mid point"), node.profile
 
@@ -139,8 +136,8 @@ async def travel_limits(node: Node) -> tuple[float, float]:
 async def set_travel_limits(node: Node, low: float, high: float) -> None:
     """Limit the travel to `low` (at most 0) and `high` (at least 0) rad; see `store`.
 
-    While the sense of rotation is reversed, a change of one limit changes the other too: VerificationFailed says so
-    unless they are symmetric; use set_reversed(False) first. Raises RequestError for impossible or equal limits.
+    While the sense of rotation is reversed, a change of one limit changes the other too: set_reversed(False) first, or
+    give symmetric limits. Raises RequestError for impossible or equal limits.
     """
     values = [(row, node.raw(row, value)) for row, value in zip(_limit_rows(node), (low, high), strict=True)]
     if values[0][1] == values[1][1]:
@@ -161,8 +158,8 @@ async def reversed_(node: Node) -> bool:
 async def set_reversed(node: Node, on: bool) -> None:
     """Reverse the sense of rotation, or not; the other bits of that object, which are unknown, are kept.
 
-    See `store`. A restart may undo it: read reversed() after one. No source says whether the servo moves to its old
-    target then: keep clear. A latched stop refuses the request.
+    A restart may undo it: read reversed() after one. No source says whether the servo moves to its old target: keep
+    clear.
     """
     row, bit = feature_row(node, "function_enable", "reverse bit"), 1 << REVERSED
 
@@ -176,8 +173,7 @@ async def set_reversed(node: Node, on: bool) -> None:
 async def start_reports(node: Node, interval: float | None = None) -> None:
     """Let the servo report its position every `interval` s (None: as it is set); it does not acknowledge that.
 
-    Where the profile has a start rule, this start also lets it move. Raises RequestError where the profile has no
-    reports, or for an interval out of range.
+    Where the profile has a start rule, this start also lets it move. Raises RequestError for an interval out of range.
     """
     row = _report_row(node)
     if interval is not None:

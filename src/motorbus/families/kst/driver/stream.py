@@ -20,7 +20,7 @@ async def open_stream(servos: Sequence[Node], *, rate: int) -> PositionStream[No
 
     A target is checked against these limits. After a change of limits, mid point or sense of rotation it means
     something else and is refused. `start` makes the present position the target; the servos have no speed setting.
-    Raises RequestError for no servo or a repeated one; else the first error of a servo, with a note for each other.
+    Raises RequestError for no servo or a repeated one; else the first error of a servo.
     """
 
     async def read_limits(node: Node) -> tuple[float, float]:

@@ -47,9 +47,8 @@ class Event(NamedTuple):
 
     @property
     def is_void(self) -> bool:
-        if self.servo is None:
-            return False
-        return self.life != (self.servo.lives if self.frame else self.servo.reports)
+        servo = self.servo
+        return servo is not None and self.life != (servo.lives if self.frame else servo.reports)
 
 
 class KstBus:
@@ -122,10 +121,10 @@ class KstBus:
         return [
             servo
             for servo in self.servos
-            if node in (sdo.BROADCAST, servo.node) and self._hears(servo) and self._takes(servo, frame)
+            if node in (sdo.BROADCAST, servo.node) and self._receives(servo) and self._takes(servo, frame)
         ]
 
-    def _hears(self, servo: Servo) -> bool:
+    def _receives(self, servo: Servo) -> bool:
         return servo.plugged and self.rate in (None, servo.bit_rate)
 
     def _takes(self, servo: Servo, frame: CanFrame) -> bool:
@@ -133,11 +132,11 @@ class KstBus:
 
     def _disturb(self) -> None:
         """A frame of the host is broken for a servo at another rate, which breaks it for all."""
-        others = [servo for servo in self.servos if servo.plugged and not self._hears(servo)]
+        others = [servo for servo in self.servos if servo.plugged and not self._receives(servo)]
         active = any(servo.errors < PASSIVE for servo in others)
         for servo in others:
             servo.errors += 1
-        if active or (others and not any(map(self._hears, self.servos))):  # no servo acknowledges it
+        if active or (others and not any(map(self._receives, self.servos))):  # no servo acknowledges it
             self._send(None, self.now, ERROR)
 
     def audience(self, data: Data) -> Audience:
@@ -195,8 +194,8 @@ class KstBus:
         while (when := self.due()) is not None and when <= moment:
             event = heappop(self._events)
             servo = event.servo
-            frame = event.frame or servo.report(moment) if servo else ERROR
-            if servo is None or not self._hears(servo):
+            frame = (event.frame or servo.report(moment)) if servo else ERROR
+            if servo is None or not self._receives(servo):
                 received.append(ERROR)
                 continue
             place = servo.unit, frame._replace(data=b"")

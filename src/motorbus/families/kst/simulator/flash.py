@@ -7,7 +7,7 @@ from math import inf
 
 
 class Flash:
-    """Stored raw values by name. A save takes time; a restart loads the last save that was complete."""
+    """Stored raw values by name. A save takes time; the last complete one counts."""
 
     def __init__(self, values: Mapping[str, int]) -> None:
         self._stored = dict(values)
@@ -32,8 +32,7 @@ class Flash:
         """The values of the last complete save."""
         return self._stored if self.saving(at) else self._pending
 
-    def load(self, at: float, *, cut: str) -> dict[str, int]:
-        """The stored values; an incomplete save has stored nothing (`cut` "old") or everything ("new")."""
-        self._stored = self._pending = self._pending if cut == "new" else self.stored(at)
+    def cut(self, at: float, kept: str) -> None:
+        """The supply goes: an incomplete save has stored nothing (`kept` "old") or everything ("new")."""
+        self._stored = self._pending = self._pending if kept == "new" else self.stored(at)
         self._done = -inf
-        return self._stored

@@ -9,6 +9,7 @@ from typing import Final
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.plant import Drive, move, rest
 from motorbus.core.register import Register, Storage
+from motorbus.core.simulated import PoweredDevice
 from motorbus.errors import RequestError
 from motorbus.families.kst import notifications
 from motorbus.families.kst.profiles import BIT_RATES, REVERSED, SAVE, Profile, bit_rate_code
@@ -28,7 +29,7 @@ ACCELERATION: Final = 100.0  # rad/s² # assumption
 DRIVE: Final = Drive(top_speed=1.0, idle_current=0.2, stall_current=2.5)  # currents in A # assumption
 
 
-class Servo:
+class Servo(PoweredDevice):
     """A simulated servo.
 
     `unit`      its number on this bus, from 1, whatever its id becomes
@@ -37,7 +38,7 @@ class Servo:
     `motion`    of the shaft, in raw counts
     `errors`    bus errors since its restart
     `started`   a start was received
-    `lives`     number of restarts; what was to be sent before is not sent
+    `lives`     number of losses of supply; what was to be sent before is not sent
     `reports`   number of changes of its reports; the next one is due by the last change only
     `delay`     s added to its replies
     `temperature` (°C) and `load` (-1 to 1, a share of full torque) may be set
@@ -60,7 +61,6 @@ class Servo:
         self.bit_rate = quirks.bit_rate
         self.profile = profile
         self.quirks = quirks
-        self.plugged = True
         self.errors = self.lives = self.reports = 0
         self.delay = self.load = 0.0
         self.temperature = 25.0
@@ -80,7 +80,7 @@ class Servo:
         }
         kept = [row.name for row in profile.table.values() if row.storage is Storage.EEPROM]
         self.flash = Flash({name: self._shipped[name] for name in (*kept, "zero")})
-        self._power_up(now())
+        self.power_on()
         self.values["goal_position"] = quirks.position
 
     # -- for tests and the control socket ------------------------------------------------------------------------
@@ -89,26 +89,6 @@ class Servo:
     def memory(self) -> Mapping[str, int]:
         """The raw value of each row at this time."""
         return {name: self.read(name, self._now()) for name in self.profile.table}
-
-    def unplug(self) -> None:
-        """Disconnect bus and supply. The shaft stays."""
-        now = self._now()
-        self.motion = rest(now, self.motion.position(now))
-        self.flash.load(now, cut=self.quirks.flash_cut)
-        self.lives += 1
-        self.set_reporting(False, now)
-        self.plugged = False
-
-    def plug(self) -> None:
-        """Connect bus and supply; no effect if they are connected."""
-        if not self.plugged:
-            self.plugged = True
-            self._power_up(self._now())
-
-    def power_cycle(self) -> None:
-        """Restart: what was saved takes effect, the rest is lost."""
-        if self.plugged:
-            self._power_up(self._now())
 
     def midway(self) -> float:
         """Time (s) at which half of a save is done; inf without one."""
@@ -263,17 +243,24 @@ class Servo:
 
     # -- supply, start and reports -------------------------------------------------------------------------------
 
-    def _power_up(self, at: float) -> None:
-        """Load the flash. The shaft stays; the target is the default, 0 (manual, command 5). # assumption"""
+    def power_off(self) -> None:
+        """A save in progress is cut; the shaft stays."""
+        now = self._now()
+        self.motion = rest(now, self.motion.position(now))
+        self.flash.cut(now, self.quirks.flash_cut)
         self.lives += 1
-        self.values = self._shipped | self.flash.load(at, cut=self.quirks.flash_cut)
+        self.set_reporting(False, now)
+
+    def power_on(self) -> None:
+        """Load the flash. The target is the default, 0 (manual, command 5). # assumption"""
+        at = self._now()
+        self.values = self._shipped | self.flash.stored(at)
         self.node = self.values["node_id"]
         self.bit_rate = BIT_RATES[self.values["bit_rate_code"]]
         self.errors, self.started = 0, False
-        self.motion = rest(at, self.motion.position(at))
         self._interval = (self.quirks.reports_ms or self.values["report_interval"]) / 1000
         self.set_reporting(self.quirks.reports_ms > 0, at)
-        if self.quirks.boot_notice and self.lives > 1:
+        if self.quirks.boot_notice and self.lives:
             self._send(self, at, notifications.encode_boot(self.node, extended=self.extended))
         if self._voltage < LOW_VOLTAGE:
             self.alarm()
