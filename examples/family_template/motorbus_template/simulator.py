@@ -74,8 +74,10 @@ class Servo(PoweredDevice):
         return delay, protocol.encode_reply(self.id, alarm | status, data)
 
     def _image(self) -> bytes:
-        memory = self.memory
-        return b"".join(row.encode(memory[row.name]) for row in TABLE.values())
+        image, memory = bytearray(END), self.memory
+        for row in TABLE.values():
+            image[row.address : row.address + row.size] = row.encode(memory[row.name])
+        return bytes(image)
 
     def _write(self, address: int, data: bytes, at: float) -> int:
         row, values = TABLE.at(address), self._values

@@ -49,7 +49,11 @@ async def wait_in_position(
         elif state.at - progressed > stall_time and not looks:
             if stalled is not None:
                 raise await stalled(state)
-            raise Stalled(f"node {node} stands at {here:.4g} rad, not at {goal:.4g} rad", node=node)
+            raise Stalled(
+                f"node {node} stands at {here:.4g} rad, not at {goal:.4g} rad",
+                cause="its torque is off, or something holds it",
+                node=node,
+            )
         if state.at - begun > longest:
             raise MotionError(
                 f"node {node} is not in position after {longest:.3g} s: it is at {here:.4g} rad on its way to "

@@ -348,7 +348,7 @@ class AxisDriver:
     move: Callable[..., Runnable[Any]] = unsupported
     """move(device, to, *, wait): to a position (rad)."""
     stop: Callable[[Any], Runnable[Any]] = unsupported
-    """Decelerate and hold; returns a promise (an Enum), see `Stop`."""
+    """Decelerate and hold; may return a promise (an Enum), see `Stop`."""
     move_by: Callable[..., Runnable[Any]] = unsupported
     """move_by(device, angle, *, velocity, wait): rad from the present position."""
     jog: Callable[..., Runnable[Any]] = unsupported

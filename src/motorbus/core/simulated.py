@@ -46,7 +46,8 @@ D = TypeVar("D", bound=PoweredDevice)
 class SerialLine(Generic[D]):
     """A simulated half-duplex line; see `core.family.Simulator`. A subclass defines `carry_out`.
 
-    `rate` is the bit rate of the devices; at another rate they receive nothing. `now` is the latest moment (s).
+    `rate` is the bit rate of the devices; until `tune` gives the host the same rate they receive nothing. `now` is the
+    latest moment (s).
     """
 
     def __init__(self, nodes: Mapping[int, D], rate: int, parser: FrameParser) -> None:
