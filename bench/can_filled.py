@@ -15,14 +15,13 @@ from motorbus.core.steps import gather
 from motorbus.diagnose.budget import Budget, Transfer, budget
 from motorbus.families.kst.sdo import encode_upload, encode_upload_reply
 from motorbus.families.kst.simulator import KstBus
+from motorbus.families.kst.simulator.server import TURNAROUND
 from motorbus.link.memory import MemoryLink
 from motorbus.motion.safety import Gate
 from tests.support.can_wire import CanWire
 
 LATENCY: Final = 0.001
 """s; there and back, a pure delay."""
-TURNAROUND: Final = 0.0001
-"""s in which a servo answers."""
 POSITION: Final = 0x6002
 
 
@@ -65,7 +64,7 @@ def counted(nodes: range, bitrate: int) -> Budget:
 
 def measured(nodes: range, bitrate: int, reads: int) -> Filled:
     """Every node is read as fast as it answers, by one blocking bus. Raises WrongValue."""
-    simulator = kst.FAMILY.simulator(tuple(nodes), "", turnaround=TURNAROUND, bit_rate=bitrate)
+    simulator = kst.FAMILY.simulator(tuple(nodes), "", bit_rate=bitrate)
     assert isinstance(simulator, KstBus)
     for servo in simulator.servos:
         servo.raw_position = raw(servo.node)
