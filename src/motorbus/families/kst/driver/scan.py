@@ -72,7 +72,7 @@ async def scan(
     At another rate than the present one the adapter listens first; a rate at which errors show that the bus is in use
     is `Skipped`, and nothing follows a first broadcast that is broken. Reports `Found`, `Progress` and `Suspicion`.
     """
-    asked = checked_ids(ids or sdo.NODES)
+    nodes = checked_ids(ids or sdo.NODES)
     present = await SetBitrate(0)
 
     async def scan_each() -> list[Found]:
@@ -81,11 +81,11 @@ async def scan(
             for rate in rates:
                 other = rate != present
                 if await _use(settings, rate, listens=other):
-                    found += await _scan_at(settings, asked, rate, broadcast=other or not ids, careful=other)
+                    found += await _scan_at(settings, nodes, rate, broadcast=other or not ids, careful=other)
         return found
 
     if not rates:
-        return await _scan_at(settings, asked, present, broadcast=not ids)
+        return await _scan_at(settings, nodes, present, broadcast=not ids)
     return await Exclusive(scan_each())
 
 
@@ -181,7 +181,7 @@ async def _use(settings: BusSettings, rate: int, *, listens: bool) -> bool:
 
 
 async def _scan_at(
-    settings: BusSettings, asked: Sequence[int], rate: int, *, broadcast: bool, careful: bool = False
+    settings: BusSettings, ids: Sequence[int], rate: int, *, broadcast: bool, careful: bool = False
 ) -> list[Found]:
     """The servos that answer at the present rate. With `careful` nothing follows a first frame that is broken."""
     state = settings.state or BusState()
@@ -189,7 +189,7 @@ async def _scan_at(
     there: list[int] = []
     if broadcast:
         answer = await broadcast_ids(settings)
-        counts = Counter(reply.lane for reply in answer.replies if reply.lane in asked)
+        counts = Counter(reply.lane for reply in answer.replies if reply.lane in ids)
         there = list(counts)
         for node, count in counts.items():
             await Emit(Found(node, rate, None))
@@ -199,12 +199,12 @@ async def _scan_at(
             await Emit(Suspicion(0, rate, WRONG_RATE))
             return []
     for number in range(PASSES):
-        done = number * len(asked)
-        for batch in _batches([node for node in asked if node not in there]):
+        done = number * len(ids)
+        for batch in _batches([node for node in ids if node not in there]):
             answers = await gather(*[_answers(Node(node, settings), rate) for node in batch])
             there += [node for node, answered in zip(batch, answers, strict=True) if answered]
             done += len(batch)
-            await Emit(Progress(done, PASSES * len(asked), f"ids up to {batch[-1]} at {rate} bit/s"))
+            await Emit(Progress(done, PASSES * len(ids), f"ids up to {batch[-1]} at {rate} bit/s"))
     if state.errors > errors:
         await Emit(Suspicion(0, rate, f"{state.errors - errors} bus errors during the scan: {ERRORS}"))
     if not there and not careful:

@@ -65,7 +65,7 @@ class KstBus:
         self._events: list[Event] = []
         self._order = count()
         self._begun = not quirks.reports_ms
-        self._due_was_asked = False
+        self._time_requested = False
         for node in ids:
             self._add(node, profile)
         for node in duplicates:
@@ -159,7 +159,7 @@ class KstBus:
 
         Until then `due` asks once for that time, by a time before all clocks.
         """
-        self._due_was_asked = True
+        self._time_requested = True
         if not self._begun and at >= 0:
             self._begun = True
             for servo in self.servos:
@@ -168,7 +168,7 @@ class KstBus:
     def due(self) -> float | None:
         """Time (s) of the next frame, or None."""
         if not self._begun:
-            return None if self._due_was_asked else -1.0
+            return None if self._time_requested else -1.0
         while self._events and self._events[0].is_void:
             heappop(self._events)
         return self._events[0].when if self._events else None
