@@ -115,7 +115,7 @@ class KstDriver:
         return upload(servo, row, decode)
 
     def stop(self, nodes: Mapping[int, Response | None]) -> Stop:
-        """Target := position for each node whose position is known; the others are asked for it."""
+        """Target := position for each node whose position is known; the others are read first."""
         requests: list[Request[Response]] = []
         for node in (Node(number, self.settings) for number in sorted(nodes)):
             row, answer = node.table["present_position"], nodes[node.node]

@@ -46,7 +46,7 @@ class PowerCycleNeeded(NamedTuple):
 
 
 class Provisioned(NamedTuple):
-    """A servo that has this id and rate (bit/s) after its restart; `resumed`: it had them when it was asked."""
+    """A servo that has this id and rate (bit/s) after its restart; `resumed`: it had them before the call."""
 
     node: int
     rate: int
