@@ -111,6 +111,7 @@ GOAL = sdo.encode_download(37, 0x6003, 0, (180).to_bytes(2, "little"))
 SIZED = sdo.encode_download(37, 0x6003, 0, b"\x84\x03", sized=True)
 UNKNOWN = sdo.encode_upload(37, 0x1018, 4)
 RESERVED_BIT = CanFrame(0x625, bytes.fromhex("4202600000000000"))
+EMERGENCY = CanFrame(0x0A5, bytes.fromhex("1031050000000000"))
 RESERVED_DATA = CanFrame(0x625, bytes.fromhex("4000300025000000"))
 UNSIZED_VALUE = CanFrame(0x5A5, bytes.fromhex("4202600084030000"))
 TURNED = "32° (raw 320, 10 per degree)"
@@ -125,6 +126,8 @@ TURNED = "32° (raw 320, 10 per degree)"
         (POSITION, "kst", "identifier", "0x5A5, 11 bits"),
         (GOAL._replace(extended=True), "kst", "identifier", "0x00000625, 29 bits"),
         (GOAL, "kst", "goal_position", "18° (raw 180, 10 per degree)"),
+        (EMERGENCY, "kst", "error code", "0x3110, voltage"),
+        (EMERGENCY, "kst", "error register", "0x05: generic, voltage"),
         (GOAL, "xqpower", "goal_position", "10° (raw 180, 18 per degree)"),
         (STATUS, "xqpower", "current", "0.3 A (0.001 A per count)"),
         (STATUS, "xqpower", "temperature", "-10 °C"),

@@ -33,6 +33,31 @@ BUS_ERRORS: Final = (
 SHAPES: Final = {"report": ": a position (2) and two zeros", "heartbeat": ": 0, 4, 5 or 127"}
 NMT: Final = {0x80: "be pre-operational", 0x81: "restart", 0x82: "restart communication"}
 """Commands of network management (CiA 301) besides start and stop."""
+EMERGENCIES: Final = {
+    0x0: "no error",
+    0x1: "generic error",
+    0x2: "current",
+    0x3: "voltage",
+    0x4: "temperature",
+    0x5: "device hardware",
+    0x6: "device software",
+    0x7: "additional modules",
+    0x8: "monitoring",
+    0x9: "external error",
+    0xF: "specific to the device",
+}
+"""Upper four bits of the code of an emergency (CiA 301)."""
+ERROR_REGISTER: Final = (
+    "generic",
+    "current",
+    "voltage",
+    "temperature",
+    "communication",
+    "profile",
+    "reserved",
+    "vendor",
+)
+"""Bits of object 0x1001 (CiA 301)."""
 
 
 def decode(data: bytes, profile: Profile = PROFILES["kst"]) -> list[Explanation]:
@@ -256,9 +281,11 @@ class _Frame:
                 what = notifications.STATES[data[0] & 0x7F] + guard
                 self.fields.take_rest("state", what)
             case _:
-                what = f"error code 0x{int.from_bytes(data[:2], 'little'):04X}"
-                self.fields.take(2, "error code", f"{what} (CiA 301)")
-                self.fields.take(1, "error register", f"0x{data[2]:02X} (CiA 301, object 1001h)")
+                code = int.from_bytes(data[:2], "little")
+                what = f"0x{code:04X}, {EMERGENCIES.get(code >> 12, 'not known')}"
+                bits = [name for bit, name in enumerate(ERROR_REGISTER) if data[2] >> bit & 1]
+                self.fields.take(2, "error code", what)
+                self.fields.take(1, "error register", f"0x{data[2]:02X}: {', '.join(bits) or 'no error'}")
                 self.fields.take_rest("vendor", "defined by the maker")
         return what
 
