@@ -91,7 +91,7 @@ def test_options_have_help_source_and_a_default_that_text_can_give() -> None:
         ({"x1": "256"}, "a whole number, 0 to 255"),
         ({"position": "40000"}, "-32768 to 32767"),
         ({"profile": "futaba"}, "kst, kst-ext, kingmax, xqpower"),
-        ({"firmware": "1.ü"}, "one or more ASCII"),
+        ({"firmware": "1.ü"}, "one or more printable ASCII"),
         ({"duplicate": "twice"}, "0x25+0x26"),
         ({"duplicate": "0x80"}, "1 to 127"),
         ({"reports_ms": "0.01"}, "0, or 0.1"),

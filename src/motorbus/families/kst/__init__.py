@@ -62,28 +62,28 @@ __all__ = [
 ]
 
 _SETTINGS: Final = (
-    Option("profile", str, "kst", f"the make of the servos: {', '.join(PROFILES)}; no servo reports it"),
+    Option("profile", str, "kst", "the make of the servos; no servo reports it", tuple(PROFILES)),
     Option("id_format", str, "std", "identifiers of 11 bits (std) or 29 (ext)", ID_FORMATS),
     Option("sized", str, "no", "whether writes state their length", SIZED),
     Option("nmt", str, "profile", "form of start and stop: profile, none, vendor or standard", NMT),
 )
 
 GUARANTEES: Final = Guarantees(
-    measured=Guarantee(Level.YES, "it tells it when it is asked"),
+    measured=Guarantee(Level.YES, "the servo reports its position on request"),
     limits=Guarantee(
-        Level.PARTLY, "the range of its make, as the bus is configured: no servo tells its make"
+        Level.PARTLY, "the range of the profile that the bus was opened with; no servo reports its make"
     ),
     stop=Guarantee(Level.PARTLY, Promise.HOLD_REQUESTED.value),
     estops={"hold": Guarantee(Level.PARTLY, Promise.HOLD_REQUESTED.value)},
     alone=Guarantee(
         Level.PARTLY,
-        "in a loop, it moves to its last goal, one cycle ahead, and holds; in a move of its own, it moves to its goal",
+        "during a loop, it moves to its last goal, one cycle ahead, and holds; during a single move, to its goal",
     ),
     ends=Guarantee(Level.YES, "every goal is a position"),
     torque=Guarantee(Level.NO, "none: it holds with full force while it has its supply"),
     restart=Guarantee(
         Level.PARTLY,
-        "a boot-up message of CANopen is a fault; no sheet promises that message, and a lost frame is not seen",
+        "a boot-up message of CANopen is reported as a fault; no sheet promises that message, and a frame may be lost",
     ),
     strain=Guarantee(
         Level.PARTLY,
@@ -92,7 +92,7 @@ GUARANTEES: Final = Guarantees(
     watchdog=Guarantee(Level.NO, "none: it moves to its last goal and holds"),
     led=True,
 )
-"""Source: the CAN protocol sheets of the makers: a target position, and no stop, torque switch or heartbeat."""
+"""Source: the CAN protocol sheets of the makers: they have a target position, no stop, torque switch or heartbeat."""
 
 
 def _simulator(ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:

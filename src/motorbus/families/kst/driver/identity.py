@@ -3,9 +3,9 @@
 No servo reports its maker or model, so its model is the profile of the bus. A node id or bit rate written here takes
 effect after a save and a restart: `provision` does all of it. Source: KST CAN protocol manual, commands 1, 2, 4 and 8.
 
-Two servos with one id send two replies, or at the same time equal ones, which merge, or unequal ones, which break each
-other. So several objects that seldom agree are read repeatedly, and bus errors meanwhile count as a second servo. Most
-slcan adapters report no bus errors: there, an id that always comes with a position that never comes counts as two.
+Two servos with one id send two replies. If they send at the same time, equal replies merge into one and unequal replies
+destroy each other. So several objects that seldom agree are read repeatedly, and bus errors meanwhile count as a second
+servo. Most slcan adapters report no bus errors: there, an id whose position never arrives counts as two.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ async def identify(node: Node) -> Identity:
 
 
 async def version(node: Node) -> str:
-    """The firmware version as text, from 0x100A or 0x100B; as hex where it is no text. Raises DeviceError without."""
+    """The firmware version (hex where it is no text), from 0x100A or 0x100B. Raises DeviceError without both."""
     *rows, last = node.profile.version_rows
     for row in rows:
         try:
@@ -80,10 +80,10 @@ def node_id(node: Node) -> Request[int]:
 
 
 async def set_node_id(node: Node, new: int) -> None:
-    """Give it another id, 1 to 127: it takes effect after save() and a restart, and is lost at one without a save.
+    """Give it another id, 1 to 127. It takes effect after save() and a restart; without a save, a restart discards it.
 
     Raises RequestError (nothing is written) for an impossible id, two servos with this id, or an id in use; NoReply;
-    VerificationFailed when it reads back neither. To swap two ids, give one of them a third one first.
+    VerificationFailed when it reads back neither the old nor the new id. To swap two ids, use a third one.
     """
     checked_id(new)
     if not await Exclusive(answers_alone(node)):
@@ -129,7 +129,10 @@ async def bit_rate(node: Node) -> int | None:
 
 
 def set_bit_rate(node: Node, rate: int) -> Request[None]:
-    """Give it another bit rate (bit/s) of `RATES`: it takes effect after save() and a restart, and is lost without."""
+    """Give it another bit rate (bit/s). It takes effect after save() and a restart; without a save it is discarded.
+
+    Raises RequestError for a rate that no servo has.
+    """
     row = node.table["bit_rate_code"]
     return write_register(node, row, bit_rate_code(rate), priority=Priority.CONFIGURATION)
 
@@ -151,7 +154,7 @@ def look(node: Node, name: str = "node_id") -> Request[Look]:
     row = node.table[name]
 
     def decode(answer: Response) -> Look:
-        replies = [reply for reply in decoded(answer) if reply.index in (row.address, 0)]
+        replies = [reply for reply in decoded(answer) if reply.index in (row.address, 0)]  # 0: some aborts
         ids = [reply.data[0] for reply in replies if reply.kind == "upload" and name == "node_id"]
         return Look(node.node, len(replies), ids[0] if ids else None, answer.at)
 
@@ -173,9 +176,9 @@ async def survey(node: Node) -> tuple[bool, str]:
     if most > 1:
         second = f"{most} answers to one request"
     elif most and error is not None:
-        second = "bus errors whenever it is read"
+        second = "bus errors while it was read"
     elif all(counts["node_id"]) and not any(counts["present_position"]):
-        second = "its id comes every time, its position never"
+        second = "every read of its id is answered, no read of its position"
     return most > 0, second
 
 

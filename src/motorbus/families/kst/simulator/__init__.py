@@ -22,18 +22,18 @@ from motorbus.families.kst.simulator.servo import Servo
 __all__ = ["OPTIONS", "KstBus", "Quirks", "Servo", "simulate"]
 
 OPTIONS = (
-    Option("profile", str, "kst", "which relative of the protocol they speak", tuple(PROFILES)),
+    Option("profile", str, "kst", "the make, that is, the variant of the protocol", tuple(PROFILES)),
     *quirk_options(Quirks),
 )
 """Options of a simulated bus, beside its ids."""
-SHORTEST_REPORT = 0.1  # ms between reports; a bus of 1 Mbit/s has no room for more
+SHORTEST_INTERVAL = 0.1  # ms; a bus of 1 Mbit/s has no room for more frequent reports
 
 
 def simulate(ids: Iterable[int], model: str = "", /, **options: object) -> KstBus:
     """A simulated bus with these ids, at rest; a repeated id is two servos.
 
-    `model` is a profile ("": the option `profile`, by default kst); the other options are the fields of `Quirks`,
-    also as text. Raises RequestError for an unknown profile or option, an invalid value, or no ids.
+    `model` is a profile ("": the option `profile`, by default kst). The other options are the fields of `Quirks`; their
+    values may be text. Raises RequestError for an unknown profile or option, an invalid value, or no ids.
     """
     named = str(options.pop("profile", "") or "")
     if model and named and model != named:
@@ -45,9 +45,9 @@ def simulate(ids: Iterable[int], model: str = "", /, **options: object) -> KstBu
         )
     quirks = switched(Quirks, "kst", options)
     if not (quirks.firmware.isascii() and quirks.firmware.isprintable() and quirks.firmware):
-        raise _impossible("firmware", quirks.firmware, "one or more ASCII characters")
-    if 0 < quirks.reports_ms < SHORTEST_REPORT:
-        raise _impossible("reports_ms", quirks.reports_ms, f"0, or {SHORTEST_REPORT:g} and more")
+        raise _impossible("firmware", quirks.firmware, "one or more printable ASCII characters")
+    if 0 < quirks.reports_ms < SHORTEST_INTERVAL:
+        raise _impossible("reports_ms", quirks.reports_ms, f"0, or {SHORTEST_INTERVAL:g} and more")
     try:
         duplicates = [units.whole(word) for word in quirks.duplicate.split("+") if word]
     except ValueError:

@@ -34,9 +34,12 @@ RETRY_BITS: Final = 100
 
 
 class Event(NamedTuple):
-    """A frame (None: a report that is made then) that a servo starts to send at `when`; without a servo an error.
+    """A frame that starts at `when` (s).
 
-    It is void when the servo has restarted, a report also when reports were started or stopped.
+    `frame`  None: a report, made when it is sent
+    `servo`  None: an error frame of the adapter
+    `life`   counter of the servo when the event was made: its restarts for a frame, the starts and stops of its
+             reports for a report. If it has changed, the event is void
     """
 
     when: float
@@ -52,7 +55,7 @@ class Event(NamedTuple):
 
 
 class KstBus:
-    """A `core.family.Simulator` of KST CAN servos: `servos` by unit number; `now` is the latest time (s)."""
+    """A `core.family.Simulator` of KST CAN servos: `servos` in order of their units; `now` is the latest time (s)."""
 
     def __init__(
         self, ids: Iterable[int], profile: Profile, quirks: Quirks, duplicates: Iterable[int] = ()
@@ -121,17 +124,17 @@ class KstBus:
         return [
             servo
             for servo in self.servos
-            if node in (sdo.BROADCAST, servo.node) and self._receives(servo) and self._takes(servo, frame)
+            if node in (sdo.BROADCAST, servo.node) and self._receives(servo) and self._takes(frame)
         ]
 
     def _receives(self, servo: Servo) -> bool:
         return servo.plugged and self.rate in (None, servo.bit_rate)
 
-    def _takes(self, servo: Servo, frame: CanFrame) -> bool:
+    def _takes(self, frame: CanFrame) -> bool:
         return self.quirks.id_format in ("asked", "ext" if frame.extended else "std")
 
     def _disturb(self) -> None:
-        """A frame of the host is broken for a servo at another rate, which breaks it for all."""
+        """Servos at another rate answer a frame of the host with error flags; the adapter repeats it."""
         others = [servo for servo in self.servos if servo.plugged and not self._receives(servo)]
         active = any(servo.errors < PASSIVE for servo in others)
         for servo in others:
@@ -143,7 +146,7 @@ class KstBus:
         """The receivers of a frame; none for a frame that no host sends."""
         if not isinstance(data, CanFrame) or (node := notifications.addressee(data)) is None:
             return Audience.NONE
-        taking = [servo.node for servo in self.servos if self._takes(servo, data)]
+        taking = [servo.node for servo in self.servos if self._takes(data)]
         if node == sdo.BROADCAST and taking:
             return Audience.EVERYONE
         return Audience.OURS if node in taking else Audience.NONE
@@ -155,9 +158,9 @@ class KstBus:
         heappush(self._events, Event(when, next(self._order), servo, frame, current))
 
     def _begin(self, at: float) -> None:
-        """Start the reports that run from power-up on, at the first time of a clock that may start anywhere.
+        """Start the reports that run from power-up on. The clock may start at any time, so that is the first one seen.
 
-        Until then `due` asks once for that time, by a time before all clocks.
+        `due` returns -1 once before that, so that the caller passes its time.
         """
         self._time_requested = True
         if not self._begun and at >= 0:
