@@ -11,7 +11,8 @@ from math import degrees
 from pathlib import Path
 from typing import Final
 
-from motorbus.core.register import Register
+from motorbus.core.register import Register, Storage
+from motorbus.core.request import Effect
 from motorbus.families.kst.profiles import BIT_RATES, PROFILES
 from motorbus.families.kst.sdo import ABORTS
 from motorbus.families.kst.simulator import OPTIONS
@@ -127,8 +128,9 @@ def _profiles() -> Iterator[str]:
 
 def _objects() -> Iterator[str]:
     yield "## Objects\n"
-    yield "Each object has an index:sub-index and a name. A row without a profile holds for all profiles. The facts are"
-    yield "size, access (r: read, w: write), storage, raw values and the effect of a write. Each row has the test"
+    yield "An object has an index:sub-index and a name. A row without a profile holds for all profiles. Numbers are raw"
+    yield "values. The effect of a write is motion, persistent (kept in EEPROM) or identity (node id, bit rate). The"
+    yield "test of each row is"
     yield f"`{MANUAL_TESTS}::test_object_has_the_size_and_access_of_its_row`.\n"
     found: dict[tuple[str, str], list[str]] = {}
     for profile in PROFILES.values():
@@ -146,15 +148,15 @@ def _facts(row: Register) -> str:
     full = (row.low, row.high) == (0, 256**row.size - 1)
     facts = [
         "1 byte" if row.size == 1 else f"{row.size} bytes",
-        row.access.value,
-        row.storage.value,
+        row.access.name.lower().replace("_", " and "),
+        "set by the maker" if row.storage is Storage.FACTORY else row.storage.value,
         "any value" if full else f"{row.low} to {row.high}",
     ]
     if row.unit:
         facts.append(
             f"1 = {degrees(row.scale):.4g}°" if row.unit == "rad" else f"1 = {row.scale:.4g} {row.unit}"
         )
-    if row.writable:
+    if row.effect is not Effect.NONE:
         facts.append(f"effect: {row.effect.name.lower()}")
     note = [f"{row.note[0].upper()}{row.note[1:]}."] if row.note else []
     return "<br>".join([f"{', '.join(facts)}.", *note, *_sources(row.source, row.conflict)])
@@ -202,7 +204,8 @@ def _assumptions() -> Iterator[str]:
         if one.source:
             default = one.default if one.kind is not bool else "yes" if one.default else "no"
             name = f"{one.name}<br>default {default}" if default != "" else one.name
-            rows.append((name, f"{one.help}.<br>Source: {one.source}."))
+            values = f"<br>Values: {', '.join(map(str, one.choices))}." if one.choices else ""
+            rows.append((name, f"{one.help}.{values}<br>Source: {one.source}."))
     yield from listed(("option", "meaning"), rows)
 
 
