@@ -36,7 +36,7 @@ A request has the CAN id 0x600 + node, its reply 0x580 + node. Both have 8 data 
 """
 
 START: Final = {
-    "none": "It needs no start.",
+    "none": "Moves without a start command.",
     "vendor": "Reports start by CAN id = node, data `01 00`.",
     "standard": "Reports and motion start by NMT of CiA 301: CAN id 0, data `01` and the node.",
 }
@@ -181,7 +181,7 @@ def _commands() -> Iterator[str]:
 
 def _aborts() -> Iterator[str]:
     yield "## Abort codes\n"
-    yield "A servo refuses a request with one of these codes. `motorbus frame` decodes each:"
+    yield "A servo refuses a request with one of these codes. `motorbus decode` explains each:"
     yield f"`{DECODE_TESTS}::test_abort_code_is_decoded_in_both_byte_orders`. The simulator sends 13 of them:"
     yield f"`{MANUAL_TESTS}::test_servo_sends_abort_codes_of_the_list`.\n"
     yield from listed(("code", "meaning"), [[f"0x{code:08X}", text] for code, text in ABORTS.items()])
