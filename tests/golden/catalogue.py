@@ -353,7 +353,7 @@ KST: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("set_reversed", True), "", ()),
 ]
 KST_GROUP: list[tuple[Call, str]] = [
-    (shared("scan", (1, 2, 3), (), SETTINGS), "ids"),
+    (shared("scan", SETTINGS, (1, 2, 3)), "ids"),
     (shared("scan_bit_rates", SETTINGS, rates=(500_000, 250_000)), "listen"),
     (shared("scan_bit_rates", SETTINGS, rates=(250_000, 500_000), isolated=True), "isolated"),
     (shared("broadcast_read", "node_id", SETTINGS), ""),
@@ -390,7 +390,7 @@ def _kst() -> list[Case]:
                     keep="requests" if reports else "all",
                 )
             )
-    cases.append(Case("kst", "kst", shared("scan", (), (), SETTINGS), "all", ids=(1, 2), lanes=True))
+    cases.append(Case("kst", "kst", shared("scan", SETTINGS), "all", ids=(1, 2), lanes=True))
     for one in (call("move", 0.2, wait=False), call("save"), call("set_node_id", 9)):
         for form, value in (("sized_only", "accept_unsized"), ("unsized_only", "accept_sized")):
             cases.append(Case("kst", "kst", one, form, options={"profile": "kst", value: False}))

@@ -9,7 +9,7 @@ import pytest
 
 from motorbus.errors import LimitExceeded
 from motorbus.families.feetech import sync_write_positions
-from motorbus.families.kst import broadcast_position
+from motorbus.families.kst import BusSettings, broadcast_position
 from motorbus.session.robot import Robot
 from tests.support.machines import machine
 
@@ -25,7 +25,7 @@ FAR_AND_BARE = "comes without a velocity, so its device would go there as fast a
         lambda robot: robot["a1"].device.reg_write(goal_position=pi + 0.7),
         lambda robot: robot["c1"].device.move(0.7, wait=False),
         lambda robot: robot["c1"].device.write(goal_position=-0.7),
-        lambda robot: robot.buses["can"].run(broadcast_position(0.7, [0x26])),
+        lambda robot: robot.buses["can"].run(broadcast_position(0.7, [0x26], BusSettings())),
     ],
     ids=["write", "sync_write", "reg_write", "kst move", "kst write", "broadcast"],
 )

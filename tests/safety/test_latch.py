@@ -77,7 +77,9 @@ FACES: dict[str, Callable[[Robot], object]] = {
         robot, "arm", feetech.reg_write_all({_known(robot): {"goal_position": 3.1}})
     ),
     "action all": lambda robot: _on(robot, "arm", feetech.action_all([robot["a1"].device])),
-    "broadcast": lambda robot: _on(robot, "can", kst.broadcast_position(0.1, [robot["c1"].device])),
+    "broadcast": lambda robot: _on(
+        robot, "can", kst.broadcast_position(0.1, [robot["c1"].device], kst.BusSettings())
+    ),
     "start project": lambda robot: robot["lift"].device.start_project(1),
     "stepper jog": lambda robot: robot["lift"].device.jog_forward(0.2),
     "raw": lambda robot: raw(robot.buses["arm"], 1),

@@ -17,7 +17,6 @@ class _Methods(driver.Node):
     identify = device_method(driver.identify)
     read = device_method(driver.read)
     write = device_method(driver.write)
-    set_node_id = device_method(driver.set_node_id)
     position = device_method(driver.position)
     telemetry = device_method(driver.telemetry)
     move = device_method(driver.move)

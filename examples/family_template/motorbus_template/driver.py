@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from enum import Enum
 from functools import partial
 from typing import Any, Final, TypeVar
 
@@ -11,13 +12,14 @@ from motorbus.core.access import readable_rows, writable_values
 from motorbus.core.arrival import wait_in_position
 from motorbus.core.family import AxisDriver, Explanation, Health, Identity, Receiver, State, Stop
 from motorbus.core.half_duplex import HalfDuplexSerial
+from motorbus.core.interrupted import Moving, stopped_if_interrupted
 from motorbus.core.register import Register, Storage, Value
 from motorbus.core.request import Effect, Expected, Precondition, Priority, Request, Response, TimeoutClass
 from motorbus.core.setpoint import Setpoint
 from motorbus.core.steps import Exclusive, Guard, catch
 from motorbus.core.stream import PositionStream, read_positions
 from motorbus.core.verify import write_verified
-from motorbus.errors import DeviceError, LimitExceeded, NoReply, RequestError
+from motorbus.errors import DeviceError, LimitExceeded, NoReply, RequestError, UnexpectedReply
 
 from . import protocol
 from .protocol import Command
@@ -30,10 +32,17 @@ PRESENT: Final = TABLE["present_position"]
 TORQUE: Final = TABLE["torque_enable"]
 
 
+class Promise(Enum):
+    """What an acknowledged stop means."""
+
+    HOLD_ACCEPTED = "each servo that acknowledged brakes and then holds; its torque stays as it was"
+
+
 class Node:
     """One servo by its id, 1 to 63, and what the driver knows of it.
 
     `limits` (rad) as last read; None: not read yet. `alarm` and `at` (s, link clock) are those of its last reply.
+    `last_move` identifies its latest move.
     """
 
     def __init__(self, node: int) -> None:
@@ -43,6 +52,7 @@ class Node:
         self.limits: tuple[float, float] | None = None
         self.alarm: tuple[str, ...] = ()
         self.at = -math.inf
+        self.last_move: object = None
 
 
 # -- requests ------------------------------------------------------------------------------------------------
@@ -68,6 +78,8 @@ def request(
         reply = response.replies[0].data
         status = reply[4]
         node.alarm, node.at = protocol.alarms(status), response.at
+        if len(reply) != expected.length and not status & 15:
+            raise UnexpectedReply(f"node {node.node} replied to {command.name} without data", node=node.node)
         if status & 15:
             raise DeviceError(
                 f"node {node.node} refused {command.name}: {protocol.status_text(status)}",
@@ -111,7 +123,7 @@ def health(node: Node) -> Request[Health]:
 
     def positions(response: Response) -> dict[int, float]:
         reply = response.replies[0].data
-        return {} if reply[4] & 15 else {node.node: to_position(reply[5:])}
+        return {} if len(reply) < protocol.OVERHEAD + 7 else {node.node: to_position(reply[5:])}
 
     block = bytes((PRESENT.address, 7))
     return request(node, Command.READ, block, size=7, decode=decode, reports_position=positions)
@@ -132,9 +144,15 @@ def position(node: Node) -> Request[float]:
     return health(node).convert(lambda health: health.state.position or 0.0)
 
 
-def stop(node: Node) -> Request[None]:
+def stop(node: Node) -> Request[Promise]:
     """Brake and hold; torque stays as it is."""
-    return request(node, Command.STOP, decode=_no_value, priority=Priority.STOP, effect=Effect.MOTION)
+    return request(
+        node,
+        Command.STOP,
+        decode=lambda data: Promise.HOLD_ACCEPTED,
+        priority=Priority.STOP,
+        effect=Effect.MOTION,
+    )
 
 
 def disable_torque(node: Node) -> Request[None]:
@@ -188,7 +206,7 @@ async def write(node: Node, /, **values: Value) -> None:
     """
     if values.get("torque_enable"):
         raise RequestError("torque_enable is not written by name: use enable_torque()", node=node.node)
-    methods = {"node_id": "set_node_id()", "lock": "write(), which opens and closes it"}
+    methods = {"node_id": "the tool of the maker", "lock": "write(), which opens and closes it"}
     raws = writable_values(TABLE, values, Register.to_raw, node=node.node, methods=methods)
     await Exclusive(_write_settings(node, [(row, raw) for row, raw in raws if row.storage is Storage.EEPROM]))
     for row, raw in raws:
@@ -196,12 +214,6 @@ async def write(node: Node, /, **values: Value) -> None:
             await write_row(node, row, raw, await setpoint(node, raw))
         elif row.storage is Storage.RAM:
             await write_row(node, row, raw)
-
-
-async def set_node_id(node: Node, new: int) -> None:
-    """Give the servo another id, 1 to 63, from its next power-up on."""
-    TABLE["node_id"].encode(new)
-    await Exclusive(_write_settings(node, [(TABLE["node_id"], new)]))
 
 
 class Unlocked(Guard):
@@ -265,15 +277,17 @@ async def enable_torque(node: Node) -> None:
 async def move(node: Node, to: float, *, wait: bool = True) -> None:
     """Move to `to` rad and return in position, at once with `wait=False`.
 
-    Raises LimitExceeded for a goal outside the limits, Stalled when the servo stops elsewhere.
+    An interrupted wait stops the servo. Raises LimitExceeded for a goal outside the limits, Stalled when it stops
+    elsewhere.
     """
     raw = to_goal(node, to)
     await write_row(node, GOAL, raw, await setpoint(node, raw))
 
     if wait:
-        await wait_in_position(
+        arrival = wait_in_position(
             lambda: telemetry(node), to, node=node.node, tolerance=0.01, timeout=lambda way: 5.0 + 2.0 * way
         )
+        await stopped_if_interrupted(arrival, Moving(node, partial(stop, node), partial(position, node)))
 
 
 async def open_stream(nodes: Sequence[Node], *, rate: int) -> PositionStream[Node]:
@@ -322,10 +336,8 @@ class MetronomeDriver(HalfDuplexSerial):
     def stop(self, nodes: Mapping[int, Response | None]) -> Stop:
         frame = protocol.encode_request(protocol.BROADCAST, Command.STOP)
         everyone = Request[Response](frame, priority=Priority.STOP, effect=Effect.MOTION)
-        each = [stop(Node(node)).with_decoder(lambda response: response) for node in nodes]
-        return Stop(
-            (everyone, *each), "each servo that acknowledged brakes and then holds; torque stays as it was"
-        )
+        each = [stop(Node(node)) for node in nodes]
+        return Stop((everyone, *each), Promise.HOLD_ACCEPTED.value)
 
     async def identify(self, node: int) -> Identity:
         return await identify(Node(node))

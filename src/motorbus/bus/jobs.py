@@ -152,9 +152,8 @@ class Attempt:
         if self.request.expected is ANY:
             self.replies[len(self.replies)] = reply
             return True
-        size = len(reply.data)
         for index, due in enumerate(self.dues):
-            if due.key == reply.key and size in (due.length, due.refusal) and index not in self.replies:
+            if due.accepts(reply.key, len(reply.data)) and index not in self.replies:
                 self.replies[index] = reply
                 self._check_complete()
                 return True
@@ -169,8 +168,8 @@ class Attempt:
 
     def is_excluded(self, reply: Reply) -> bool:
         """An excluded node sent this reply: it came in spite of not being waited for."""
-        kind = reply.key, len(reply.data)
-        return any(due.node in self.excluded and (due.key, due.length) == kind for due in self.dues)
+        size = len(reply.data)
+        return any(due.node in self.excluded and due.accepts(reply.key, size) for due in self.dues)
 
     def take_noise(self, fault: str, data: bytes) -> None:
         """Noise before the first reply does no harm; behind a reply that reply may be shifted by a byte."""

@@ -67,7 +67,7 @@ class LastPositions(Mapping[int, Reading]):
         self.add(nodes)
         if request.effect in GATED:
             self._acknowledged.update(dict.fromkeys(nodes, answer))
-        if request.reports_position:
+        if request.reports_position and not _is_refusal(request, answer):
             self.latest.update(dict.fromkeys(nodes, (request, answer, self.orders)))
 
     def add(self, nodes: Iterable[int]) -> None:
@@ -173,6 +173,13 @@ class LastPositions(Mapping[int, Reading]):
         requests = self.driver.stop(dict.fromkeys(sorted(self.nodes))).requests
         gated = [one.expected for one in requests if one.effect in GATED and one.expected is not ANY]
         return max(1, len({due for dues in gated for due in dues if due.node == node}))
+
+
+def _is_refusal(request: Request[Any], answer: Response) -> bool:
+    """The only reply has the length of a refusal."""
+    if request.expected is ANY or len(request.expected) != 1 or not answer.replies:
+        return False
+    return len(answer.replies[0].data) == request.expected[0].refusal
 
 
 def rests(goal: Setpoint) -> bool:

@@ -24,7 +24,7 @@ async def stop_in_rounds(engine: Engine, now: Callable[[], float]) -> StopOutcom
     positions.forget_stop_replies()
     before = {node: positions.accepted_count(node) for node in positions.nodes}
     stop = positions.frames(now())
-    frames: Sequence[Request[Response]] = stop.requests
+    frames: Sequence[Request[Any]] = stop.requests
     acknowledged: list[int] = []
     rounds = 0
     while frames and rounds < ROUNDS and not engine.listening:

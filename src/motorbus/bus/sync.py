@@ -78,6 +78,8 @@ class SyncTable:
         """This reply did not come in time and may still come."""
         node = self.of(due.node)
         node.owed[lane, due.key, due.length] = None
+        if due.refusal:
+            node.owed[lane, due.key, due.refusal] = None
         node.quiet_until = quiet_until
         self.out_of_sync.add(due.node)
 
@@ -143,4 +145,5 @@ class SyncTable:
 def kind_of(probe: Request[bool]) -> Kind:
     """The kind of the only reply to a probe."""
     (due,) = probe.expected  # type: ignore[misc]  # a probe has one reply
+    assert not due.refusal, "a probe accepts no refusal"
     return probe.lane, due.key, due.length

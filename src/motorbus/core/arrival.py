@@ -25,13 +25,11 @@ async def wait_in_position(
     tolerance: float,
     timeout: Callable[[float], float],
     stalled: Callable[[State], Procedure[MotorbusError]] | None = None,
-    progress: float = PROGRESS,
-    stall_time: float = STALL_TIME,
 ) -> None:
     """Return when the device is in position: within `tolerance` rad of `goal` and not moving.
 
     A device that does not report whether it moves must be within tolerance in two samples in a row. Raises Stalled, or
-    the error that `stalled` makes, when its position has not changed by `progress` rad for `stall_time` s; MotionError
+    the error that `stalled` makes, when its position has not changed by `PROGRESS` rad for `STALL_TIME` s; MotionError
     after the time (s) that `timeout` gives for the distance (rad).
     """
     state = await sample()
@@ -44,9 +42,9 @@ async def wait_in_position(
         looks = looks + 1 if near else 0
         if near and (not state.moving if state.moving is not None else looks >= 2):
             return
-        if abs(here - mark) >= progress:
+        if abs(here - mark) >= PROGRESS:
             mark, progressed = here, state.at
-        elif state.at - progressed > stall_time and not looks:
+        elif state.at - progressed > STALL_TIME and not looks:
             if stalled is not None:
                 raise await stalled(state)
             raise Stalled(

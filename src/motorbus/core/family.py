@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Protocol
 
 from motorbus.core.guarantees import Guarantees
 from motorbus.core.recording import RecordingReceiver
-from motorbus.core.register import RegisterMap, Value
+from motorbus.core.register import RegisterMap
 from motorbus.core.request import Data, Event, Request, Response
 from motorbus.core.steps import Procedure, Runnable
 from motorbus.errors import RequestError
@@ -177,7 +177,7 @@ class PositionStream(Protocol):
 class Stop(NamedTuple):
     """Requests that stop the nodes, in order, and what their acknowledgement promises."""
 
-    requests: tuple[Request[Response], ...]
+    requests: tuple[Request[Any], ...]
     promise: str
 
 
@@ -281,38 +281,6 @@ class Simulator(Protocol):
         """Set the rate (bit/s) of the host; devices set to another rate neither receive nor are received."""
 
 
-class Device(Protocol):
-    """Methods of a blocking device. A method that a device does not support is absent.
-
-    `read(*names)` returns values by name, `write(**values)` writes them. Devices also have, where they support it:
-
-        position() telemetry() enable_torque() disable_torque() stop()    `telemetry` returns a `State`
-        move(to, *, wait=True)                  on some devices with `velocity` and `acceleration`
-        mode() set_mode(mode)                   also those of set_velocity, set_duty, set_current and step that some
-                                                model of the family supports
-        calibrate(to=None) zero()               rad, None: the middle; return a named tuple, float: angle, int: raw
-        alarms()                                the active alarms, in words
-        table                                   register map; None before it is known
-        value(row, raw) raw(row, value)         conversion with the factors of this device
-
-    Persistent rows are written in a guarded sequence. If it opens a lock, the lock is a row named `lock` with a choice
-    "closed", and is always closed again. Reads have priority POLL and effect NONE, so a dry run can identify them.
-    """
-
-    @property
-    def node(self) -> int: ...
-    @property
-    def alarm(self) -> tuple[str, ...]: ...
-    @property
-    def ping(self) -> Callable[[], bool]: ...
-    @property
-    def identify(self) -> Callable[[], Identity]: ...
-    @property
-    def read(self) -> Callable[..., dict[str, Value]]: ...
-    @property
-    def write(self) -> Callable[..., None]: ...
-
-
 class DeviceTypes(NamedTuple):
     """Device classes of a family, called with a bus and a node id."""
 
@@ -322,7 +290,7 @@ class DeviceTypes(NamedTuple):
 
 def unsupported(*args: object, **kwargs: object) -> Any:
     """The function of a capability that a device does not have."""
-    raise RequestError("the device does not support this", advice="nothing was sent")
+    raise RequestError("the device does not support this")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -348,7 +316,7 @@ class AxisDriver:
     move: Callable[..., Runnable[Any]] = unsupported
     """move(device, to, *, wait): to a position (rad)."""
     stop: Callable[[Any], Runnable[Any]] = unsupported
-    """Decelerate and hold; may return a promise (an Enum), see `Stop`."""
+    """Decelerate and hold; returns a promise, an Enum whose name begins with HOLD, see `Stop`."""
     move_by: Callable[..., Runnable[Any]] = unsupported
     """move_by(device, angle, *, velocity, wait): rad from the present position."""
     jog: Callable[..., Runnable[Any]] = unsupported

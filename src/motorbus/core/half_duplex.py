@@ -66,8 +66,8 @@ class HalfDuplexSerial:
         return self.longest_reply * BITS / rate + self.longest_gap
 
     def echo_test(self) -> Request[Any] | None:
-        """The first probe of node 1: its echo has another length than its reply."""
-        return self.probe(1, 0)
+        """A probe: its echo has another length than its reply."""
+        return self.probe(self.ids[0], 0)
 
     async def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> list[Found]:
         """Probe each id twice; see `BusDriver.scan`."""

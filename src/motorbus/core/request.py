@@ -59,6 +59,10 @@ class Expected(NamedTuple):
     length: int
     refusal: int = 0
 
+    def accepts(self, key: Key, size: int) -> bool:
+        """A reply with this key and number of bytes is this one."""
+        return key == self.key and (size == self.length or 0 < size == self.refusal)
+
 
 class Any_(Enum):  # noqa: N801 - typing.Any is taken
     """The type of `ANY`: every reply before the deadline is part of the answer."""

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, TypeVar
+from typing import Final, NamedTuple, TypeVar
 
 from motorbus.core.family import Found, Identity
-from motorbus.core.steps import Emit, Guard, Procedure, Progress, Runnable, SetBitrate, catch
-from motorbus.errors import LinkError, LinkLost, MotorbusError
+from motorbus.core.steps import Emit, Guard, Procedure, Progress, Runnable, SetBitrate
+from motorbus.errors import DeviceError, LinkError, LinkLost, NoReply, WireError
 
 T = TypeVar("T")
+
+PASSES: Final = 2
+"""A silent id is pinged twice: a device may miss the first frame after power-up."""
 
 
 class Skipped(NamedTuple):
@@ -54,19 +57,33 @@ async def scan_ids(
     rate: int,
     ping: Callable[[int], Runnable[bool]],
     identify: Callable[[int], Runnable[Identity]],
-    passes: int = 2,
 ) -> list[Found]:
     """Ping these ids one after the other and identify those that reply; a silent id is pinged in each pass.
 
-    `rate` (bit/s) is the present one. Reports `Progress`, and `Found` at once. A device that cannot be identified is
-    found without identity.
+    `rate` (bit/s) is the present one. Reports `Progress`, and `Found` at once. A device that cannot be identified, or
+    whose replies are damaged (as those of two devices with one id), is found without identity.
     """
     found: dict[int, Found] = {}
-    for number in range(passes):
+    for number in range(PASSES):
         for count, node in enumerate(ids, number * len(ids) + 1):
-            if node not in found and await catch(ping(node)) is True:
-                identity = await catch(identify(node))
-                found[node] = Found(node, rate, None if isinstance(identity, MotorbusError) else identity)
+            if node not in found and await _answers(ping(node)):
+                found[node] = Found(node, rate, await _identity(identify(node)))
                 await Emit(found[node])
-            await Emit(Progress(count, passes * len(ids), f"{rate} bit/s"))
+            await Emit(Progress(count, PASSES * len(ids), f"{rate} bit/s"))
     return [found[node] for node in ids if node in found]
+
+
+async def _answers(ping: Runnable[bool]) -> bool:
+    try:
+        return await ping
+    except NoReply:
+        return False
+    except WireError:
+        return True
+
+
+async def _identity(identify: Runnable[Identity]) -> Identity | None:
+    try:
+        return await identify
+    except (DeviceError, NoReply, WireError):
+        return None

@@ -21,19 +21,18 @@ async def write_verified(
     node: int,
     what: str,
     differs: Callable[[T], MotorbusError] | None = None,
-    tries: int = TRIES,
 ) -> None:
     """Write, read back, and repeat both while the value differs.
 
     Raises VerificationFailed, or the error that `differs` makes of the last value; OutcomeUnknown when the value cannot
     be read back.
     """
-    for attempt in range(tries):
+    for attempt in range(TRIES):
         await write()
         try:
             await check(read, expected, node=node, what=what, differs=differs)
         except VerificationFailed:
-            if attempt == tries - 1:
+            if attempt == TRIES - 1:
                 raise
         else:
             return

@@ -27,10 +27,12 @@ def names() -> list[str]:
 def load(name: str) -> Family:
     """The family of this name. Raises RequestError when there is none."""
     if name in _inside():
-        return _family(import_module(f"{__name__}.{name}").FAMILY)
+        built_in: Family = import_module(f"{__name__}.{name}").FAMILY
+        return built_in
     for point in _outside():
         if point.name == name:
-            return _family(point.load())
+            installed: Family = point.load()
+            return installed
     raise RequestError(
         f"there is no family {name!r}",
         expected=f"one of {', '.join(names())}",
@@ -46,7 +48,3 @@ def _outside() -> list[EntryPoint]:
     from importlib.metadata import entry_points  # 20 ms that a built-in family need not pay
 
     return list(entry_points(group=GROUP))
-
-
-def _family(found: Family) -> Family:
-    return found

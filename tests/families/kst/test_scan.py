@@ -19,7 +19,7 @@ ALL = "600#4000300000000000"
 
 def run_scan(bench: Bench, ids: Sequence[int] = (), rates: Sequence[int] = ()) -> list[tuple[int, int]]:
     """The nodes that the scan finds, with their rates."""
-    return [(one.node, one.rate) for one in bench.bus.run(scan(ids, rates, bench.settings))]
+    return [(one.node, one.rate) for one in bench.bus.run(scan(bench.settings, ids, rates))]
 
 
 def test_scan_sends_one_broadcast_and_reads_silent_ids_twice() -> None:

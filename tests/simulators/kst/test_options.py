@@ -42,6 +42,7 @@ CASES: list[tuple[str, object, dict[str, Any], Script, list[str]]] = [
     ("reports_ms", "5", {}, [0.0101], [REPORT] * 2),
     ("boot_notice", "yes", {}, [RESTART], ["725#00"]),
     ("position", "256", {}, [READ_POSITION], ["5A5#4B02600000010000"]),
+    ("speed", "100", {}, [MOVE, 0.26, READ_POSITION], [MOVED, "5A5#4B02600084030000"]),
 ]
 """Option, value, further options, steps (requests, s to wait, restart), the frames of the servos."""
 

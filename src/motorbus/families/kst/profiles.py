@@ -56,44 +56,43 @@ _version = partial(
 _MANUAL_ROWS = (
     _version(
         name="firmware_version", address=0x100A, source=f"{MANUAL}, command 8",
-        conflict="the manual: four letters; CiA 301: text of any length, sent in segments. Chosen: four letters",
-        note="the first letter in the lowest byte; newer firmware may do as CiA 301; some has its version in 0x100B",
+        conflict="manual: four letters; CiA 301: text of any length, sent in segments. Chosen: four letters",
+        note="first letter in the lowest byte; newer firmware may follow CiA 301 or have its version in 0x100B",
     ),
     _kept(
         name="store", address=0x1010, subindex=1, size=4, access=Access.WRITE, high=0xFFFFFFFF, protected=True,
         choices={SAVE: "save"}, source=f"{MANUAL}, command 3; CiA 301, object 1010h",
-        conflict="the manual: it is not answered; CiA 301 demands an answer. Chosen: one that comes is accepted",
+        conflict="manual: no reply; CiA 301: a reply. Chosen: a reply is accepted and not required",
         note="keeps node id and bit rate (and travel limits and function bits), never the goal position",
     ),
     _kept(
         name="node_id", address=0x3000, low=1, high=127, default=DEFAULT_NODE, effect=Effect.IDENTITY,
         protected=True, source=f"{MANUAL}, commands 2 and 4 and defaults",
-        note="takes effect when saved and restarted; that reading it gives the new id before that is an assumption",
+        note="takes effect after a save and a restart; that a read gives the new id earlier is an assumption",
     ),
     _kept(
         name="bit_rate_code", address=0x3001, access=Access.WRITE, high=7, default=5, effect=Effect.IDENTITY,
         protected=True, choices={code: f"{rate} bit/s" for code, rate in BIT_RATES.items()},
         source=f"{MANUAL}, command 1 and defaults",
-        note="takes effect when saved and restarted; the manual has no command that reads it",
+        note="takes effect after a save and a restart; the manual has no command that reads it",
     ),
     _angle(
         name="present_position", address=0x6002, access=Access.READ, storage=Storage.RAM, low=-900, high=900,
         source=f"{MANUAL}, command 6",
-        conflict="the manual, command 7: the status, by this very frame and with an answer alike; four public drivers "
-        "read that at 0x6005. Chosen: the position, as in command 6",
+        conflict="manual, command 7: the same frame reads the status; four public drivers read the status at 0x6005. "
+        "Chosen: the position, as in command 6",
     ),
     _angle(
         name="goal_position", address=0x6003, access=Access.READ_WRITE, storage=Storage.RAM, low=-900, high=900,
         effect=Effect.MOTION, source=f"{MANUAL}, command 5",
-        note="acts at once and is back at a default after a restart, which the manual does not give; the manual "
-        "shows the write only",
+        note="acts at once; a restart sets a default that the manual does not state. The manual shows the write only",
     ),
 )  # fmt: skip
 
 _LATER_ROWS = (
     _version(
         name="software_version", address=0x100B, source=DEMO,
-        conflict="the manual: the version is in 0x100A; the demo driver: here. Chosen: both are asked",
+        conflict="manual: the version is in 0x100A; demo driver: in 0x100B. Chosen: both are read",
     ),
     Register(
         name="report_interval", address=0x2200, subindex=0, size=1, access=Access.WRITE, storage=Storage.RAM,
@@ -103,28 +102,29 @@ _LATER_ROWS = (
     _kept(
         name="mid_point", address=0x3009, size=4, access=Access.WRITE, high=1, protected=True,
         source=DEMO,
-        note="makes the present position the zero, and is then to be saved; the demo driver writes 0. The length is "
-        "that of the one sized write seen (0x23), to a servo of XQPOWER",
+        note="makes the present position the zero; needs a save. The demo driver writes 0. The length is that of the "
+        "one sized write seen (0x23), to a servo of XQPOWER",
     ),
     _angle(
         name="negative_limit", address=0x300A, access=Access.READ_WRITE, storage=Storage.EEPROM,
         low=-1000, high=0, effect=Effect.PERSISTENT, source=FLIGHT,
-        note="to be saved; while the sense is reversed a change of one limit changes the other too",
+        note="needs a save; in reversed sense a change of one limit changes the other too",
     ),
     _angle(
         name="positive_limit", address=0x300B, access=Access.READ_WRITE, storage=Storage.EEPROM,
         low=0, high=1000, effect=Effect.PERSISTENT, source=FLIGHT,
-        note="to be saved; while the sense is reversed a change of one limit changes the other too",
+        note="needs a save; in reversed sense a change of one limit changes the other too",
     ),
     _kept(
         name="function_enable", address=0x300F, high=255, protected=True, bits={REVERSED: "reversed"},
         source=f"{FLIGHT}; {DEMO}",
-        note="the other bits are unknown, so only read-modify-write; a write may fail, or be undone by a restart",
+        note="bit 5 reverses the sense; the other bits are unknown, so only read-modify-write; a write may fail, or be "
+        "undone by a restart",
     ),
     Register(
         name="status", address=0x6005, subindex=0, size=4, access=Access.READ, storage=Storage.RAM,
         high=0xFFFFFFFF, source=f"{FLIGHT}; {DEMO}",
-        conflict="the manual reads a status at 0x6002; four public drivers here. Chosen: here",
+        conflict="manual: status at 0x6002; four public drivers: at 0x6005. Chosen: 0x6005",
         note="bytes 0 and 1 current (0.01 A, unsigned), byte 2 temperature (°C, signed), byte 3 unused",
     ),
 )  # fmt: skip
@@ -153,12 +153,12 @@ XQPOWER: Final = KST_EXT.derive(
     "xqpower",
     changed(
         KST_EXT["report_interval"], low=10, source=XQPOWER_DRIVER,
-        note="less than 10 ms is raised to 10 ms by the servo",
+        note="the servo raises less than 10 ms to 10 ms",
     ),
     changed(
         KST_EXT["mid_point"], source=XQPOWER_DRIVER,
-        conflict="the PX4 module: writes 1 without a length; the tools: four bytes with it. Chosen: the tools",
-        note="makes the present position the zero, and is then to be saved",
+        conflict="PX4 module: 1 without a length; tools: four bytes with a length. Chosen: the tools",
+        note="makes the present position the zero; needs a save",
     ),
     changed(
         KST_EXT["status"], source=XQPOWER_DRIVER, conflict="",
@@ -223,8 +223,8 @@ _KST = Profile(
     nmt="none",
     report_forms=(),
     source=f"{MANUAL}; the wait after a save: {FLIGHT}",
-    conflicts="commands 6 and 7 of the manual, position and status, are one and the same frame; it prints ids of four "
-    "bytes and calls the frames standard ones",
+    conflicts="the manual has one frame for position (command 6) and status (command 7); it prints CAN ids of four "
+    "bytes and calls the frames standard",
 )
 _KST_EXT = replace(
     _KST,
@@ -240,7 +240,7 @@ _KINGMAX = replace(
     table=KINGMAX,
     vendor="Kingmax",
     source=f"{KINGMAX_DRIVER} for position, status and scale; the rest is taken over from kst-ext",
-    conflicts="that range, start rule and configuration objects are those of kst-ext is an assumption",
+    conflicts="range, start and configuration objects are assumed to be those of kst-ext",
 )
 _XQPOWER = replace(
     _KST_EXT,

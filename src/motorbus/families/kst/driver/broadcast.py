@@ -16,13 +16,13 @@ from motorbus.core.steps import Emit, Exclusive
 from motorbus.errors import RequestError, UnexpectedReply
 from motorbus.families.kst import sdo
 from motorbus.families.kst.driver.motion import Started, target
-from motorbus.families.kst.driver.node import DEFAULT, BusSettings, Node, checked_id, checked_ids
+from motorbus.families.kst.driver.node import BusSettings, Node, checked_id, checked_ids
 from motorbus.families.kst.driver.requests import value_bytes
 from motorbus.families.kst.notifications import encode_start
 from motorbus.families.kst.profiles import SAVE, bit_rate_code
 
 
-async def broadcast_read(name: str, settings: BusSettings = DEFAULT) -> dict[int, Value]:
+async def broadcast_read(name: str, settings: BusSettings) -> dict[int, Value]:
     """An object of all servos, in API units, by node. Raises RequestError for an unknown or write-only object.
 
     A servo is missing that refuses it, is silent, sends another size, or sends two values (two servos with one id).
@@ -43,9 +43,7 @@ async def broadcast_read(name: str, settings: BusSettings = DEFAULT) -> dict[int
     return {node: row.to_value(row.decode(min(found))) for node, found in values.items() if len(found) == 1}
 
 
-async def broadcast_position(
-    to: float, nodes: Sequence[int], settings: BusSettings = DEFAULT
-) -> tuple[int, ...]:
+async def broadcast_position(to: float, nodes: Sequence[int], settings: BusSettings) -> tuple[int, ...]:
     """Send all servos to `to` rad; return the nodes that acknowledged. Errors and start rule as in `move`.
 
     `nodes` are the servos that the gate checks: name all on the bus, because all move.
@@ -71,19 +69,17 @@ async def broadcast_position(
     return await Exclusive(start_and_move())
 
 
-async def broadcast_save(settings: BusSettings = DEFAULT) -> tuple[int, ...]:
+async def broadcast_save(settings: BusSettings) -> tuple[int, ...]:
     """Let all servos save, and wait for their flash; return the nodes that acknowledged, by the manual none."""
     return await Exclusive(_write(settings, "store", SAVE))
 
 
-async def broadcast_bit_rate(rate: int, settings: BusSettings = DEFAULT) -> tuple[int, ...]:
+async def broadcast_bit_rate(rate: int, settings: BusSettings) -> tuple[int, ...]:
     """Give all servos another bit rate (bit/s), see `set_bit_rate`; return the nodes that acknowledged."""
     return await Exclusive(_write(settings, "bit_rate_code", bit_rate_code(rate)))
 
 
-async def broadcast_node_id(
-    new: int, settings: BusSettings = DEFAULT, *, force: bool = False
-) -> tuple[int, ...]:
+async def broadcast_node_id(new: int, settings: BusSettings, *, force: bool = False) -> tuple[int, ...]:
     """Give all servos on the bus this id. Raises RequestError without `force`: several servos then have one id."""
     checked_id(new)
     if not force:

@@ -121,7 +121,9 @@ class KstDriver:
             row, answer = node.table["present_position"], nodes[node.node]
             replies = decoded(answer) if answer is not None else []
             here = [
-                reply.data[:2] for reply in replies if reply.kind == "upload" and reply.index == row.address
+                reply.data[: row.size]
+                for reply in replies
+                if reply.kind == "upload" and reply.index == row.address and len(reply.data) >= row.size
             ]
             if here:
                 requests += hold(node, row.decode(here[0]), Priority.STOP)
@@ -134,7 +136,7 @@ class KstDriver:
         return identity.identify(Node(node, self.settings))
 
     def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Procedure[list[Found]]:
-        return scan(ids, rates, self.settings)
+        return scan(self.settings, ids, rates)
 
     def axis(self, model: str) -> AxisDriver:
         for profile in PROFILES.values():

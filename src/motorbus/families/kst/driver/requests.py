@@ -63,7 +63,7 @@ def read_register(
 
     def positions(answer: Response) -> dict[int, float]:
         reply = sdo.decode_reply(answer.replies[0].data)
-        if reply is None or reply.kind != "upload":
+        if reply is None or reply.kind != "upload" or len(reply.data) < row.size:
             return {}
         return {node.node: float(row.to_value(row.decode(reply.data[: row.size])))}
 

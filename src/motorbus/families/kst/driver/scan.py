@@ -19,11 +19,11 @@ from motorbus.core.family import Found, Identity
 from motorbus.core.request import ANY, EVERY_LANE, Priority, Request, Response, TimeoutClass
 from motorbus.core.scan import BitrateRestored, Skipped
 from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate, WaitFor, catch, gather
-from motorbus.errors import LinkError, LinkLost, MotorbusError, NoReply, RequestError, WireError
+from motorbus.errors import LinkError, LinkLost, NoReply, RequestError, WireError
 from motorbus.families.kst import sdo
 from motorbus.families.kst.driver.feedback import position
 from motorbus.families.kst.driver.identity import identify, is_bus_error, look
-from motorbus.families.kst.driver.node import DEFAULT, BusSettings, Node, check_above_zero, checked_ids
+from motorbus.families.kst.driver.node import BusSettings, Node, check_above_zero, checked_ids
 from motorbus.families.kst.driver.requests import decoded, upload
 from motorbus.families.kst.notifications import BusState
 from motorbus.families.kst.profiles import RATES, bit_rate_code
@@ -64,9 +64,7 @@ class BitRates(NamedTuple):
     found: tuple[Found, ...] = ()
 
 
-async def scan(
-    ids: Sequence[int] = (), rates: Sequence[int] = (), settings: BusSettings = DEFAULT
-) -> list[Found]:
+async def scan(settings: BusSettings, ids: Sequence[int] = (), rates: Sequence[int] = ()) -> list[Found]:
     """All servos that answer, with their identity. `ids` (): all; `rates` (): the present one.
 
     At another rate than the present one the adapter listens first; a rate at which errors show that the bus is in use
@@ -90,7 +88,7 @@ async def scan(
 
 
 async def scan_bit_rates(
-    settings: BusSettings = DEFAULT,
+    settings: BusSettings,
     *,
     rates: Sequence[int] = RATES,
     isolated: bool = False,
@@ -154,9 +152,13 @@ async def listen(settings: BusSettings, rate: int, seconds: float) -> LineActivi
 
 async def set_named_rate(settings: BusSettings, rate: int) -> None:
     """Set this rate after listening, if the adapter can. Raises RequestError if the bus is in use at another rate."""
-    activity = await catch(listen(settings, rate, SHORT_LISTEN))
-    if isinstance(activity, LinkLost):
-        raise activity
+    activity = None
+    try:
+        activity = await listen(settings, rate, SHORT_LISTEN)
+    except LinkLost:
+        raise
+    except LinkError:
+        pass  # the adapter cannot listen
     if activity is LineActivity.ERRORS:
         raise RequestError(
             f"nothing is sent at {rate} bit/s: {activity.value}",
@@ -168,13 +170,17 @@ async def set_named_rate(settings: BusSettings, rate: int) -> None:
 
 async def _use(settings: BusSettings, rate: int, *, listens: bool) -> bool:
     """Set this rate, or report why it is left out."""
-    error = await catch(set_named_rate(settings, rate) if listens else SetBitrate(rate))
-    if isinstance(error, LinkLost):
-        raise error
-    if isinstance(error, MotorbusError):
-        in_use = isinstance(error, RequestError)
-        await Emit(Skipped(rate, LineActivity.ERRORS.value if in_use else error.summary))
-    return not isinstance(error, MotorbusError)
+    try:
+        await (set_named_rate(settings, rate) if listens else SetBitrate(rate))
+    except LinkLost:
+        raise
+    except LinkError as error:
+        await Emit(Skipped(rate, error.summary))
+    except RequestError:
+        await Emit(Skipped(rate, LineActivity.ERRORS.value))
+    else:
+        return True
+    return False
 
 
 # -- one rate --------------------------------------------------------------------------------------------------

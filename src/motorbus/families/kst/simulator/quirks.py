@@ -78,4 +78,6 @@ class Quirks:
         "a heartbeat of state 0 whenever their supply comes back",
         source="CiA 301; manual and drivers: none")
     position: int = switch(0, "their first position, raw counts", source="an assumption", span=_COUNTS)
+    speed: float = switch(7.0, "top speed in rad/s",
+        source="an assumption; 0.15 s for 60 degrees is usual", span=(1e-6, 1e9))
     # fmt: on

@@ -24,7 +24,6 @@ SOFTWARE: Final = "1.00"  # version in 0x100B # assumption
 INTERVAL: Final = 20
 """ms between reports as shipped; the public drivers expect 50 a second. # assumption"""
 LOW_VOLTAGE: Final = 6.0  # V; below it the servo sends the alarm # assumption
-SPEED: Final = 7.0  # rad/s; 0.15 s for 60 degrees # assumption
 ACCELERATION: Final = 100.0  # rad/s² # assumption
 DRIVE: Final = Drive(top_speed=1.0, idle_current=0.2, stall_current=2.5)  # currents in A # assumption
 
@@ -225,7 +224,7 @@ class Servo(PoweredDevice):
             goal = self.values["goal_position"] = max(low, min(high, raw))  # clamped # assumption
             position, velocity, _ = self.motion.state(at)
             unit = 180 / pi * self.profile.counts_per_degree  # counts per rad
-            limits = {"speed": SPEED * unit, "acceleration": ACCELERATION * unit}
+            limits = {"speed": self.quirks.speed * unit, "acceleration": ACCELERATION * unit}
             self.motion = move(at, position, self._place(goal), velocity=velocity, **limits)
 
     @property
