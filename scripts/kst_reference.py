@@ -19,6 +19,7 @@ from motorbus.families.kst.simulator import OPTIONS
 from scripts.pages import kept, listed
 
 PAGE: Final = Path(__file__).resolve().parent.parent / "docs" / "reference" / "kst.md"
+FAMILY: Final = PAGE.parents[2] / "src" / "motorbus" / "families" / "kst"
 MANUAL_TESTS: Final = "tests/simulators/kst/test_manual.py"
 DECODE_TESTS: Final = "tests/protocol/kst/test_decode.py"
 ERRATA_TESTS: Final = "tests/families/kst/test_errata.py"
@@ -207,6 +208,29 @@ def _assumptions() -> Iterator[str]:
             values = f"<br>Values: {', '.join(map(str, one.choices))}." if one.choices else ""
             rows.append((name, f"{one.help}.{values}<br>Source: {one.source}."))
     yield from listed(("option", "meaning"), rows)
+    yield "\nConstants that no source states:\n"
+    yield from listed(("where", "assumed"), list(_constants()))
+
+
+def _constants() -> Iterator[tuple[str, str]]:
+    """The file and the text of each line that the family marks as an assumption."""
+    for file in sorted(FAMILY.rglob("*.py")):
+        before = ""
+        for line in file.read_text(encoding="utf-8").splitlines():
+            if line.rstrip('"').endswith("# assumption"):
+                code, _, text = (
+                    line.strip().removesuffix('"""').removesuffix("# assumption").partition("  # ")
+                )
+                constant = (before if code.startswith('"""') and ": Final" in before else code).partition(
+                    ": Final"
+                )
+                name = f"`{constant[0].strip()}{constant[2]}`: " if constant[1] else ""
+                words = text or code.strip('"')
+                yield (
+                    f"`{file.relative_to(FAMILY)}`",
+                    (name + words).strip().rstrip(".").replace("|", "/") + ".",
+                )
+            before = line.strip()
 
 
 def main() -> int:

@@ -17,7 +17,7 @@ import pytest
 
 from motorbus.core.family import Family
 from tests.support.subjects import FAMILIES, SUBJECTS, Line, Vector, line_of, tables_of, vectors
-from tests.support.world import has, has_torque_switch, kept, leads, locks, moves, plain, reports
+from tests.support.world import has_torque_switch, kept, leads, locks, moves, plain, reports
 
 
 def _is_reply(vector: Vector) -> bool:
@@ -46,7 +46,6 @@ SUITS: dict[str, Callable[[Family], object]] = {
     "leader": leads,
     "keeping_leader": lambda subject: leads(subject) and any(kept(table) for table in tables_of(subject)),
     "limp": has_torque_switch,
-    "reporting_mover": lambda family: moves(family) and reports(family) and not has(family, "start_reports"),
     "plain_one": lambda subject: any(plain(table) for table in tables_of(subject)),
     "shared": lambda subject: line_of(subject).devices != 1,
     "writer": lambda subject: line_of(subject).writes,

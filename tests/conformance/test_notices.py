@@ -7,7 +7,7 @@ from motorbus.core.request import Data, Notification
 from motorbus.core.steps import WaitFor
 from motorbus.link.base import Delivery, PerfectLine, Side
 from tests.support.subjects import vectors
-from tests.support.world import IDS, reports, said, sent, world
+from tests.support.world import IDS, reports, sent, world
 
 NODE = IDS[0]
 
@@ -78,19 +78,3 @@ def test_who_listens_in_vain_goes_on_in_time(reporter: Family) -> None:
         begun = there.link.now()
         assert there.bus.run(listening()) is None
         assert 0.5 <= there.link.now() - begun < 0.6
-
-
-def test_a_device_under_way_says_so_and_the_bus_listens(reporting_mover: Family) -> None:
-    async def moved() -> tuple[Notification | None, float]:
-        to = await said(device, "position") + 1.0
-        await said(device, "move", to, wait=False)
-        notice = await WaitFor(lambda notice: notice.node == NODE, 10.0)
-        there.link.advance(5.0)
-        return notice, abs(await said(device, "position") - to)
-
-    with world(reporting_mover) as there:
-        device = there.device(NODE)
-        device.enable_torque()
-        notice, off = there.bus.run(moved())
-        assert notice is not None
-        assert off < 0.01

@@ -15,7 +15,7 @@ class RecordedFrame(NamedTuple):
 
     `data`  the whole frame; a CAN frame as `CanFrame.flat()` serializes it
     `kind`  "request", "reply", "notice" (unsolicited), or "either": a repeated request, its echo or a reply
-    `node`  sender or receiver; `ABSENT` if the frame does not tell
+    `node`  sender or receiver; `ABSENT` if the frame does not contain it
     `code`  content as a number of the family; `ABSENT` if the family has none
     """
 

@@ -25,7 +25,7 @@ from motorbus.families.kst.driver.node import Node, check_above_zero
 from motorbus.families.kst.driver.requests import acknowledged, is_absent, read_register, write_register
 from motorbus.families.kst.notifications import encode_start
 
-TOLERANCE: Final = 0.02  # rad, about a degree # assumption: no source gives the error under load
+TOLERANCE: Final = 0.02  # rad, about a degree; no source gives the error under load # assumption
 SLOWEST: Final = 1.0
 """rad/s that each servo reaches; the default timeout of a move is computed with it. # assumption"""
 

@@ -1,7 +1,7 @@
 """The SDO server of one simulated servo: the reply to each request.
 
-The manual comes first; CiA 301 fills its gaps. The order of checks (object, access, length, value) is that of common
-CANopen servers. # assumption
+The manual comes first; CiA 301 fills its gaps.
+The order of the checks is object, access, length, value, as in common CANopen servers. # assumption
 """
 
 from __future__ import annotations
@@ -125,6 +125,6 @@ class SdoServer:
         return sdo.encode_download_reply(node, request.index, request.subindex, extended=extended)
 
     def _abort(self, request: sdo.SdoRequest, code: int) -> CanFrame:
-        """Manual, command 9: the index of the request. That the sub-index is repeated as well is an # assumption"""
+        """An abort repeats the index (manual, command 9) and also the sub-index of the request. # assumption"""
         node, extended = self._servo.node, request.extended
         return sdo.encode_abort_reply(node, request.index, request.subindex, code, extended=extended)

@@ -196,7 +196,7 @@ class Servo(PoweredDevice):
                     values[name] = clamped
                     if self._reversed:  # a change of one limit changes the other (flight-controller driver)
                         other = "positive_limit" if name == "negative_limit" else "negative_limit"
-                        values[other] = -clamped  # as its mirror image # assumption
+                        values[other] = -clamped  # a reversed servo mirrors a changed limit # assumption
             case "report_interval":  # XQPOWER raises a short interval; 0 means none # assumption
                 values[name] = max(row.low, raw) if raw or row.low > 1 else 0
                 self._interval = values[name] / 1000
@@ -204,7 +204,11 @@ class Servo(PoweredDevice):
             case "mid_point":  # one source writes 0 and one 1, so any value sets it
                 place = round(self.motion.position(at))
                 self.motion = rest(at, place)
-                values |= {name: raw, "zero": place, "goal_position": 0}  # it stays # assumption
+                values |= {
+                    name: raw,
+                    "zero": place,
+                    "goal_position": 0,
+                }  # it stays at a new mid point # assumption
             case "function_enable":  # bit 5 reverses at once and the shaft stays # assumption
                 turned = (raw ^ values[name]) >> REVERSED & 1
                 values[name] = raw
@@ -221,7 +225,9 @@ class Servo(PoweredDevice):
         """Move at once (manual, command 5); before a start XQPOWER acknowledges a target and ignores it."""
         if self.started or self.profile.nmt != "standard":
             low, high = self.values["negative_limit"], self.values["positive_limit"]
-            goal = self.values["goal_position"] = max(low, min(high, raw))  # clamped # assumption
+            goal = self.values["goal_position"] = max(
+                low, min(high, raw)
+            )  # clamped to the limits # assumption
             position, velocity, _ = self.motion.state(at)
             unit = 180 / pi * self.profile.counts_per_degree  # counts per rad
             limits = {"speed": self.quirks.speed * unit, "acceleration": ACCELERATION * unit}
@@ -251,7 +257,7 @@ class Servo(PoweredDevice):
         self.set_reporting(False, now)
 
     def power_on(self) -> None:
-        """Load the flash. The target is the default, 0 (manual, command 5). # assumption"""
+        """Load the flash. After a restart the target is the default, 0 (manual, command 5). # assumption"""
         at = self._now()
         self.values = self._shipped | self.flash.stored(at)
         self.node = self.values["node_id"]
