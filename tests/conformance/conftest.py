@@ -5,7 +5,8 @@ Of subjects there are also `shared`, on whose line are several devices, and `wri
 A test asks by name: `family`, where no device matters; `subject`, a family with simulated devices of one kind, of which
 it may have several. And some subjects: `lockable`, whose EEPROM has a lock; `mover`, whose devices move; `limp`, whose
 devices can be let go; `leader`, whose devices can be led in a loop, and `keeping_leader`, which also has settings that
-are kept; `reporter`, whose devices say something unasked; `plain_one`, with rows that just keep a value. Or a family together with one of its vectors: `VECTORS`.
+are kept; `reporter`, whose devices say something unasked; `plain_one`, with rows that just keep a value. Or a family
+together with one of its vectors: `VECTORS`.
 """
 
 from __future__ import annotations

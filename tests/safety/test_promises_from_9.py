@@ -11,11 +11,11 @@ import motorbus
 from motorbus.core.steps import Emit
 from motorbus.errors import Faulted, LimitExceeded, MotorbusError, Overloaded, Refused, RequestError
 from motorbus.families.feetech import action_all, reg_write_all, sync_write_positions
-from motorbus.families.feetech.driver.jobs import SET_BAUD, SET_ID
 from motorbus.motion.safety.gate import Gate
 from motorbus.session.robot import Robot
-from tests.families.feetech.cuts import Cut, World
+from tests.conformance.cuts import Kind, violations
 from tests.safety.points import asks, known, sent
+from tests.support.catalogue.cuts import COMMANDS
 from tests.support.machines import Heard, listened, machine
 
 
@@ -44,14 +44,12 @@ def test_09_a_device_whose_change_nobody_has_ended_is_not_moved() -> None:
         assert sim[3].memory["goal_position"] != round((pi + 0.1) / (2 * pi) * 4096)
 
 
-@pytest.mark.parametrize("verb", [SET_ID, SET_BAUD])
-@pytest.mark.parametrize("record", range(4))
-def test_10_an_id_and_a_rate_change_in_two_phases_and_every_crash_ends_old_or_new(
-    verb: str, record: int
-) -> None:
-    world = World(verb, {})
-    world.run(world.change, Cut(record=record, kept=True, supply=True))
-    assert world.faults(world.run(world.recovery)) == []
+@pytest.mark.parametrize("name", ["feetech-sts-set_id", "feetech-sts-set_baud"])
+def test_10_an_id_and_a_rate_change_in_two_phases_and_every_crash_ends_old_or_new(name: str) -> None:
+    command = next(one for one in COMMANDS if one.name == name)
+    crashes = [cut for cut in command.single_cuts() if cut.kind is Kind.BLACKOUT]
+    for crash in crashes[-12:]:
+        assert violations(command, crash) == [], crash
 
 
 def test_10_an_id_that_somebody_has_is_refused_before_anything_is_written() -> None:

@@ -48,9 +48,11 @@ def make_bus(
     return Bus(link, driver, interlock=Gate() if gate else None, report=report, journal=journal)
 
 
-def make_async_bus(link: Link, driver: BusDriver, *, report: Notify | None = None) -> AsyncBus:
+def make_async_bus(
+    link: Link, driver: BusDriver, *, report: Notify | None = None, journal: Notify | None = None
+) -> AsyncBus:
     """An async bus around a link that the test has made."""
-    return AsyncBus(link, driver, interlock=Gate(), report=report)
+    return AsyncBus(link, driver, interlock=Gate(), report=report, journal=journal)
 
 
 def exclude_echo(bus: BaseBus) -> None:

@@ -204,15 +204,6 @@ WHOLE = [
 ]
 
 
-@pytest.mark.parametrize("step", range(3, len(WHOLE)))
-def test_d6_an_interruption_at_any_step_ends_with_the_lock(step: int) -> None:
-    whole = step >= WHOLE.index(LOCK)  # the end of the sequence is not interrupted
-    played = Played(WHOLE if whole else [*WHOLE[:step], *GIVEN_UP], interrupt_at=step)
-    with pytest.raises(KeyboardInterrupt):
-        played.run(calibrate(Node(3)))
-    assert played.script == []
-
-
 # -- refused before anything is written ----------------------------------------------------------------------
 
 

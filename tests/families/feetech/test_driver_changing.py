@@ -1,4 +1,7 @@
-"""A change that is interrupted while the process lives ends at once: old or new, locked, and the journal closed."""
+"""A change of id or rate beside a journal that fails, a servo that is pulled out, and other tasks of the program.
+
+Cuts at every frame are in `tests/conformance/test_cuts.py`.
+"""
 
 from __future__ import annotations
 
@@ -9,154 +12,67 @@ import pytest
 
 import motorbus
 from motorbus import session
-from motorbus.bus.blocking import Bus
-from motorbus.core.request import Data
-from motorbus.core.steps import INTENT, Exclusive, JournalEntry
-from motorbus.errors import LinkError, LinkLost, MotorbusError, NoReply, RequestError
-from motorbus.families.feetech.driver import Node, prepare
-from motorbus.families.feetech.driver.changing import guarded
-from motorbus.families.feetech.driver.placing import called
-from motorbus.journal import BusJournal
-from motorbus.link.memory import MemoryLink
+from motorbus.core.steps import INTENT, JournalEntry
+from motorbus.errors import LinkError, NoReply, RequestError
 from motorbus.simulation.named import Simulation
-from tests.families.feetech.cuts import NEVER, OLD, VERBS, Cut, Doomed, World
+
+NEW = {"set_id": 7, "set_baud": 500_000}
 
 
-def sent(verb: str) -> int:
-    """How many packets a change sends."""
-    world = World(verb, {})
-    world.run(world.change)
-    return len(world.link.sent)
+@pytest.mark.parametrize("verb", NEW)
+def test_servo_that_is_unplugged_during_change_is_recovered_later(verb: str) -> None:
+    with motorbus.simulate("feetech", ids="3") as simulation:
+        servo = simulation[3]
+
+        def unplug(event: object) -> None:
+            if isinstance(event, JournalEntry) and event.state.startswith("writing"):
+                servo.unplug()
+
+        with motorbus.open(simulation.url, report=unplug) as bus:
+            with pytest.raises(motorbus.MotorbusError) as caught:
+                getattr(motorbus.feetech.Servo(bus, 3), verb)(NEW[verb], among=[3])
+            assert "recover() ends it" in caught.value.__notes__[0]
+        with motorbus.open(simulation.url) as bus:
+            change = session.unfinished(bus)
+            assert change is not None
+            recover = motorbus.feetech.Servo(bus, change.node).recover
+            with pytest.raises(NoReply):
+                recover(change.verb, change.facts)
+            servo.plug()
+            assert recover(change.verb, change.facts) == "old"
+            assert session.unfinished(bus) is None
+        assert (servo.id, servo.baud_rate, servo.locked) == (3, 1_000_000, True)
 
 
-class Interrupting:
-    """Raises KeyboardInterrupt as soon as packet number `at` has left; twice in a row with `again`."""
+@pytest.mark.parametrize("kept", [False, True], ids=["full disk", "folder not synced"])
+def test_change_whose_intent_cannot_be_recorded_writes_nothing(kept: bool) -> None:
+    with motorbus.simulate("feetech", ids="3") as simulation, motorbus.open(simulation.url) as bus:
+        journal: Any = bus.journal
 
-    def __init__(self, at: int, again: int | None = None) -> None:
-        self.left = {at, again}
-        self.count = -2  # the servo is read before the change begins
+        def refuse(event: Any) -> None:
+            if event.state != INTENT or kept:
+                journal(event)
+            if event.state == INTENT:
+                raise LinkError("the disk is full")
 
-    def __call__(self, link: Doomed, data: Data) -> None:
-        MemoryLink.write(link, data)
-        self.count += 1
-        if self.count in self.left:
-            raise KeyboardInterrupt
-
-
-def interrupted(verb: str, interrupting: Interrupting, monkeypatch: pytest.MonkeyPatch) -> World:
-    world = World(verb, {})
-    with monkeypatch.context() as patched:
-        patched.setattr(Doomed, "write", lambda link, data: interrupting(link, data))
-        with pytest.raises(KeyboardInterrupt) as caught:
-            world.run(world.change)
-    world.notes = caught.value.__notes__
-    return world
+        bus.journal = refuse
+        with pytest.raises(LinkError, match="the disk is full"):
+            motorbus.feetech.Servo(bus, 3).set_id(7, among=[3])
+        assert journal.unfinished() is None
+        assert simulation[3].locked
+        assert simulation[3].memory.wear.total() == 0
 
 
-@pytest.mark.parametrize("verb", VERBS)
-def test_ctrl_c_at_any_packet(verb: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    for at in range(sent(verb)):
-        world = interrupted(verb, Interrupting(at), monkeypatch)
-        assert world.faults(None) == [], at
-        assert world.link.rate == world.rate
-        assert world.notes == [f"the servo is {called(world.job(), world.place)}, and locked"]
-
-
-@pytest.mark.parametrize("verb", VERBS)
-def test_ctrl_c_again_in_the_clean_up_is_ended_by_recovery(
-    verb: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for at in range(sent(verb)):
-        world = interrupted(verb, Interrupting(at, at + 1), monkeypatch)
-        outcome = world.run(world.recovery)
-        assert world.faults(outcome) == [], at
-
-
-@pytest.mark.parametrize("verb", VERBS)
-def test_a_servo_that_loses_its_supply_is_brought_to_an_end_at_once(verb: str) -> None:
-    world = World(verb, {"torn": "erased"})
-    error = world.run(world.change, Cut(moment=0.01, host=False, supply=True))
-    assert "and locked" in error.__notes__[0]
-    assert world.journal.unfinished() is None
-    assert world.faults("old") == []
-
-
-@pytest.mark.parametrize("verb", VERBS)
-def test_a_servo_that_is_pulled_out_leaves_the_journal_open_and_says_so(
-    verb: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    world = World(verb, {})
-    with monkeypatch.context() as patched:
-        patched.setattr(world.servo, "power_cycle", world.servo.unplug)
-        error = world.run(world.change, Cut(record=1, kept=True, host=False, supply=True))
-    assert "recover() ends it" in error.__notes__[0]
-    assert world.journal.unfinished() is not None
-    assert isinstance(world.run(world.recovery), NoReply)
-    world.servo.plug()
-    outcome = world.run(world.recovery, NEVER)
-    assert world.faults(outcome) == []
-
-
-def test_nothing_is_done_when_the_intent_cannot_be_recorded() -> None:
-    world = World("set_id", {})
-    error = world.run(world.change, Cut(record=0, host=True))
-    assert isinstance(error, LinkLost)
-    assert world.link.sent == []
-    assert world.place == world.old
-
-
-def refused(world: World, error: MotorbusError, *, kept: bool, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """The change, when its intent is refused by this error; the packets that left."""
-    record = BusJournal.__call__
-
-    def refuse(journal: BusJournal, event: object) -> None:
-        if isinstance(event, JournalEntry) and event.state == INTENT:
-            if kept:
-                record(journal, event)
-            raise error
-        record(journal, event)
-
-    with monkeypatch.context() as patched:
-        patched.setattr(BusJournal, "__call__", refuse)
-        assert world.run(world.change) is error
-    return world.link.sent
-
-
-def test_an_intent_that_a_full_disk_refuses_has_begun_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    world = World("set_id", {})
-    assert refused(world, LinkError("the disk is full"), kept=False, monkeypatch=monkeypatch) == []
-    assert world.faults(None) == []
-    assert world.servo.memory.wear.total() == 0
-
-
-def test_an_intent_that_is_on_the_disk_although_its_folder_was_not_synced_is_closed(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    world = World("set_id", {})
-    assert refused(world, LinkError("the folder cannot be synced"), kept=True, monkeypatch=monkeypatch) == []
-    assert world.faults(None) == []
-
-
-@pytest.mark.parametrize("interrupted", [False, True])
-def test_the_journal_of_another_change_stays_open(interrupted: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of two that one program begins at the same time, the first was cut off."""
-    world = World("set_id", {})
-    world.journal(JournalEntry("set_id", INTENT, {"node": 9, "new": 8}))
-    if interrupted:
-        error: BaseException = KeyboardInterrupt()
-        monkeypatch.setattr("motorbus.journal._unfinished", lambda change: error)
-        with pytest.raises(KeyboardInterrupt):
-            world.run(world.change)
-    else:
-        error = world.run(world.change)
-        assert isinstance(error, RequestError)
-        assert world.link.sent == []
-        assert not hasattr(error, "__notes__")
-    change = world.journal.unfinished()
-    assert change is not None
-    assert change.facts["node"] == 9
-    assert world.place == world.old
-    assert world.servo.memory.wear.total() == 0
+def test_change_is_refused_while_another_one_is_unfinished() -> None:
+    with motorbus.simulate("feetech", ids="3") as simulation, motorbus.open(simulation.url) as bus:
+        journal: Any = bus.journal
+        journal(JournalEntry("set_id", INTENT, {"node": 9, "new": 8}))
+        with pytest.raises(RequestError, match=r"set_id\(\) of #9, begun .* is unfinished"):
+            motorbus.feetech.Servo(bus, 3).set_id(7, among=[3])
+        change = journal.unfinished()
+        assert change is not None
+        assert change.node == 9
+        assert 3 not in bus.statistics.nodes
 
 
 def meanwhile(simulation: Simulation, *changes: tuple[int, str, int]) -> list[Any]:
@@ -175,7 +91,7 @@ def meanwhile(simulation: Simulation, *changes: tuple[int, str, int]) -> list[An
     return asyncio.run(work())
 
 
-@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("verb", NEW)
 def test_two_that_are_changed_at_once_do_not_meet(verb: str) -> None:
     """What was looked over before is looked at once more when nobody else has the bus."""
     with motorbus.simulate("feetech", ids="1+2+3") as simulation:
@@ -211,21 +127,3 @@ def test_one_that_gets_the_id_as_shipped_meanwhile_is_noticed() -> None:
         ids = sorted(simulation.simulator.nodes)
         failed = [end for end in ends if isinstance(end, Exception)]
         assert (len(failed), ids) in ((1, [1, 3]), (0, [1, 7]))
-
-
-def test_an_interruption_when_all_is_over_says_that_it_is() -> None:
-    world = World("set_id", {})
-    done = world.job()
-    operation = guarded(done, Node(OLD))
-    step = operation.send(None)
-    assert isinstance(step, Exclusive)
-
-    def work(bus: Bus) -> None:
-        bus.run(prepare(Node(OLD)))
-        bus.run(step.runnable)
-
-    world.run(work)
-    with pytest.raises(KeyboardInterrupt) as caught:
-        operation.throw(KeyboardInterrupt())
-    assert caught.value.__notes__ == ["the servo is 7, and locked"]
-    assert world.faults(None) == []

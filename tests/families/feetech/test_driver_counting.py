@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import pytest
 
@@ -225,18 +224,6 @@ def test_what_cannot_be_put_back_is_told() -> None:
     error = failing(OutcomeUnknown, *silent, *gone)
     assert "could not be put back as it was: 0c from register 18 on" in error.__notes__[0]
     assert "lock of node 3 may still be open" in error.__notes__[1]
-
-
-@pytest.mark.parametrize("count", range(2, 16))
-def test_an_interruption_at_any_exchange_leaves_all_or_nothing(count: int) -> None:
-    """At the exchange of this number; what was begun until then is put back, and the lock is closed."""
-    lines = turned_on("sts", 12)
-    begun: Sequence[Line] = (*BACK_9, *BACK_18) if 10 <= count <= 12 else BACK_18 if 7 <= count <= 9 else ()
-    script = [*lines[:count], *begun, *GIVEN_UP] if count < 14 else lines[:-2]  # the end is not interrupted
-    played = Played(script, interrupt_at=count)
-    with pytest.raises(KeyboardInterrupt):
-        played.run(set_many_turns(Node(3), True))
-    assert played.script == [], [line.sent.hex(" ") for line in played.script]
 
 
 # --- a simulated one ----------------------------------------------------------------------------------------

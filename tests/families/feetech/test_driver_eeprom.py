@@ -11,7 +11,7 @@ from motorbus.core.request import Effect, Priority, TimeoutClass
 from motorbus.core.steps import Sleep
 from motorbus.errors import ChecksumError, MotorbusError, NoReply, OutcomeUnknown, VerificationFailed
 from motorbus.families.feetech.driver import write
-from motorbus.families.feetech.table import TABLES, Mode
+from motorbus.families.feetech.table import Mode
 from tests.families.feetech.driver_script import (
     REG_WRITE,
     Line,
@@ -140,16 +140,6 @@ STEPS = range(len(LOOK), len(WHOLE))
 
 
 @pytest.mark.parametrize("step", STEPS)
-def test_d6_an_interruption_at_any_step_ends_with_the_lock(step: int) -> None:
-    whole = step > WHOLE.index(STILL_OPEN)  # the end of the sequence is not interrupted
-    played = Played(WHOLE if whole else [*WHOLE[:step], *given_up(step)], interrupt_at=step)
-    with pytest.raises(KeyboardInterrupt):
-        played.run(write(prepared(), position_p=33, led_mask=5))
-    assert played.script == []
-    assert played.sent[-2:] == [LOCK.sent, LOCKED.sent]
-
-
-@pytest.mark.parametrize("step", STEPS)
 @pytest.mark.parametrize("failure", [NoReply("n"), ChecksumError("c"), OutcomeUnknown("o")])
 def test_d6_an_error_at_any_step_ends_with_the_lock(step: int, failure: MotorbusError) -> None:
     played = Played([*WHOLE[:step], *(Line(line.sent, failure) for line in failing(step)), *given_up(step)])
@@ -214,21 +204,6 @@ def test_a_servo_told_to_acknowledge_nothing_more_is_still_locked() -> None:
         ),
         *(STILL_OPEN, unheard(LOCK), LOCKED, LOCKED),
     )
-
-
-@pytest.mark.parametrize("commits", [0, 0.5, 1])
-@pytest.mark.parametrize("name", TABLES)
-def test_a_servo_that_lost_its_supply_in_the_middle_is_not_taken_for_done(name: str, commits: float) -> None:
-    """It comes back with its lock closed, takes the write that is repeated, reads back right and keeps nothing."""
-    with simulated(name) as (real, servo):
-        servo.prepare()
-        real.cut(commits)
-        with pytest.raises(OutcomeUnknown, match="closed its EEPROM lock by itself"):
-            servo.write(led_mask=5)
-        assert real.memory["lock"] == 1
-        servo.write(led_mask=5)
-        real.power_cycle()
-        assert real.memory["led_mask"] == 5
 
 
 CHANGES: dict[str, Callable[[Any], object]] = {

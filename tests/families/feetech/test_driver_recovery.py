@@ -1,6 +1,6 @@
 """Finding a servo again: the right one among others, never a wrong one, and said plainly when it cannot be known.
 
-What happens at every cut is in `test_power_cuts.py`; here are the buses on which something else is odd as well.
+What happens at every cut is in `tests/conformance/test_cuts.py`; here are the buses on which something else is odd.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from motorbus.families.feetech.driver import Node, recover
 from motorbus.families.feetech.driver.jobs import SET_BAUD, SET_ID, Job, Place
 from motorbus.families.feetech.simulator import effects
 from motorbus.simulation.named import Simulation
-from tests.families.feetech.cuts import VERBS, Cut, World, cuts
 
 RATE, SLOW = 1_000_000, 500_000
 
@@ -91,27 +90,6 @@ def test_an_open_lock_proves_nothing_when_a_recovery_has_opened_it() -> None:
         assert end(simulation) == "new"
         simulation[7].power_cycle()
         assert simulation[7].id == 7
-
-
-@pytest.mark.parametrize("verb", VERBS)
-@pytest.mark.parametrize("model", ["sts3215", "hls3925"])
-def test_a_recovery_that_is_cut_off_on_its_way_to_write_it_again(verb: str, model: str) -> None:
-    def wreck() -> World:
-        """The supply failed right before the write, which was heard, and the host died."""
-        world = World(verb, {"model": model})
-        world.run(world.change, Cut(record=1, kept=True, supply=True))
-        there = world.job()
-        effects.write(world.servo, there.cell, bytes((there.value(there.new),)), world.now)
-        assert world.place == world.new
-        assert world.servo.locked
-        return world
-
-    for cut in cuts(wreck, lambda world: world.recovery):
-        if cut.host and (cut.record is not None or not cut.supply):
-            world = wreck()
-            world.run(world.recovery, cut)
-            outcome = world.run(world.recovery)
-            assert world.faults(outcome) == [], cut
 
 
 @pytest.mark.parametrize(("second", "wear"), [(3, {7: 1}), (7, {}), (255, {7: 1})])
@@ -266,27 +244,6 @@ def test_facts_of_something_else_are_refused_and_nothing_is_sent() -> None:
         assert 3 not in bus.statistics.nodes
 
 
-@pytest.mark.parametrize(("old", "torn"), [(3, False), (3, True), (1, False)])
-def test_a_setting_that_was_lost_with_the_supply_does_not_hinder(old: int, torn: bool) -> None:
-    """Written while the lock was closed, so the journal has it and the servo has not."""
-    world = World(SET_ID, {"torn": "erased", "ids": (old, 7), "volatile": True})
-    world.run(world.change, Cut(moment=0.01, supply=True) if torn else Cut(record=1, kept=True, supply=True))
-    outcome = world.run(world.recovery)
-    assert outcome == "old"
-    assert world.faults(outcome) == []
-    assert world.servo.memory["max_temperature"] == 70
-
-
-def test_a_recovery_that_fails_closes_the_lock_it_has_opened(monkeypatch: pytest.MonkeyPatch) -> None:
-    world = World(SET_ID, {"ids": (1, 7)})
-    world.run(world.change, Cut(record=1, kept=True, supply=True))
-    monkeypatch.setattr("motorbus.families.feetech.driver.jobs.Job.is_at", lambda *_: False)
-    failed = world.run(world.recovery)
-    assert isinstance(failed, OutcomeUnknown)
-    assert (world.servo.id, world.servo.locked) == (1, True)
-    assert world.journal.unfinished() is not None
-
-
 @pytest.mark.parametrize("id", [1, 7])
 def test_one_at_another_rate_is_somebody_else_when_an_id_was_changed(id: int) -> None:
     """Its rate is not touched by that, so it is not looked for at any other."""
@@ -331,3 +288,38 @@ def test_facts_on_a_bus_whose_journal_is_closed_are_kept_there_whole() -> None:
             assert kept.facts == {**change.facts, "reached": [INTENT, "writing 7", "recovering"]}
         with pytest.raises(NoReply):
             end(other)
+
+
+UNREACHABLE = {"torn": "erased", "torn_identity": "unreachable"}
+
+
+def tear(simulation: Simulation, cell: int) -> Any:
+    """The first servo restarts with an id or rate that was half written."""
+    servo = simulation.simulator.servos[0]  # type: ignore[attr-defined]
+    servo.memory.stored[cell] = 0xFF
+    servo.power_cycle()
+    return servo
+
+
+@pytest.mark.parametrize(("verb", "cell"), [(SET_ID, 5), (SET_BAUD, 6)])
+def test_recover_raises_for_servo_that_answers_nowhere(verb: str, cell: int) -> None:
+    with motorbus.simulate("feetech", ids="3+9", **UNREACHABLE) as simulation:
+        begin(simulation, "writing 7", verb=verb, others=[9])
+        tear(simulation, cell)
+        with pytest.raises(NoReply, match="is nowhere") as caught:
+            end(simulation)
+        assert ("by broadcast" in caught.value.advice) is (verb == SET_ID)
+        assert is_open(simulation)
+
+
+def test_recover_gives_servo_without_id_its_old_id_when_it_is_alone() -> None:
+    with motorbus.simulate("feetech", ids="3+9", **UNREACHABLE) as simulation:
+        begin(simulation, "writing 7", others=[9])
+        servo = tear(simulation, 5)
+        assert servo.id == 0xFF
+        with pytest.raises(RequestError, match="the servo is not alone: "):
+            end(simulation, alone=True)
+        simulation[9].unplug()
+        assert end(simulation, alone=True) == "old"
+        servo.power_cycle()
+        assert (servo.id, servo.locked) == (3, True)

@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.errors import DeviceError, OutcomeUnknown, RequestError
-from motorbus.families.feetech.simulator import effects
+from motorbus.errors import DeviceError, RequestError
 from motorbus.simulation.named import Simulation
 
 NEAR = range(10)
@@ -108,22 +107,6 @@ def test_a_servo_whose_map_is_not_known_is_refused() -> None:
         with pytest.raises(DeviceError):
             given(simulation, 9)
         assert wear(simulation) == 0
-
-
-def test_a_supply_that_fails_in_between_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    write = effects.write
-
-    def failing(servo: Any, address: int, data: bytes, at: float) -> float:
-        if address == 7:
-            servo.power_cycle()
-        return write(servo, address, data, at)
-
-    with hls() as simulation:
-        monkeypatch.setattr(effects, "write", failing)
-        with pytest.raises(OutcomeUnknown, match="closed its EEPROM lock"):
-            given(simulation, 9)
-        simulation[3].power_cycle()
-        assert (simulation[3].second_id, simulation[3].locked) == (3, True)
 
 
 def test_a_plain_write_names_the_verb() -> None:

@@ -115,28 +115,6 @@ def test_power_loss_during_the_save_is_never_reported_as_saved(
         assert (servo.node, servo.bit_rate) == (5, 500_000)
 
 
-@pytest.mark.parametrize("loses_power", [False, True])
-@pytest.mark.parametrize("done", [0, 1, 2, 3, 4])
-def test_interrupted_provision_restores_the_rate_and_resumes(done: int, loses_power: bool) -> None:
-    with Bench() as bench:
-        (servo,) = bench.simulator.servos
-
-        def interrupt(event: object) -> None:
-            if isinstance(event, PowerCycleNeeded):
-                servo.power_cycle()
-            if isinstance(event, Progress) and event.done == done:
-                raise KeyboardInterrupt
-
-        bench.on = interrupt
-        with pytest.raises(KeyboardInterrupt):
-            bench.servo().provision(**CHANGES[2])
-        assert (bench.bus.rate, bench.link.rate, bench.link.listen_only) == (500_000, 500_000, False)
-        if loses_power:
-            servo.power_cycle()
-        bench.on_power_cycle()
-        assert bench.servo().provision(**CHANGES[2])[:2] == (9, 1_000_000)
-
-
 def test_id_written_before_is_not_saved_by_mistake() -> None:
     with Bench() as bench:
         bench.servo().set_node_id(7)

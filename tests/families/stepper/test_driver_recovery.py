@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import tau
 from typing import Any
@@ -9,16 +10,29 @@ from typing import Any
 import pytest
 
 from motorbus.core.steps import REACHED, Progress
-from motorbus.errors import OutcomeUnknown, RequestError
+from motorbus.errors import LinkLost, OutcomeUnknown, RequestError
 from motorbus.families.stepper import Controller
 from motorbus.families.stepper.execution import Phase
 from tests.families.stepper.loans import MINE, Cut, Line1
-from tests.families.stepper.test_borrow_cuts import jogged, wrecked
 from tests.families.stepper.test_driver_borrowing import SELECT, failed, starts
 from tests.families.stepper.test_driver_stopping import MOTOR, PROJECT, Losing
 
 MOVING = Cut(8, sent=True)
 """The order to move has left."""
+
+
+def jogged(device: Controller) -> object:
+    return device.jog(tau, 0.5)
+
+
+def wrecked(cut: Cut, work: Callable[[Controller], object], options: dict[str, Any]) -> Line1:
+    """The line after a host has died so, and the time has passed in which the motor comes to its end."""
+    line = Line1(**options)
+    told = line.run(work, cut)
+    assert isinstance(told, LinkLost), told
+    line.later()
+    assert line.at_rest, cut
+    return line
 
 
 @pytest.fixture
@@ -30,6 +44,27 @@ def facts_of(line: Line1) -> dict[str, Any]:
     change = line.journal.unfinished()
     assert change is not None
     return change.facts
+
+
+COMMANDS: dict[str, Callable[[Controller], object]] = {
+    "jog": jogged,
+    "move_by": lambda device: device.move_by(-tau, velocity=tau),
+    "home": lambda device: device.home(velocity=tau, deadline=5.0),
+    "run_once": lambda device: device.run_once(),
+    "jog_forward": lambda device: device.jog_forward(0.1),
+    "run": lambda device: device.run(1),
+    "write": lambda device: device.write(step_1_delay=0.5),
+    "select": lambda device: device.select(2),
+    "save": lambda device: device.save(1, expert=True),
+    "clear": lambda device: device.clear(2),
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_command_is_refused_while_project_1_is_borrowed(line: Line1, command: str) -> None:
+    failed(line.run(COMMANDS[command]), RequestError, "the borrow of project 1 (for jog)")
+    assert line.sent == []
+    assert f"motorbus recover {line.journal.bus}" in line.journal.warning()
 
 
 def test_it_stops_first_and_writes_only_what_differs(line: Line1) -> None:

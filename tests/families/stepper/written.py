@@ -1,19 +1,15 @@
-"""Controllers of every kind that a write may meet, what they have stored, and a supply that goes at a chosen moment."""
+"""Controllers of every kind that a write may meet, and what they have stored."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import product
-from math import inf
 from typing import Any, Final
 
-from motorbus.core.request import Data
 from motorbus.families.stepper import Program
 from motorbus.families.stepper.simulator import Controller as Simulated
-from motorbus.families.stepper.simulator import StepperBus
 from motorbus.families.stepper.table import Project, Step, decode_image, with_steps
-from tests.families.stepper.bench import Bench
 
 KINDS: Final[list[dict[str, Any]]] = [
     {"select": select, "read_view": view, "flags_scope": scope, "dump_order": order}
@@ -56,46 +52,3 @@ def stored(simulated: Simulated, number: int) -> Project:
 def program(project: Project, **changes: int) -> Program:
     """A program of it, with the delay, distance and so on of its first step changed."""
     return Program(project=project.with_step(1, **changes) if changes else project)
-
-
-class Supply:
-    """The simulated bus, whose controller loses its supply for an instant at this moment (s on the link's clock)."""
-
-    def __init__(self, bus: StepperBus, at: float) -> None:
-        self.bus = bus
-        self.at = at
-        self.usual_rate = None
-
-    @property
-    def nodes(self) -> Mapping[int, Simulated]:
-        return self.bus.nodes
-
-    def receive(self, data: Data, at: float) -> None:
-        self.bus.receive(data, at)
-
-    def advance(self, to: float) -> list[tuple[float, Data]]:
-        said: list[tuple[float, Data]] = []
-        if self.at <= to:
-            said += self.bus.advance(self.at)
-            self.bus.nodes[1].power_cycle()
-            self.at = inf
-        return said + list(self.bus.advance(to))
-
-    def due(self) -> float:
-        due = self.bus.due()
-        return self.at if due is None else min(self.at, due)
-
-    def tune(self, rate: int) -> None:
-        self.bus.tune(rate)
-
-
-def cut_at(there: Bench, moment: float) -> None:
-    """The supply goes, and comes back at once, so many seconds from now."""
-    there.link.simulator = Supply(there.simulator, there.link.now() + moment)
-
-
-def took(there: Bench, act: Callable[[], object]) -> float:
-    """Seconds of the link's clock."""
-    began = there.link.now()
-    act()
-    return there.link.now() - began
