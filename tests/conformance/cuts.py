@@ -28,8 +28,8 @@ PAUSE = 20.0
 """s between two hosts; a motor that was left moving comes to rest."""
 SPARSE = 200
 """Before the device changes for the first time only every so-many-th cut is made: nothing can be left half done."""
-SECONDS = 5
-"""Second cuts for each first one."""
+ROUNDS, SECONDS = 4, 5
+"""How often a first cut is chosen at most, and second cuts for each choice."""
 
 
 class Kind(Enum):
@@ -134,10 +134,12 @@ class Command:
     def double_cuts(self, count: int) -> list[tuple[Cut, Cut]]:
         """So many pairs, chosen at random: the second cut is in the clean-up or in the recovery after the first."""
         random, pairs = Random(self.name), list[tuple[Cut, Cut]]()
-        firsts = self.single_cuts()
+        firsts = self.single_cuts() * ROUNDS
         random.shuffle(firsts)
-        while len(pairs) < count and firsts:
-            world = World(self, first := firsts.pop())
+        for first in firsts:
+            if len(pairs) >= count:
+                break
+            world = World(self, first)
             world.execute(self.call)
             world.recover()
             moments = range(len(world.moments))

@@ -11,10 +11,11 @@ import pytest
 from motorbus.core.family import Family
 from motorbus.core.request import Effect, Request
 from motorbus.errors import Interrupted, MotionError, NoReply
-from tests.conformance.test_guarded import Interrupting, guarded
+from tests.conformance.test_guarded import guarded
 from tests.support.subjects import possible
 from tests.support.world import (
     IDS,
+    Interrupting,
     StopOutcome,
     World,
     closed,

@@ -94,6 +94,32 @@ def turn(bus: BaseBus, seconds: float) -> None:
     bus.receive(bus.link.now() + seconds)
 
 
+class Interrupting(MemoryLink):
+    """Raises KeyboardInterrupt at one call of `read` or `write`, before or after it; data of that `read` are lost."""
+
+    countdown = 0
+    after = False
+    pressed = False
+
+    def write(self, data: Data) -> None:
+        self._count(False)
+        super().write(data)
+        self._count(True)
+
+    def read(self, until: float) -> list[Data]:
+        self._count(False)
+        arrived = super().read(until)
+        self._count(True)
+        return arrived
+
+    def _count(self, after: bool) -> None:
+        if after is self.after and self.countdown:
+            self.countdown -= 1
+            if not self.countdown:
+                self.pressed = True
+                raise KeyboardInterrupt
+
+
 class Tries:
     """The first try of each request, without a link: it is sent, these data arrive, and then silence."""
 

@@ -23,10 +23,9 @@ from motorbus.link.base import PerfectLine
 from motorbus.simulation.faults import FaultyLine
 from motorbus.simulation.mount import Mount
 from motorbus.simulation.pty import PtyMaster
-from tests.conformance.test_guarded import Interrupting
 from tests.families.feetech.quirk_bus import Busy, Lossy, bench, instruction
 from tests.support.mounts import served
-from tests.support.world import world
+from tests.support.world import Interrupting, world
 
 COUNT = 2 * 3.141592653589793 / 4096
 PING, READ, WRITE, REG_WRITE, SYNC_READ = 1, 2, 3, 4, 0x82

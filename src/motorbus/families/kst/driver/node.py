@@ -80,7 +80,7 @@ class Node:
 
     `at`         arrival time of its last reply (s, link clock)
     `limits`     travel limits (rad) as last read; None: not read yet
-    `unsaved`    names of objects that were written here and may not be saved
+    `saved`      raw values that were saved here, by name
     `last_move`  identifies its latest move
     `reading`    the request for its position, which is made once
     """
@@ -92,7 +92,7 @@ class Node:
         self.table: Final[RegisterMap] = settings.profile.table
         self.limits: tuple[float, float] | None = None
         self.at = -inf
-        self.unsaved: set[str] = set()
+        self.saved: dict[str, int] = {}
         self.last_move: object = None
         self.reading: Request[float] | None = None
 

@@ -54,10 +54,10 @@ def save(node: Node) -> Request[None]:
 async def store(node: Node, values: Sequence[tuple[Register, int]]) -> None:
     """Write these rows, read them back, save, and read them back again, with the bus reserved.
 
-    Nothing is written if all rows read so and this node has written none of them since its last save: flash wears.
-    Raises VerificationFailed when a row reads back different after three tries, or after the save.
+    A row that reads so already is not written; values that this node has saved before are not saved again, because
+    flash wears. Raises VerificationFailed when a row reads back different after three tries, or after the save.
     """
-    names = {row.name for row, _ in values}
+    wanted = {row.name: raw for row, raw in values}
     reads = [partial(read_register, node, row, int) for row, _ in values]
 
     async def check_all() -> None:
@@ -65,23 +65,28 @@ async def store(node: Node, values: Sequence[tuple[Register, int]]) -> None:
             differs = partial(_differs, node, row, raw)
             await verify.check(read, raw, node=node.node, what=row.name, differs=differs)
 
+    async def read_equal() -> bool:
+        for read, raw in zip(reads, wanted.values(), strict=True):
+            if await read() != raw:
+                return False
+        return True
+
     async def write_and_save() -> None:
         node.limits = None
-        if names.isdisjoint(node.unsaved):
-            for read, (_, raw) in zip(reads, values, strict=True):
-                if await read() != raw:
-                    break
-            else:
+        if await read_equal():
+            if wanted.items() <= node.saved.items():
                 return
-        node.unsaved |= names
-        for read, (row, raw) in zip(reads, values, strict=True):
-            write = partial(write_register, node, row, raw, priority=Priority.CONFIGURATION)
-            differs = partial(_differs, node, row, raw)
-            await verify.write_verified(write, read, raw, node=node.node, what=row.name, differs=differs)
-        await check_all()  # one may have changed another
+        else:
+            for read, (row, raw) in zip(reads, values, strict=True):
+                write = partial(write_register, node, row, raw, priority=Priority.CONFIGURATION)
+                differs = partial(_differs, node, row, raw)
+                await verify.write_verified(write, read, raw, node=node.node, what=row.name, differs=differs)
+            await check_all()  # one may have changed another
+        for name in wanted:
+            node.saved.pop(name, None)
         await save(node)
         await check_all()
-        node.unsaved -= names
+        node.saved |= wanted
 
     await Exclusive(write_and_save())
 
@@ -101,21 +106,21 @@ def _differs(node: Node, row: Register, raw: int, found: int) -> VerificationFai
 async def set_mid_point(node: Node) -> float:
     """Make the present position the zero and save it; return the position (rad) read afterwards, about 0.
 
-    Nothing is written if the servo reads 0 and this node has no unsaved mid point: flash wears. No source says whether
+    Nothing is written if the servo reads 0 and this node has saved its mid point: flash wears. No source says whether
     the servo then moves to its old target: keep clear, and send a target next. The request is never repeated:
     OutcomeUnknown says that the servo may have received it.
     """
     row, profile = feature_row(node, "mid_point", "mid point"), node.profile
 
     async def write_and_save() -> float:
-        if row.name not in node.unsaved and not await position(node):
+        if not await position(node) and row.name in node.saved:
             return 0.0
         node.limits = None
-        node.unsaved.add(row.name)
+        node.saved.pop(row.name, None)
         await write_register(node, row, profile.mid_point_value, priority=Priority.CONFIGURATION)
         await save(node)
         await Sleep(max(0.0, profile.mid_point_wait - profile.flash_wait))
-        node.unsaved.discard(row.name)
+        node.saved[row.name] = profile.mid_point_value
         return await position(node)
 
     return await Exclusive(write_and_save())
