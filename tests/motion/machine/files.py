@@ -199,8 +199,8 @@ UNOPENABLE = (
     Broken("baud=1000000", "baud=fast", "bus.arm.address: baud=fast: not a rate", "bit/s, as 500000"),
     Broken("baud=1000000", "latency=x", "bus.arm.address: latency=x: time 'x' is not", "change it in the address"),
     Broken("baud=1000000", "reconnect=1", "bus.arm.address: reconnect=1: neither yes nor no", "yes or no"),
-    Broken("bitrate=500000", "profile=xq", "bus.gimbal.address: profile=xq: there is no such", "one of kst, "),
-    Broken("bitrate=500000", "sized=2", "bus.gimbal.address: sized=2: there is no such sized", "one of no, yes"),
+    Broken("bitrate=500000", "profile=xq", "bus.gimbal.address: profile=xq is not possible", "one of kst, "),
+    Broken("bitrate=500000", "sized=2", "bus.gimbal.address: sized=2 is not possible", "one of no, yes"),
     # values that simulated devices cannot have
     Broken(FEETECH, "feetech:sim,model=zzz", "bus.arm.address: there is no simulated FEETECH model 'zzz'", "lists"),
     Broken(FEETECH, "feetech:sim,model=sts3216", "bus.arm.address: there is no simulated FEETECH", "perhaps sts3215"),
