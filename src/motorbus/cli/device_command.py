@@ -1,21 +1,23 @@
-"""A command of one family for one device BUS#ID: open its bus, read or write, show the result."""
+"""Commands of one family for one device BUS#ID: open its bus, read or write, show the result."""
 
 from __future__ import annotations
 
-from functools import partial
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+import inspect
+from collections.abc import Callable, Mapping
+from functools import partial, wraps
+from typing import Annotated, Any, Final, Generic, TypeVar
+
+from cyclopts import App, Parameter
 
 from motorbus.cli import dry
 from motorbus.cli.consent import consent_to
 from motorbus.cli.exits import Exit
+from motorbus.cli.output import Output
+from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.target import device, id_shown, opened, target
 from motorbus.errors import RequestError
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from motorbus.cli.output import Output
-
+OptionOfBus: Final = Annotated[str, Parameter(help="Any option of the bus, as --profile kst-ext.")]
 D = TypeVar("D")
 T = TypeVar("T")
 
@@ -44,7 +46,7 @@ class DeviceCommand(Generic[D]):
         self.bus, _, (self.node,) = device(address)
         self.label = f"#{id_shown(self.node, bus.family)}"
         self.schema = f"motorbus.{family}.{name}/1"
-        self.kind, self.output, self.options = kind, output, options
+        self.address, self.kind, self.output, self.options = address, kind, output, options
         self.dry_run, self.yes = dry_run, yes
 
     def read(self, action: Callable[[D], T]) -> T:
@@ -85,3 +87,65 @@ class DeviceCommand(Generic[D]):
         else:
             self.output.text(text)
         return Exit.OK
+
+
+def family_command(
+    app: App, usage: str, text: str, *examples: str
+) -> Callable[[Callable[..., Exit]], Callable[..., Exit]]:
+    """Register a function as a command of a family; `usage` and `examples` stand without `motorbus FAMILY`."""
+    family, name = app.name[0], usage.split()[0]
+    lines = [f"    motorbus {family} {example}" for example in examples]
+    epilogue = "\n".join([text, "", "Examples:", "", *lines]).lstrip()
+    usage = f"Usage: motorbus {family} {usage} [OPTIONS]"
+    return partial(app.command, name=name, usage=usage, help_epilogue=epilogue)
+
+
+def device_command(
+    app: App,
+    kind: Callable[[Any, int], Any],
+    address: object,
+    usage: str,
+    text: str,
+    *examples: str,
+    yes: str = "a permanent change",
+    dry_run: bool = True,
+) -> Callable[[Callable[..., Exit]], Callable[..., Exit]]:
+    """Register a function with a parameter `run`, a `DeviceCommand`, as a command of a family, see `family_command`.
+
+    On the command line BUS#ID (annotated by `address`) has the place of `run`. Every command takes the options of the
+    bus, and those that write --dry-run and, before what `yes` names, --yes.
+    """
+    family, name = app.name[0], usage.split()[0]
+
+    def register(function: Callable[..., Exit]) -> Callable[..., Exit]:
+        own = inspect.signature(function, eval_str=True)
+        parameters = [
+            one.replace(name="address", annotation=address) if one.name == "run" else one
+            for one in own.parameters.values()
+        ]
+        option = partial(inspect.Parameter, kind=inspect.Parameter.KEYWORD_ONLY)
+        if yes:
+            consent = Annotated[Flag, Parameter(help=f"Do not ask before {yes}.")]
+            parameters.append(option("yes", default=False, annotation=consent))
+        if dry_run:
+            parameters.append(option("dry_run", default=False, annotation=DryRun))
+        parameters.append(option("output", annotation=Silent))
+        parameters.append(inspect.Parameter("options", inspect.Parameter.VAR_KEYWORD, annotation=OptionOfBus))
+        whole = own.replace(parameters=parameters)
+
+        @wraps(function)
+        def command(*words: Any, **options: Any) -> Exit:
+            bound = whole.bind(*words, **options)
+            bound.apply_defaults()
+            given = bound.arguments
+            mine = {one: given.pop(one) for one in ("address", "output", "options")}
+            flags = {one: given.pop(one) for one in ("yes", "dry_run") if one in given}
+            given["run"] = DeviceCommand(family, kind, name, **mine, **flags)
+            call = inspect.BoundArguments(own, given)
+            return function(*call.args, **call.kwargs)
+
+        command.__signature__ = whole  # type: ignore[attr-defined]
+        command.__annotations__ = {one.name: one.annotation for one in parameters}
+        return family_command(app, usage, text, *examples)(command)
+
+    return register

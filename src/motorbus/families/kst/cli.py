@@ -10,15 +10,16 @@ from typing import Annotated, Any, Final, Literal
 from cyclopts import App, Group, Parameter
 
 from motorbus.cli import consent, dry, files, identity, quantity, several, target
-from motorbus.cli.device_command import DeviceCommand
+from motorbus.cli.device_command import DeviceCommand, device_command, family_command
 from motorbus.cli.exits import Exit
-from motorbus.cli.parameters import DryRun, Flag, Silent
+from motorbus.cli.parameters import Flag, Silent
 from motorbus.core import units
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import BusDriver
 from motorbus.core.interrupted import Moving, stopped_if_interrupted
 from motorbus.core.register import Register
 from motorbus.core.scan import Skipped
+from motorbus.core.setpoint import Setpoint
 from motorbus.core.steps import Progress, gather
 from motorbus.errors import RequestError
 from motorbus.families.kst import notifications, sdo
@@ -32,8 +33,7 @@ from motorbus.families.kst.profiles import PROFILES, bit_rate_code, current, tem
 
 Device = Annotated[str, Parameter(name="BUS#ID", help="As kst:can://slcan/dev/ttyACM0#0x25.")]
 Switch = Literal["on", "off"]
-Yes = Annotated[Flag, Parameter(help="Do not ask before a permanent change.")]
-BusOption = Annotated[str, Parameter(help="Any option of the bus, as --profile kst-ext.")]
+Run = DeviceCommand[Servo]
 
 app = App(
     name="kst",
@@ -41,14 +41,7 @@ app = App(
     help_epilogue="",
     group_arguments=Group.create_default_parameters(),
 )
-ServoCommand = partial(DeviceCommand, "kst", Servo)
-
-
-def command(usage: str, text: str, *examples: str) -> Callable[[Callable[..., Exit]], Callable[..., Exit]]:
-    """Register a command; usage and examples stand without `motorbus kst`."""
-    lines = [f"    motorbus kst {example}" for example in examples]
-    epilogue = "\n".join([text, "", "Examples:", "", *lines]).lstrip()
-    return partial(app.command, usage=f"Usage: motorbus kst {usage} [OPTIONS]", help_epilogue=epilogue)
+command = partial(device_command, app, Servo, Device)
 
 
 def label(node: int) -> str:
@@ -62,31 +55,27 @@ def label(node: int) -> str:
     "position kst:can://slcan/dev/ttyACM0#0x25 10.9deg",
     "position kst:sim,ids=0x25#0x25 -30deg --wait",
     "position kst:sim,ids=0x25#0x25 90deg --dry-run",
+    yes="a move of over 180 degrees",
 )
 def position(
-    address: Device,
+    run: Run,
     value: Annotated[str, Parameter(name="VALUE", help="Target in rad, or as 90deg; without it, read.")] = "",
     /,
     *,
     wait: Annotated[Flag, Parameter(help="Return when the servo has arrived.")] = False,
-    yes: Annotated[Flag, Parameter(help="Do not ask before a move of over 180 degrees.")] = False,
-    dry_run: DryRun = False,
-    output: Silent,
-    **options: BusOption,
 ) -> Exit:
     """Read the position of a servo, or move it."""
-    run = ServoCommand("position", address, output, options, dry_run=dry_run)
     if not value:
         here = run.read(lambda servo: servo.position())
         return run.show({"position": here}, units.show(here, "position"))
     goal = units.parse(value, "position")
-    if dry_run:
+    if run.dry_run:
         run.write(lambda servo: servo.move(goal, wait=False))
         return Exit.OK
-    with target.opened(run.bus, options, output) as bus:
+    with target.opened(run.bus, run.options, run.output) as bus:
         servo = Servo(bus, run.node)
         rehearse = partial(Servo(dry.DryBus(bus), run.node).move, goal, wait=False)
-        consent.consent_to_ways([(servo, goal)], output, yes=yes, rehearse=rehearse)
+        consent.consent_to_ways([(servo, goal)], run.output, yes=run.yes, rehearse=rehearse)
         servo.move(goal, wait=wait)
         here = servo.position()
     shown = {"goal": units.show(goal, "position"), "position": units.show(here, "position")}
@@ -99,25 +88,30 @@ def position(
     "by the frame that reads the position. Other profiles: current and temperature.",
     "status kst:can://slcan/dev/ttyACM0#0x25",
     "status kst:sim,ids=0x25,profile=kst-ext#0x25",
+    yes="",
+    dry_run=False,
 )
-def status(address: Device, /, *, output: Silent, **options: BusOption) -> Exit:
+def status(run: Run, /) -> Exit:
     """Read the status of a servo."""
-    run = ServoCommand("status", address, output, options)
     found = run.read(lambda servo: servo.status())
     if isinstance(found, feedback.RawStatus):
         run.show(found._asdict(), X1=f"0x{found.x1:02X}", X2=f"0x{found.x2:02X}")
-        output.note(f"warning: {found.warning}")
+        run.output.note(f"warning: {found.warning}")
         return Exit.OK
     names = ("current", "temperature")
     return run.show(found._asdict(), **{name: units.show(getattr(found, name), name) for name in names})
 
 
 @command(
-    "version BUS#ID", "", "version kst:can://slcan/dev/ttyACM0#0x25", "version kst:sim,ids=0x25#0x25 --json"
+    "version BUS#ID",
+    "",
+    "version kst:can://slcan/dev/ttyACM0#0x25",
+    "version kst:sim,ids=0x25#0x25 --json",
+    yes="",
+    dry_run=False,
 )
-def version(address: Device, /, *, output: Silent, **options: BusOption) -> Exit:
+def version(run: Run, /) -> Exit:
     """Read the firmware version of a servo."""
-    run = ServoCommand("version", address, output, options)
     text = run.read(lambda servo: servo.version())
     return run.show({"version": text}, text)
 
@@ -130,24 +124,18 @@ def version(address: Device, /, *, output: Silent, **options: BusOption) -> Exit
     "node-id kst:sim,ids=0x25#0x25 0x26 --dry-run",
 )
 def node_id(
-    address: Device,
+    run: Run,
     new: Annotated[str, Parameter(name="NEW", help="New id, 1 to 127; without it, read.")] = "",
     /,
-    *,
-    yes: Yes = False,
-    dry_run: DryRun = False,
-    output: Silent,
-    **options: BusOption,
 ) -> Exit:
     """Read the id that a servo has or will have, or write another one."""
-    run = ServoCommand("node-id", address, output, options, dry_run=dry_run, yes=yes)
     if not new:
         found = run.read(lambda servo: servo.node_id())
         pending = "" if found == run.node else f"; it answers as {run.label} until it is restarted"
         return run.show({"reads_back": found}, f"{label(found)}{pending}")
     wanted = checked_id(identity.id_said(new))
     run.write(lambda servo: servo.set_node_id(wanted), f"write the id {label(wanted)}")
-    return show_pending(run, address, wanted, f"the id {label(wanted)}")
+    return show_pending(run, wanted, f"the id {label(wanted)}")
 
 
 @command(
@@ -158,29 +146,23 @@ def node_id(
     "bit-rate kst:sim,ids=0x25#0x25 250k --dry-run",
 )
 def bit_rate(
-    address: Device,
+    run: Run,
     rate: Annotated[str, Parameter(name="RATE", help="20k 50k 100k 125k 250k 500k 800k or 1000k")] = "",
     /,
-    *,
-    yes: Yes = False,
-    dry_run: DryRun = False,
-    output: Silent,
-    **options: BusOption,
 ) -> Exit:
     """Read the bit rate that a servo will have, or write another one."""
-    run = ServoCommand("bit-rate", address, output, options, dry_run=dry_run, yes=yes)
     if not rate:
         found = run.read(lambda servo: servo.bit_rate())
         text = f"{found} bit/s" if found else "not readable: the manual has no command for it"
         return run.show({"bitrate": found}, text)
     wanted = parse_bit_rate(rate)
     run.write(lambda servo: servo.set_bit_rate(wanted), f"write the bit rate {wanted} bit/s")
-    return show_pending(run, address, wanted, f"the bit rate {wanted} bit/s")
+    return show_pending(run, wanted, f"the bit rate {wanted} bit/s")
 
 
-def show_pending(run: DeviceCommand[Servo], address: str, wanted: int, value: str) -> Exit:
+def show_pending(run: Run, wanted: int, value: str) -> Exit:
     """Show what was written and takes effect after a save and a restart."""
-    text = f"written: {run.label} has {value} after `motorbus kst save {address}` and a power cycle"
+    text = f"written: {run.label} has {value} after `motorbus kst save {run.address}` and a power cycle"
     facts = {"new": wanted, "in_force": False, "next": ["save", "power-cycle"]}
     return run.show(facts, f"{text}; without a save it is lost")
 
@@ -198,11 +180,8 @@ def parse_bit_rate(text: str) -> int:
     "save kst:can://slcan/dev/ttyACM0#0x25 --yes",
     "save kst:sim,ids=0x25#0x25 --dry-run",
 )
-def save(
-    address: Device, /, *, yes: Yes = False, dry_run: DryRun = False, output: Silent, **options: BusOption
-) -> Exit:
+def save(run: Run, /) -> Exit:
     """Save id, bit rate, limits and function bits of a servo."""
-    run = ServoCommand("save", address, output, options, dry_run=dry_run, yes=yes)
     run.write(lambda servo: servo.save(), "save its settings")
     text = f"sent to {run.label}; a save has no reply: only a power cycle shows what was saved"
     return run.show({"sent": True, "confirmed": None}, text)
@@ -215,19 +194,14 @@ def save(
     "provision kst:sim,ids=0x25#0x25 --new-id 0x26 --dry-run",
 )
 def provision(
-    address: Device,
+    run: Run,
     /,
     *,
     new_id: Annotated[str, Parameter(help="New id, 1 to 127.")] = "",
     new_bitrate: Annotated[str, Parameter(help="New bit rate, as 1000000 or 1M.")] = "",
     timeout: Annotated[str, Parameter(help="Time to wait for the power cycle.")] = "120s",
-    yes: Yes = False,
-    dry_run: DryRun = False,
-    output: Silent,
-    **options: BusOption,
 ) -> Exit:
     """Write id and bit rate, save, wait for a power cycle, and verify."""
-    run = ServoCommand("provision", address, output, options, dry_run=dry_run, yes=yes)
     wanted: dict[str, int] = {}
     if new_id:
         wanted["new_id"] = checked_id(identity.id_said(new_id))
@@ -245,25 +219,25 @@ def provision(
             servo.set_bit_rate(wanted["new_rate"])
         servo.save()
 
-    if dry_run:
+    if run.dry_run:
         run.write(write)
-        output.text("then: power cycle, and a check of the new values")
+        run.output.text("then: power cycle, and a check of the new values")
         return Exit.OK
     values = [f"the id {label(wanted['new_id'])}"] if new_id else []
     values += [f"the bit rate {wanted['new_rate']} bit/s"] if new_bitrate else []
 
     def show_step(event: object) -> None:
         if isinstance(event, Progress):
-            output.document(run.schema, {"event": "progress", **event._asdict()})
+            run.output.document(run.schema, {"event": "progress", **event._asdict()})
         if isinstance(event, provisioning.PowerCycleNeeded):
-            output.document(run.schema, {"event": "power-cycle", **event._asdict()})
+            run.output.document(run.schema, {"event": "power-cycle", **event._asdict()})
 
-    with target.opened(run.bus, options, output) as bus:
+    with target.opened(run.bus, run.options, run.output) as bus:
         rehearse = partial(write, Servo(dry.DryBus(bus), run.node))
         question = f"{run.label}: write and save {' and '.join(values)}"
-        consent.consent_to(question, output, yes=yes, rehearse=rehearse)
+        consent.consent_to(question, run.output, yes=run.yes, rehearse=rehearse)
         done: provisioning.Provisioned = identity.carried_out(
-            bus, run.node, "provision", output=output, report=show_step, timeout=seconds, **wanted
+            bus, run.node, "provision", output=run.output, report=show_step, timeout=seconds, **wanted
         )
     result = "had these values already" if done.resumed else "came back after the power cycle"
     text = f"{label(done.node)} {result}: it answers at {done.rate} bit/s, firmware {done.firmware}"
@@ -278,19 +252,16 @@ def provision(
     "reports on kst:can://slcan/dev/ttyACM0#1 --profile kst-ext",
     "reports on kst:sim,profile=kst-ext#1 --interval 10ms",
     "reports off kst:sim,profile=kst-ext#1",
+    yes="",
 )
 def reports(
     switch: Switch,
-    address: Device,
+    run: Run,
     /,
     *,
     interval: Annotated[str, Parameter(help="Time between two reports, as 10ms.")] = "",
-    dry_run: DryRun = False,
-    output: Silent,
-    **options: BusOption,
 ) -> Exit:
     """Start or stop the position reports of a servo."""
-    run = ServoCommand("reports", address, output, options, dry_run=dry_run)
     seconds = units.parse(interval, "time") if interval else None
     on = switch == "on"
     run.write(lambda servo: servo.start_reports(seconds) if on else servo.stop_reports())
@@ -304,13 +275,10 @@ def reports(
     "mid-point kst:sim,profile=kst-ext#1 --yes",
     "mid-point kst:sim,profile=kst-ext#1 --dry-run",
 )
-def mid_point(
-    address: Device, /, *, yes: Yes = False, dry_run: DryRun = False, output: Silent, **options: BusOption
-) -> Exit:
+def mid_point(run: Run, /) -> Exit:
     """Make the present position of a servo its zero, and save it."""
-    run = ServoCommand("mid-point", address, output, options, dry_run=dry_run, yes=yes)
     here = run.write(lambda servo: servo.set_mid_point(), "make its present position its zero, and save it")
-    if dry_run:
+    if run.dry_run:
         return Exit.OK
     text = f"{run.label} reads {units.show(here, 'position')} at its new zero; the save has no reply"
     return run.show({"position": here}, text)
@@ -323,18 +291,12 @@ def mid_point(
     "limits kst:sim,profile=kst-ext#1 -45deg 45deg --yes",
 )
 def limits(
-    address: Device,
+    run: Run,
     low: Annotated[str, Parameter(name="LOW", help="At most 0, in rad or as -45deg.")] = "",
     high: Annotated[str, Parameter(name="HIGH", help="At least 0.")] = "",
     /,
-    *,
-    yes: Yes = False,
-    dry_run: DryRun = False,
-    output: Silent,
-    **options: BusOption,
 ) -> Exit:
     """Read the travel limits of a servo, or write and save them."""
-    run = ServoCommand("limits", address, output, options, dry_run=dry_run, yes=yes)
     if bool(low) != bool(high):
         raise RequestError("one limit alone", expected="both, as -45deg 45deg", advice="nothing was sent")
     if low:
@@ -353,18 +315,8 @@ def limits(
     "reverse kst:sim,profile=kst-ext#1",
     "reverse kst:sim,profile=kst-ext#1 on --yes",
 )
-def reverse(
-    address: Device,
-    switch: Switch | None = None,
-    /,
-    *,
-    yes: Yes = False,
-    dry_run: DryRun = False,
-    output: Silent,
-    **options: BusOption,
-) -> Exit:
+def reverse(run: Run, switch: Switch | None = None, /) -> Exit:
     """Read the reverse bit of a servo, or write and save it."""
-    run = ServoCommand("reverse", address, output, options, dry_run=dry_run, yes=yes)
     if switch is None:
         on = run.read(lambda servo: servo.reversed())
     else:
@@ -373,7 +325,9 @@ def reverse(
     return run.show({"reversed": on}, f"{run.label} turns {'in reverse' if on else 'as shipped'}")
 
 
-@command("eds", "", "eds --output kst.eds", "eds --profile xqpower --with-mandatory > xqpower.eds")
+@family_command(
+    app, "eds", "", "eds --output kst.eds", "eds --profile xqpower --with-mandatory > xqpower.eds"
+)
 def eds(
     *,
     profile: Annotated[str, Parameter(help=f"One of {', '.join(PROFILES)}.")] = "kst",
@@ -413,7 +367,6 @@ COMMANDS: Final = {
     "set_reversed()": "`motorbus kst reverse BUS#ID on|off`",
     "set_reversed(False)": "`motorbus kst reverse BUS#ID off`",
     "reversed()": "`motorbus kst reverse BUS#ID`",
-    "isolated=True": "`motorbus scan BUS --bitrate all`",
 }
 CUT_OFF: Final = (
     "repeat `motorbus set-id`, `motorbus set-baud` or `motorbus kst provision`: it reads the state of the servo and "
@@ -499,25 +452,20 @@ def move_together(bus: Any, goals: Mapping[int, float], *, wait: bool = True) ->
 
     Errors as `Servo.move` raises.
     """
-    several.carried_out(bus, _move_together([Servo(bus, node) for node in goals], list(goals.values()), wait))
+    servos = [Servo(bus, node) for node in goals]
 
-
-async def _move_together(servos: Sequence[Servo], positions: Sequence[float], wait: bool) -> None:
-    pairs = [
-        (servo, await motion.setpoint(servo, motion.target(servo, position)))
-        for servo, position in zip(servos, positions, strict=True)
-    ]
-    if not wait:
-        for servo, goal in pairs:
-            await motion.send_target(servo, goal)
-        return
-
-    async def send_and_wait() -> None:
-        for number, (servo, goal) in enumerate(pairs):
+    async def send_and_wait(targets: Sequence[Setpoint]) -> None:
+        for number, (servo, goal) in enumerate(zip(servos, targets, strict=True)):
             send = motion.send_target(servo, goal)
-            await (several.or_all_stop(send) if number else send)
-        arrivals = [motion.wait_arrival(servo, goal.value, motion.TOLERANCE, None) for servo, goal in pairs]
-        await gather(*map(several.or_all_stop, arrivals))
+            await (several.or_all_stop(send) if number and wait else send)
+        if wait:
+            arrivals = map(motion.wait_arrival, servos, [goal.value for goal in targets])
+            await gather(*map(several.or_all_stop, arrivals))
 
-    moving = [Moving(one, partial(motion.stop, one), partial(feedback.position, one)) for one in servos]
-    await stopped_if_interrupted(send_and_wait(), *moving)
+    async def move() -> None:
+        raws = map(motion.target, servos, goals.values())
+        targets = [await motion.setpoint(servo, raw) for servo, raw in zip(servos, list(raws), strict=True)]
+        moving = [Moving(one, partial(motion.stop, one), partial(feedback.position, one)) for one in servos]
+        await (stopped_if_interrupted(send_and_wait(targets), *moving) if wait else send_and_wait(targets))
+
+    several.carried_out(bus, move())

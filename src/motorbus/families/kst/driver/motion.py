@@ -78,7 +78,9 @@ async def move(
     await stopped_if_interrupted(send_and_wait(), device)
 
 
-async def wait_arrival(node: Node, goal: float, tolerance: float, timeout: float | None) -> None:
+async def wait_arrival(
+    node: Node, goal: float, tolerance: float = TOLERANCE, timeout: float | None = None
+) -> None:
     """Wait until the servo is in position. Raises Stalled, or MotionError after `timeout` s."""
 
     async def sample() -> State:
