@@ -28,6 +28,7 @@ from tests.cli.conftest import Run
             "`motorbus kst node-id BUS#ID 38` and `motorbus kst save` put",
         ),
         ("kst", "set_reversed(False) first", "`motorbus kst reverse BUS#ID off` first"),
+        ("kst", "say isolated=True; nothing", "say `motorbus scan BUS --bitrate all`; nothing"),
         ("feetech", "write(operating_mode=0) puts", "`motorbus write BUS#ID operating_mode=0` puts"),
         ("feetech", "set_mode('position') first", "`motorbus feetech mode BUS#ID position` first"),
         ("feetech", "set_torque_limit(1.0); more", "`motorbus feetech torque-limit BUS#ID 1.0`; more"),

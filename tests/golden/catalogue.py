@@ -32,7 +32,6 @@ EXCLUDED = {
     "kst": {
         "settings_of": "settings of an open bus; sends nothing",
         "raw": "converts a value; sends nothing",
-        "value": "converts a value; sends nothing",
     },
     "stepper": {
         "raw": "converts a value; sends nothing",

@@ -355,7 +355,8 @@ def eds(
     return Exit.OK
 
 
-# -- functions for common commands, see motorbus.cli.faces -------------------------------------------------------------
+# -- what the commands of all families (motorbus scan, read, move, budget, ...) use of this family ---------------------
+# `motorbus.cli.faces` finds it by name.
 
 COMMANDS: Final = {
     "set_node_id()": "`motorbus kst node-id BUS#ID NEW`",
@@ -367,15 +368,19 @@ COMMANDS: Final = {
     "set_reversed()": "`motorbus kst reverse BUS#ID on|off`",
     "set_reversed(False)": "`motorbus kst reverse BUS#ID off`",
     "reversed()": "`motorbus kst reverse BUS#ID`",
+    "isolated=True": "`motorbus scan BUS --bitrate all`",
 }
+"""Words of an error of the Python API -> the command that does the same; {} stands for the argument."""
 CUT_OFF: Final = (
     "repeat `motorbus set-id`, `motorbus set-baud` or `motorbus kst provision`: it reads the state of the servo and "
     "continues; nothing was sent"
 )
 
+"""Advice after a change was interrupted."""
+
 
 def say(event: object) -> str:
-    """The text of an event of a scan or of `provision`; "" if it has none."""
+    """The text that a command prints for an event of a scan or of `provision`; "": none."""
     if isinstance(event, Suspicion):
         place = f"#{event.node} " if event.node else ""
         return f"{place}at {event.rate} bit/s: {event.what}"
@@ -387,7 +392,7 @@ def say(event: object) -> str:
 
 
 def meaning(row: Register, raw: int) -> str:
-    """The raw value of an object in words."""
+    """For `motorbus read`: the raw value of an object in words."""
     if row.name in ("firmware_version", "software_version"):
         return version_text(raw.to_bytes(row.size, "little"))
     for profile in PROFILES.values():
@@ -398,16 +403,18 @@ def meaning(row: Register, raw: int) -> str:
 
 
 def ping_everyone(bus: Any) -> list[int]:
-    """The ids of the servos that answer one broadcast read."""
+    """For `motorbus ping BUS`: the ids of the servos that answer one broadcast read."""
     return sorted(bus.run(broadcast_read("node_id", settings_of(bus))))
 
 
 def detect_bit_rate(
     bus: Any, seconds: float, report: Callable[[object], None]
 ) -> tuple[int | None, dict[int, str]]:
-    """Listen `seconds` at each bit rate; the rate of the bus, and the activity at each rate.
+    """For `motorbus scan --listen`: listen `seconds` at each bit rate, without sending.
 
-    A rate that the adapter lacks is reported. Raises RequestError if it can listen at none.
+    Returns the rate of the bus (None: not known) and, by rate, what was received.
+
+    A rate that the adapter lacks is reported. Raises RequestError if the adapter can listen at none.
     """
     skipped: dict[int, str] = {}
 
@@ -422,23 +429,28 @@ def detect_bit_rate(
 
 
 def budget_frames(driver: BusDriver, node: int) -> Mapping[str, tuple[Sequence[CanFrame], ...]]:
-    """Requests and replies of a control loop, for every position: `write` a target, `read` the position."""
+    """For `motorbus budget`: the requests and replies of a control loop, with every position that they may carry.
+
+    "write" sends a target and receives its acknowledgement, "read" receives the position.
+    """
     assert isinstance(driver, KstDriver)
     settings = driver.settings
-    extended, sized = settings.extended, settings.sized
-    goal, present = settings.profile.table["goal_position"], settings.profile.table["present_position"]
-    written, read = (node, goal.address, 0), (node, present.address, 0)
-    positions = [goal.encode(raw) for raw in range(goal.low, goal.high + 1)]
-    goals = [sdo.encode_download(*written, data, sized=sized, extended=extended) for data in positions]
-    replies = [sdo.encode_upload_reply(*read, data, extended=extended) for data in positions]
+    goal, present = (settings.profile.table[name] for name in ("goal_position", "present_position"))
+    raws = range(goal.low, goal.high + 1)
+    targets = [settings.download(node, goal, raw) for raw in raws]
+    acknowledgement = sdo.encode_download_reply(node, goal.address, 0, extended=settings.extended)
+    positions = [
+        sdo.encode_upload_reply(node, present.address, 0, goal.encode(raw), extended=settings.extended)
+        for raw in raws
+    ]
     return {
-        "write": (goals, [sdo.encode_download_reply(*written, extended=extended)]),
-        "read": ([sdo.encode_upload(*read, extended=extended)], replies),
+        "write": (targets, [acknowledgement]),
+        "read": ([settings.upload(node, present)], positions),
     }
 
 
 def report_frames(driver: BusDriver, node: int) -> list[CanFrame]:
-    """A report of every position."""
+    """For `motorbus budget`: a report of every position."""
     assert isinstance(driver, KstDriver)
     settings = driver.settings
     profile, extended = settings.profile, settings.extended
@@ -448,9 +460,9 @@ def report_frames(driver: BusDriver, node: int) -> list[CanFrame]:
 
 
 def move_together(bus: Any, goals: Mapping[int, float], *, wait: bool = True) -> None:
-    """Move servos to these targets (rad by id) after all are checked; if one does not answer, all stop.
+    """For `motorbus move` with several servos: move them to these targets (rad by id) after all are checked.
 
-    Errors as `Servo.move` raises.
+    With `wait`, an interrupt or a servo that does not answer stops all. Errors as `Servo.move` raises.
     """
     servos = [Servo(bus, node) for node in goals]
 

@@ -52,9 +52,6 @@ class Start(NamedTuple):
 
 def encode_report(node: int, raw: int, *, form: str = "sdo", extended: bool = False) -> CanFrame:
     """A position (raw counts) under 0x580 + node, or with `form` "pdo" under 0x180 + node."""
-    sdo.check_node(node)
-    if form not in REPORT_FORMS or not -0x8000 <= raw <= 0x7FFF:
-        raise RequestError(f"no {form} report of {raw}", expected="sdo or pdo, -32768 to 32767 counts")
     return CanFrame(REPORT_FORMS[form] + node, raw.to_bytes(2, "little", signed=True) + b"\0\0", extended)
 
 
@@ -65,15 +62,11 @@ def decode_report(data: bytes) -> int:
 
 def encode_alarm(node: int, data: bytes = LOW_VOLTAGE, *, extended: bool = False) -> CanFrame:
     """An alarm of 4 bytes."""
-    sdo.check_node(node)
-    if len(data) != REPORT_LENGTH:
-        raise RequestError(f"an alarm has not {len(data)} bytes", expected="4 bytes")
     return CanFrame(ALARM + node, data, extended)
 
 
 def encode_boot(node: int, *, extended: bool = False) -> CanFrame:
     """The heartbeat of a node that has just started."""
-    sdo.check_node(node)
     return CanFrame(HEARTBEAT + node, b"\0", extended)
 
 
@@ -82,7 +75,6 @@ def encode_start(form: str, node: int, on: bool, *, extended: bool = False) -> C
 
     "vendor": identifier = node, `01 00` or `02 00`. "standard": NMT of CiA 301, identifier 0, `01 node` or `02 node`.
     """
-    sdo.check_node(node, lowest=sdo.BROADCAST)
     if form not in START_FORMS:
         raise RequestError(f"there is no start form {form!r}", expected="vendor or standard")
     command = 1 if on else 2

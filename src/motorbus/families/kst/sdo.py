@@ -7,13 +7,14 @@ Byte 0, the specifier: bits 7 to 5 are the kind; bit 1 (e): the data are in this
 stated, bits 3 and 2 (n): how many of the four data bytes are unused. Reserved bits are ignored (CiA 301).
 
 Source: KST CAN protocol manual, commands 1 to 9; CiA 301 for the specifier and for transfers in segments. Frames from a
-device never raise an error here; arguments that no frame can carry raise RequestError.
+device never raise an error here. An id above 127 raises RequestError.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from struct import pack
 from typing import Final, NamedTuple
 
 from motorbus.core.can_frame import CanFrame
@@ -30,7 +31,6 @@ SEGMENT_BYTES: Final = 7
 
 UPLOAD: Final = 0x40
 DOWNLOAD_UNSIZED: Final = 0x22
-DOWNLOAD_SIZED: Final = {1: 0x2F, 2: 0x2B, 3: 0x27, 4: 0x23}
 DOWNLOADED: Final = 0x60
 SEGMENT: Final = 0x60
 ABORT: Final = 0x80
@@ -77,27 +77,27 @@ class SdoReply(NamedTuple):
 
 def encode_upload(node: int, index: int, subindex: int = 0, *, extended: bool = False) -> CanFrame:
     """Read an object of one node or of all (0): `40 il ih sub 00 00 00 00`. `extended`: 29-bit identifier."""
-    return _frame(REQUEST, node, _head(UPLOAD, index, subindex), extended, lowest=BROADCAST)
+    return _frame(REQUEST, node, _head(UPLOAD, index, subindex), extended)
 
 
 def encode_download(
     node: int, index: int, subindex: int, data: bytes, *, sized: bool = False, extended: bool = False
 ) -> CanFrame:
     """Write 1 to 4 bytes to an object of one node or of all (0): specifier 0x22, or `sized` as in CiA 301."""
-    if not 1 <= len(data) <= EXPEDITED:
-        raise RequestError(f"{len(data)} bytes cannot be written in one frame", expected="1 to 4 bytes")
-    specifier = DOWNLOAD_SIZED[len(data)] if sized else DOWNLOAD_UNSIZED
-    return _frame(REQUEST, node, _head(specifier, index, subindex) + data, extended, lowest=BROADCAST)
+    specifier = DOWNLOAD_UNSIZED
+    if sized:
+        specifier |= (EXPEDITED - len(data)) << 2 | _S
+    return _frame(REQUEST, node, _head(specifier, index, subindex) + data, extended)
 
 
 def encode_segment(node: int, toggle: int, *, extended: bool = False) -> CanFrame:
     """Request the next segment of an upload; `toggle` is 0 for the first segment, then alternates."""
-    return _frame(REQUEST, node, bytes((SEGMENT | _toggle_bit(toggle),)), extended)
+    return _frame(REQUEST, node, bytes((SEGMENT | toggle << 4,)), extended)
 
 
 def encode_abort(node: int, index: int, subindex: int, code: int, *, extended: bool = False) -> CanFrame:
     """Abort a transfer as the client; it has no reply."""
-    return _frame(REQUEST, node, _head(ABORT, index, subindex) + _four_bytes(code), extended)
+    return _frame(REQUEST, node, _head(ABORT, index, subindex) + code.to_bytes(4, "little"), extended)
 
 
 def decode_request(frame: CanFrame) -> SdoRequest | None:
@@ -152,20 +152,12 @@ def decode_reply(data: bytes) -> SdoReply | None:
     return SdoReply(kind, index, subindex, code=int.from_bytes(rest, "little") if kind == "abort" else 0)
 
 
-def upload_head(index: int, subindex: int, size: int) -> bytes:
-    """The first four bytes of an upload of `size` bytes that states its length; b"" if one reply cannot carry it."""
-    if not 1 <= size <= EXPEDITED:
-        return b""
-    return _head(0x40 | (EXPEDITED - size) << 2 | _E | _S, index, subindex)
-
-
 def encode_upload_reply(
     node: int, index: int, subindex: int, data: bytes, *, extended: bool = False
 ) -> CanFrame:
     """The value of an object, 1 to 4 bytes: specifier 4F, 4B, 47, 43."""
-    if not 1 <= len(data) <= EXPEDITED:
-        raise RequestError(f"{len(data)} bytes do not fit one reply", expected="1 to 4 bytes")
-    return _frame(REPLY, node, upload_head(index, subindex, len(data)) + data, extended)
+    specifier = UPLOAD | (EXPEDITED - len(data)) << 2 | _E | _S
+    return _frame(REPLY, node, _head(specifier, index, subindex) + data, extended)
 
 
 def encode_upload_start(
@@ -174,16 +166,14 @@ def encode_upload_start(
     """Announce segments of `size` bytes in all: specifier 41; 40 without a stated size (None)."""
     if size is None:
         return _frame(REPLY, node, _head(UPLOAD, index, subindex), extended)
-    return _frame(REPLY, node, _head(UPLOAD | _S, index, subindex) + _four_bytes(size), extended)
+    return _frame(REPLY, node, _head(UPLOAD | _S, index, subindex) + size.to_bytes(4, "little"), extended)
 
 
 def encode_segment_reply(
     node: int, toggle: int, data: bytes, last: bool, *, extended: bool = False
 ) -> CanFrame:
     """One segment of at most 7 bytes, with the toggle of its request."""
-    if len(data) > SEGMENT_BYTES:
-        raise RequestError(f"{len(data)} bytes do not fit a segment", expected="0 to 7 bytes")
-    specifier = _toggle_bit(toggle) | (SEGMENT_BYTES - len(data)) << 1 | int(last)
+    specifier = toggle << 4 | (SEGMENT_BYTES - len(data)) << 1 | last
     return _frame(REPLY, node, bytes((specifier,)) + data, extended)
 
 
@@ -196,43 +186,21 @@ def encode_abort_reply(
     node: int, index: int, subindex: int, code: int, *, extended: bool = False
 ) -> CanFrame:
     """Refuse a request: `80 il ih sub` and the code. Source: KST CAN protocol manual, command 9."""
-    return _frame(REPLY, node, _head(ABORT, index, subindex) + _four_bytes(code), extended)
+    return _frame(REPLY, node, _head(ABORT, index, subindex) + code.to_bytes(4, "little"), extended)
 
 
-def check_node(node: int, *, lowest: int = 1) -> None:
-    """Raise RequestError for a node that no identifier has; with `lowest` 0, all nodes may be addressed."""
-    if not lowest <= node < NODES.stop:
-        raise RequestError(f"{node} is not a node id", expected=f"{lowest} to 127", node=node)
-
-
-def _frame(base: int, node: int, data: bytes, extended: bool, *, lowest: int = 1) -> CanFrame:
-    check_node(node, lowest=lowest)
+def _frame(base: int, node: int, data: bytes, extended: bool) -> CanFrame:
+    if not BROADCAST <= node < NODES.stop:
+        raise RequestError(f"{node} is not a node id", expected="0 to 127", node=node)
     return CanFrame(base + node, data.ljust(LENGTH, b"\0"), extended)
 
 
 def _head(specifier: int, index: int, subindex: int) -> bytes:
-    if not (0 <= index <= 0xFFFF and 0 <= subindex <= 0xFF):
-        raise RequestError(
-            f"object 0x{index:X}:{subindex} is impossible",
-            expected="an index of 0 to 0xFFFF and a sub-index of 0 to 255",
-        )
-    return bytes((specifier, index & 0xFF, index >> 8, subindex))
-
-
-def _four_bytes(number: int) -> bytes:
-    if not 0 <= number <= 0xFFFF_FFFF:
-        raise RequestError(f"{number} does not fit 32 bits", expected="0 to 0xFFFFFFFF")
-    return number.to_bytes(4, "little")
+    return pack("<BHB", specifier, index, subindex)
 
 
 def _size(specifier: int) -> int:
     return EXPEDITED - (specifier >> 2 & 3)
-
-
-def _toggle_bit(toggle: int) -> int:
-    if toggle not in (0, 1):
-        raise RequestError(f"toggle {toggle} is impossible", expected="0 or 1")
-    return toggle << 4
 
 
 @dataclass(slots=True, eq=False)

@@ -30,7 +30,7 @@ async def read(node: Node, /, *names: str) -> dict[str, Value]:
     Raises RequestError for an unknown or write-only name, DeviceError for a named object that the servo refuses.
     """
     raws = await read_raw(node, *names)
-    return {name: node.value(node.table[name], raw) for name, raw in raws.items()}
+    return {name: node.table[name].to_value(raw) for name, raw in raws.items()}
 
 
 async def read_raw(node: Node, /, *names: str) -> dict[str, int]:

@@ -102,10 +102,6 @@ class Node:
         state = self.settings.state
         return () if state is None else state.alarm(self.node, self.at)
 
-    def value(self, row: Register, raw: int) -> Value:
-        """Raw value of an object -> value in the unit of the row."""
-        return row.to_value(raw)
-
     def raw(self, row: Register, value: Value) -> int:
         """Value in the unit of the row -> raw value. Raises RequestError if not finite, or an angle out of range."""
         if row.unit == "rad" and is_number(value):

@@ -38,20 +38,22 @@ class Event(NamedTuple):
 
     `frame`  None: a report, made when it is sent
     `servo`  None: an error frame of the adapter
-    `life`   counter of the servo when the event was made: its restarts for a frame, the starts and stops of its
-             reports for a report. If it has changed, the event is void
+    `epoch`  number of losses of supply of the servo (for a report: of changes of its reports) when the event was made;
+             if it has changed since, the event is void
     """
 
     when: float
     order: int
     servo: Servo | None
     frame: CanFrame | None
-    life: int
+    epoch: int
 
     @property
     def is_void(self) -> bool:
         servo = self.servo
-        return servo is not None and self.life != (servo.lives if self.frame else servo.reports)
+        return servo is not None and self.epoch != (
+            servo.power_losses if self.frame else servo.report_changes
+        )
 
 
 class KstBus:
@@ -154,7 +156,7 @@ class KstBus:
     # -- frames of the servos ------------------------------------------------------------------------------------
 
     def _send(self, servo: Servo | None, when: float, frame: CanFrame | None) -> None:
-        current = 0 if servo is None else servo.lives if frame else servo.reports
+        current = 0 if servo is None else servo.power_losses if frame else servo.report_changes
         heappush(self._events, Event(when, next(self._order), servo, frame, current))
 
     def _begin(self, at: float) -> None:

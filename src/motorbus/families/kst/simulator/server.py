@@ -33,7 +33,7 @@ class SdoServer:
 
     def __init__(self, servo: Servo) -> None:
         self._servo = servo
-        self._life = 0
+        self._losses_seen = 0
         self._busy_until = -inf
         self._transfer: tuple[sdo.SdoRequest, bytes, int] | None = None
         """Upload in segments: its request, the bytes left, the next toggle."""
@@ -41,19 +41,19 @@ class SdoServer:
     def receive(self, request: sdo.SdoRequest, at: float) -> None:
         """Carry out a request and reply, one after the other. More requests than `MAILBOX` are lost."""
         servo = self._servo
-        if self._life != servo.lives:
-            self._life, self._busy_until, self._transfer = servo.lives, -inf, None
+        if self._losses_seen != servo.power_losses:
+            self._losses_seen, self._busy_until, self._transfer = servo.power_losses, -inf, None
         if self._busy_until - at > MAILBOX * TURNAROUND:
             return
         servo.extended = request.extended
-        reply = (
-            None if servo.flash.saving(at) else self._answer(request, at)
-        )  # lost (flight-controller driver)
+        if servo.flash.saving(at):
+            return  # lost (flight-controller driver)
+        reply = self._answer(request, at)
         is_read = request.kind != "download"
         if reply is None or (request.node == sdo.BROADCAST and is_read and not servo.quirks.broadcast_read):
             return
         self._busy_until = max(at, self._busy_until) + TURNAROUND
-        servo.send(reply, self._busy_until + servo.delay)
+        servo.send(servo, self._busy_until + servo.delay, reply)
 
     def _answer(self, request: sdo.SdoRequest, at: float) -> CanFrame | None:
         """The reply to this request, None for no reply."""

@@ -31,17 +31,17 @@ DRIVE: Final = Drive(top_speed=1.0, idle_current=0.2, stall_current=2.5)  # curr
 class Servo(PoweredDevice):
     """A simulated servo.
 
-    `unit`      its number on this bus, from 1, whatever its id becomes
-    `node`      the id it answers to; `bit_rate` its rate (bit/s)
-    `values`    raw values by name, in force until the next restart; "zero" is the place of the shaft that reads 0
-    `motion`    of the shaft, in raw counts
-    `errors`    bus errors since its restart
-    `started`   a start was received
-    `lives`     number of losses of supply; what was to be sent before is not sent
-    `reports`   number of changes of its reports; the next one is due by the last change only
-    `delay`     s added to its replies
-    `temperature` (°C) and `load` (-1 to 1, a share of full torque) may be set
-    `extended`  the last request had a 29-bit identifier: unsolicited frames then have one as well
+    `unit`            its number on this bus, from 1, whatever its id becomes
+    `node`            the id it answers to; `bit_rate` its rate (bit/s)
+    `values`          raw values by name, in force until the next restart; "zero" is the place of the shaft that reads 0
+    `motion`          of the shaft, in raw counts
+    `errors`          bus errors since its restart
+    `started`         a start was received
+    `power_losses`    number of losses of supply; what was to be sent before is not sent
+    `report_changes`  number of starts and stops of its reports; the next report is due by the last one only
+    `delay`           s added to its replies
+    `temperature`     (°C) and `load` (-1 to 1, a share of full torque) may be set
+    `extended`        the last request had a 29-bit identifier: unsolicited frames then have one as well
 
     `send(servo, time, frame)` sends a frame that starts at this time; without a frame `report` makes it then.
     """
@@ -60,12 +60,12 @@ class Servo(PoweredDevice):
         self.bit_rate = quirks.bit_rate
         self.profile = profile
         self.quirks = quirks
-        self.errors = self.lives = self.reports = 0
+        self.errors = self.power_losses = self.report_changes = 0
         self.delay = self.load = 0.0
         self.temperature = 25.0
         self.extended = quirks.id_format == "ext"
         self._now = now
-        self._send = send
+        self.send = send
         self._voltage = 7.4
         self.motion = rest(now(), quirks.position)
         self._shipped = {row.name: row.default or 0 for row in profile.table.values()} | {
@@ -97,7 +97,7 @@ class Servo(PoweredDevice):
         """Send an alarm of four bytes now."""
         if self.plugged:
             frame = notifications.encode_alarm(self.node, data, extended=self.extended)
-            self._send(self, self._now(), frame)
+            self.send(self, self._now(), frame)
 
     def status(self) -> dict[str, object]:
         """Its state as plain data; positions in raw counts."""
@@ -253,7 +253,7 @@ class Servo(PoweredDevice):
         now = self._now()
         self.motion = rest(now, self.motion.position(now))
         self.flash.cut(now, self.quirks.flash_cut)
-        self.lives += 1
+        self.power_losses += 1
         self.set_reporting(False, now)
 
     def power_on(self) -> None:
@@ -265,8 +265,8 @@ class Servo(PoweredDevice):
         self.errors, self.started = 0, False
         self._interval = (self.quirks.reports_ms or self.values["report_interval"]) / 1000
         self.set_reporting(self.quirks.reports_ms > 0, at)
-        if self.quirks.boot_notice and self.lives:
-            self._send(self, at, notifications.encode_boot(self.node, extended=self.extended))
+        if self.quirks.boot_notice and self.power_losses:
+            self.send(self, at, notifications.encode_boot(self.node, extended=self.extended))
         if self._voltage < LOW_VOLTAGE:
             self.alarm()
 
@@ -280,15 +280,11 @@ class Servo(PoweredDevice):
     def set_reporting(self, on: bool, at: float) -> None:
         """Start or stop the reports; a start begins a new interval."""
         self.reporting = on
-        self.reports += 1
+        self.report_changes += 1
         if on and self._interval:
-            self._send(self, at + self._interval, None)
+            self.send(self, at + self._interval, None)
 
     def report(self, at: float) -> CanFrame:
         """The report that is due, under 0x580 + id; XQPOWER sends another one under 0x180 + id, which is left out."""
-        self._send(self, at + self._interval, None)
+        self.send(self, at + self._interval, None)
         return notifications.encode_report(self.node, self._reading(at), extended=self.extended)
-
-    def send(self, frame: CanFrame, at: float) -> None:
-        """Send a frame that starts at this time."""
-        self._send(self, at, frame)
