@@ -107,13 +107,13 @@ def device_command(
     usage: str,
     text: str,
     *examples: str,
-    yes: str = "a permanent change",
+    consent: str = "a permanent change",
     dry_run: bool = True,
 ) -> Callable[[Callable[..., Exit]], Callable[..., Exit]]:
     """Register a function with a parameter `run`, a `DeviceCommand`, as a command of a family, see `family_command`.
 
     On the command line BUS#ID (annotated by `address`) has the place of `run`. Every command takes the options of the
-    bus, and those that write --dry-run and, before what `yes` names, --yes.
+    bus; those that write take --dry-run and, unless `consent` is empty, --yes: do not ask before `consent`.
     """
     family, name = app.name[0], usage.split()[0]
 
@@ -124,9 +124,9 @@ def device_command(
             for one in own.parameters.values()
         ]
         option = partial(inspect.Parameter, kind=inspect.Parameter.KEYWORD_ONLY)
-        if yes:
-            consent = Annotated[Flag, Parameter(help=f"Do not ask before {yes}.")]
-            parameters.append(option("yes", default=False, annotation=consent))
+        if consent:
+            yes = Annotated[Flag, Parameter(help=f"Do not ask before {consent}.")]
+            parameters.append(option("yes", default=False, annotation=yes))
         if dry_run:
             parameters.append(option("dry_run", default=False, annotation=DryRun))
         parameters.append(option("output", annotation=Silent))

@@ -5,12 +5,12 @@ from __future__ import annotations
 import motorbus
 from motorbus.cli.feetech.offers import say
 from motorbus.core.steps import Progress
-from motorbus.families.feetech.driver import Skipped, Suspicion
+from motorbus.families.feetech.driver import ScanWarning, Skipped
 from tests.cli.conftest import Run
 
 
 def test_events_in_words() -> None:
-    assert say(Suspicion(3, 1_000_000, 8, garbled=4)) == (
+    assert say(ScanWarning(3, 1_000_000, 8, garbled=4)) == (
         "#3 at 1000000 bit/s: two servos seem to have this id (of 8 answers 4 garbled); connect them one at a time"
     )
     assert say(Skipped(76_800, "no such rate")) == "nothing was asked at 76800 bit/s: no such rate"

@@ -9,7 +9,7 @@ from motorbus.core.family import Found
 from motorbus.core.request import Priority, TimeoutClass
 from motorbus.core.steps import Progress
 from motorbus.errors import ChecksumError, LinkError, LinkLost, RequestError
-from motorbus.families.feetech.driver import Skipped, Suspicion, scan
+from motorbus.families.feetech.driver import ScanWarning, Skipped, scan
 from motorbus.families.feetech.driver.scanning import DRAIN
 from tests.families.feetech.driver_script import PING, Line, Played, packet, play, reads, unheard, watch
 
@@ -77,7 +77,7 @@ def test_answers_that_stay_garbled_are_two_servos_with_one_id() -> None:
     ]
     played = Played([damaged, damaged, Line(tells(1).sent, ChecksumError("c")), *garbled])
     assert played.run(scan([1])) == [Found(1, 1_000_000, None)]
-    (seen,) = [event for event in played.events if isinstance(event, Suspicion)]
+    (seen,) = [event for event in played.events if isinstance(event, ScanWarning)]
     assert (seen.node, seen.rate, seen.garbled, seen.suspected) == (1, 1_000_000, 8, True)
 
 
@@ -89,7 +89,7 @@ def test_whoever_is_found_may_be_asked_whether_it_is_alone() -> None:
         with motorbus.open(simulation.url) as bus:
             found = bus.run(bus.driver.scan((1, 2, 3)), report=events.append)
     assert [(one.node, one.identity is not None) for one in found] == [(1, True), (2, True)]
-    assert [event.node for event in events if isinstance(event, Suspicion)] == [1]
+    assert [event.node for event in events if isinstance(event, ScanWarning)] == [1]
 
 
 def test_a_rate_that_the_link_lacks_is_skipped_and_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ import motorbus
 from motorbus.core.request import Effect
 from motorbus.core.steps import Progress
 from motorbus.errors import NoReply, RequestError
-from motorbus.families.feetech.driver import Node, Suspicion, duplicates
+from motorbus.families.feetech.driver import Node, ScanWarning, duplicates
 from motorbus.families.feetech.driver.sharing import POLLS
 from motorbus.link.base import Side
 from motorbus.simulation.named import Simulation
@@ -24,7 +24,7 @@ LATE = 254
 """2 µs each: register 7 of one of the two; its answers begin when those of the other have ended."""
 
 
-def asked(simulation: Simulation, polls: int = POLLS) -> Suspicion:
+def asked(simulation: Simulation, polls: int = POLLS) -> ScanWarning:
     with motorbus.open(simulation.url) as bus:
         return bus.run(duplicates(Node(3), polls))
 
@@ -123,12 +123,12 @@ def test_a_second_answer_and_other_contents_are_evidence() -> None:
 
 
 def test_a_few_garbled_answers_may_be_noise() -> None:
-    assert not Suspicion(3, 1_000_000, 200, garbled=3).suspected
-    assert Suspicion(3, 1_000_000, 200, garbled=4).suspected
-    assert Suspicion(3, 1_000_000, 200, doubled=1, changed=1).suspected
-    assert Suspicion(3, 1_000_000, 8, garbled=2).suspected
-    assert not Suspicion(3, 1_000_000, 200, silent=50).suspected
-    assert "none was garbled" in Suspicion(3, 1_000_000, 200).evidence
+    assert not ScanWarning(3, 1_000_000, 200, garbled=3).suspected
+    assert ScanWarning(3, 1_000_000, 200, garbled=4).suspected
+    assert ScanWarning(3, 1_000_000, 200, doubled=1, changed=1).suspected
+    assert ScanWarning(3, 1_000_000, 8, garbled=2).suspected
+    assert not ScanWarning(3, 1_000_000, 200, silent=50).suspected
+    assert "none was garbled" in ScanWarning(3, 1_000_000, 200).evidence
 
 
 @pytest.mark.parametrize("seed", range(6))

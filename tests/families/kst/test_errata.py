@@ -10,7 +10,7 @@ from math import radians
 import pytest
 
 from motorbus.errors import DeviceError, LimitExceeded, NoReply, OutcomeUnknown, RequestError
-from motorbus.families.kst import PowerCycleNeeded, RawStatus, Skipped, Status, Suspicion, broadcast_read
+from motorbus.families.kst import PowerCycleNeeded, RawStatus, ScanWarning, Skipped, Status, broadcast_read
 from motorbus.families.kst.profiles import RATES
 from tests.families.kst.bench import Answers, Bench
 from tests.simulators.kst.host import SAVE, frame
@@ -195,7 +195,7 @@ def test_erratum_20_two_servos_with_one_id_get_no_other(delay: float) -> None:
             bench.servo().set_node_id(9)
         assert bench.written() == []
         bench.bus.run(bench.bus.driver.scan((5,)))
-        assert "two servos with one id" in bench.of(Suspicion)[0].what
+        assert "two servos with one id" in bench.of(ScanWarning)[0].what
 
 
 def test_erratum_21_scan_of_other_rates_listens_before_it_sends() -> None:

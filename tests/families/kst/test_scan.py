@@ -9,7 +9,7 @@ import pytest
 from motorbus.core.family import Found
 from motorbus.core.steps import Progress
 from motorbus.errors import LinkError, LinkLost, RequestError
-from motorbus.families.kst import LineActivity, Skipped, Suspicion, scan, scan_bit_rates
+from motorbus.families.kst import LineActivity, ScanWarning, Skipped, scan, scan_bit_rates
 from motorbus.families.kst.profiles import RATES
 from motorbus.link.memory import MemoryLink
 from tests.families.kst.bench import Bench, NoErrorFrames, NoListening
@@ -45,32 +45,32 @@ def test_scan_reports_an_id_that_needs_a_restart(ids: tuple[int, ...]) -> None:
         (found,) = bench.bus.run(bench.bus.driver.scan(ids))
         assert found.identity is not None
         assert found.identity.details["reads_back_id"] == 9
-        (suspicion,) = bench.of(Suspicion)
-        assert suspicion.node == 5
-        assert "reads back the id 9" in suspicion.what
+        (warning,) = bench.of(ScanWarning)
+        assert warning.node == 5
+        assert "reads back the id 9" in warning.what
 
 
-def test_scan_suspects_duplicates_without_bus_errors() -> None:
+def test_scan_warns_of_duplicates_without_bus_errors() -> None:
     with Bench(5, 5, 6, line=NoErrorFrames()) as bench:
         bench.simulator.servos[1].raw_position = 3
         assert run_scan(bench) == [(5, 500_000), (6, 500_000)]
-        (suspicion,) = bench.of(Suspicion)
-        assert "its position never" in suspicion.what
+        (warning,) = bench.of(ScanWarning)
+        assert "never of its position" in warning.what
 
 
 @pytest.mark.parametrize(("sent", "accepted"), [("std", "ext"), ("ext", "std")])
 def test_scan_without_a_reply_names_the_other_id_format(sent: str, accepted: str) -> None:
     with Bench(settings={"id_format": sent}, id_format=accepted) as bench:
         assert run_scan(bench) == []
-        (suspicion,) = bench.of(Suspicion)
-        assert "id_format=ext" in suspicion.what
+        (warning,) = bench.of(ScanWarning)
+        assert "id_format=ext" in warning.what
 
 
 def test_scan_of_a_silent_bus_loses_one_frame_at_each_named_rate() -> None:
     with Bench(bit_rate=250_000) as bench:
         wrong = [rate for rate in RATES if rate not in (250_000, 500_000)]
         assert run_scan(bench, (5,), (*wrong, 250_000)) == [(5, 250_000)]
-        assert [one[:2] for one in bench.of(Suspicion)] == [(0, rate) for rate in wrong]
+        assert [one[:2] for one in bench.of(ScanWarning)] == [(0, rate) for rate in wrong]
         assert bench[5].status()["errors"] == len(wrong)
     with Bench(bit_rate=250_000, link=NoListening) as bench:
         assert run_scan(bench, (5,), (125_000, 250_000)) == [(5, 250_000)]

@@ -94,7 +94,7 @@ def test_options_have_help_source_and_a_default_that_text_can_give() -> None:
         ({"profile": "futaba"}, "kst, kst-ext, kingmax, xqpower"),
         ({"firmware": "1.ü"}, "one or more printable ASCII"),
         ({"duplicate": "twice"}, "0x25+0x26"),
-        ({"duplicate": "0x80"}, "1 to 127"),
+        ({"duplicate": "0x80"}, "one of [1]"),
         ({"reports_ms": "0.01"}, "0, or 0.1"),
     ],
     ids=str,

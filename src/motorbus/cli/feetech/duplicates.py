@@ -48,7 +48,7 @@ def duplicates(device_: Device, /, *, polls: int = POLLS, output: Silent, **opti
     return Exit.OK
 
 
-def _asked(servo: driver.Servo, polls: int, output: Output) -> driver.Suspicion:
+def _asked(servo: driver.Servo, polls: int, output: Output) -> driver.ScanWarning:
     bus = servo.bus
     with output.progress("asking") as bar:
 

@@ -16,7 +16,7 @@ def say(event: object) -> str:
     """What an event of a scan, a change or a move says, in words; "" for one that says nothing to people."""
     if isinstance(event, driver.Powerless | driver.TorqueAfterWrite):
         return str(event)
-    if isinstance(event, driver.Suspicion):
+    if isinstance(event, driver.ScanWarning):
         return (
             f"#{event.node} at {event.rate} bit/s: two servos seem to have this id ({event.evidence}); "
             "connect them one at a time"

@@ -30,7 +30,7 @@ from motorbus.families.kst.driver.feedback import RawStatus, Status
 from motorbus.families.kst.driver.motion import Promise, Started
 from motorbus.families.kst.driver.node import ID_FORMATS, NMT, SIZED, BusSettings, Node
 from motorbus.families.kst.driver.provisioning import PowerCycleNeeded, Provisioned
-from motorbus.families.kst.driver.scan import BitRates, LineActivity, Suspicion, scan, scan_bit_rates
+from motorbus.families.kst.driver.scan import BitRates, LineActivity, ScanWarning, scan, scan_bit_rates
 from motorbus.families.kst.driver.servo import AsyncServo, Servo, settings_of
 from motorbus.families.kst.profiles import DEFAULT_RATE, PROFILES, RATES, TABLES
 
@@ -46,11 +46,11 @@ __all__ = [
     "Promise",
     "Provisioned",
     "RawStatus",
+    "ScanWarning",
     "Servo",
     "Skipped",
     "Started",
     "Status",
-    "Suspicion",
     "broadcast_bit_rate",
     "broadcast_node_id",
     "broadcast_position",

@@ -27,7 +27,7 @@ from motorbus.families.kst.driver import feedback, motion, provisioning
 from motorbus.families.kst.driver.broadcast import broadcast_read
 from motorbus.families.kst.driver.bus import KstDriver
 from motorbus.families.kst.driver.node import checked_id
-from motorbus.families.kst.driver.scan import Suspicion, scan_bit_rates
+from motorbus.families.kst.driver.scan import ScanWarning, scan_bit_rates
 from motorbus.families.kst.driver.servo import Servo, settings_of
 from motorbus.families.kst.profiles import PROFILES, bit_rate_code, current, temperature, version_text
 
@@ -42,6 +42,8 @@ app = App(
     group_arguments=Group.create_default_parameters(),
 )
 command = partial(device_command, app, Servo, Device)
+"""Register a command: usage, note, examples. It is run with a `Run`: `write` asks for consent, or shows the frames of a
+dry run; `show` prints the result, in a dry run nothing. Without `consent` the command has no --yes."""
 
 
 def label(node: int) -> str:
@@ -55,7 +57,7 @@ def label(node: int) -> str:
     "position kst:can://slcan/dev/ttyACM0#0x25 10.9deg",
     "position kst:sim,ids=0x25#0x25 -30deg --wait",
     "position kst:sim,ids=0x25#0x25 90deg --dry-run",
-    yes="a move of over 180 degrees",
+    consent="a move of over 180 degrees",
 )
 def position(
     run: Run,
@@ -84,11 +86,12 @@ def position(
 
 @command(
     "status BUS#ID",
-    "By the profile `kst`, the manual, a status is two bytes without a meaning, read\n"
-    "by the frame that reads the position. Other profiles: current and temperature.",
+    "By the profile `kst`, the manual, the status is two bytes without a documented\n"
+    "meaning, read by the frame that reads the position. Other profiles: current and\n"
+    "temperature.",
     "status kst:can://slcan/dev/ttyACM0#0x25",
     "status kst:sim,ids=0x25,profile=kst-ext#0x25",
-    yes="",
+    consent="",
     dry_run=False,
 )
 def status(run: Run, /) -> Exit:
@@ -98,8 +101,8 @@ def status(run: Run, /) -> Exit:
         run.show(found._asdict(), X1=f"0x{found.x1:02X}", X2=f"0x{found.x2:02X}")
         run.output.note(f"warning: {found.warning}")
         return Exit.OK
-    names = ("current", "temperature")
-    return run.show(found._asdict(), **{name: units.show(getattr(found, name), name) for name in names})
+    celsius = units.show(found.temperature, "temperature")
+    return run.show(found._asdict(), current=units.show(found.current, "current"), temperature=celsius)
 
 
 @command(
@@ -107,7 +110,7 @@ def status(run: Run, /) -> Exit:
     "",
     "version kst:can://slcan/dev/ttyACM0#0x25",
     "version kst:sim,ids=0x25#0x25 --json",
-    yes="",
+    consent="",
     dry_run=False,
 )
 def version(run: Run, /) -> Exit:
@@ -153,7 +156,7 @@ def bit_rate(
     """Read the bit rate that a servo will have, or write another one."""
     if not rate:
         found = run.read(lambda servo: servo.bit_rate())
-        text = f"{found} bit/s" if found else "not readable: the manual has no command for it"
+        text = f"{found} bit/s" if found is not None else "not readable: the manual has no command for it"
         return run.show({"bitrate": found}, text)
     wanted = parse_bit_rate(rate)
     run.write(lambda servo: servo.set_bit_rate(wanted), f"write the bit rate {wanted} bit/s")
@@ -170,7 +173,7 @@ def show_pending(run: Run, wanted: int, value: str) -> Exit:
 def parse_bit_rate(text: str) -> int:
     """Parse 500000, 500k or 1M. Raises RequestError for a rate that these servos do not have."""
     rate = units.rate(text)
-    bit_rate_code(rate)
+    bit_rate_code(rate)  # raises
     return rate
 
 
@@ -203,10 +206,13 @@ def provision(
 ) -> Exit:
     """Write id and bit rate, save, wait for a power cycle, and verify."""
     wanted: dict[str, int] = {}
+    values: list[str] = []
     if new_id:
         wanted["new_id"] = checked_id(identity.id_said(new_id))
+        values.append(f"the id {label(wanted['new_id'])}")
     if new_bitrate:
         wanted["new_rate"] = parse_bit_rate(new_bitrate)
+        values.append(f"the bit rate {wanted['new_rate']} bit/s")
     if not wanted:
         raise RequestError("no new id and no new bit rate", expected="--new-id, --new-bitrate, or both")
     seconds = units.parse(timeout, "time")
@@ -223,14 +229,11 @@ def provision(
         run.write(write)
         run.output.text("then: power cycle, and a check of the new values")
         return Exit.OK
-    values = [f"the id {label(wanted['new_id'])}"] if new_id else []
-    values += [f"the bit rate {wanted['new_rate']} bit/s"] if new_bitrate else []
 
     def show_step(event: object) -> None:
-        if isinstance(event, Progress):
-            run.output.document(run.schema, {"event": "progress", **event._asdict()})
-        if isinstance(event, provisioning.PowerCycleNeeded):
-            run.output.document(run.schema, {"event": "power-cycle", **event._asdict()})
+        if isinstance(event, (Progress, provisioning.PowerCycleNeeded)):
+            name = "progress" if isinstance(event, Progress) else "power-cycle"
+            run.output.document(run.schema, {"event": name, **event._asdict()})
 
     with target.opened(run.bus, run.options, run.output) as bus:
         rehearse = partial(write, Servo(dry.DryBus(bus), run.node))
@@ -248,11 +251,11 @@ def provision(
 @command(
     "reports on|off BUS#ID",
     "Not in the manual; a profile without it refuses. By the profile xqpower, `on`\n"
-    "also lets the servo move, and after `off` it ignores positions.",
+    "also lets the servo move, and after `off` it ignores target positions.",
     "reports on kst:can://slcan/dev/ttyACM0#1 --profile kst-ext",
     "reports on kst:sim,profile=kst-ext#1 --interval 10ms",
     "reports off kst:sim,profile=kst-ext#1",
-    yes="",
+    consent="",
 )
 def reports(
     switch: Switch,
@@ -279,7 +282,7 @@ def mid_point(run: Run, /) -> Exit:
     """Make the present position of a servo its zero, and save it."""
     here = run.write(lambda servo: servo.set_mid_point(), "make its present position its zero, and save it")
     if run.dry_run:
-        return Exit.OK
+        return Exit.OK  # it has no position to show
     text = f"{run.label} reads {units.show(here, 'position')} at its new zero; the save has no reply"
     return run.show({"position": here}, text)
 
@@ -332,7 +335,9 @@ def eds(
     *,
     profile: Annotated[str, Parameter(help=f"One of {', '.join(PROFILES)}.")] = "kst",
     node: Annotated[str, Parameter(help="The id in the sheet.")] = "0x25",
-    with_mandatory: Annotated[Flag, Parameter(help="Add three objects of CiA 301 that they lack.")] = False,
+    with_mandatory: Annotated[
+        Flag, Parameter(help="Add three objects of CiA 301 that the servos lack.")
+    ] = False,
     output_: Annotated[Path | None, Parameter(help="File to write; without it, stdout.")] = None,
     output: Silent,
 ) -> Exit:
@@ -370,18 +375,18 @@ COMMANDS: Final = {
     "reversed()": "`motorbus kst reverse BUS#ID`",
     "isolated=True": "`motorbus scan BUS --bitrate all`",
 }
-"""Words of an error of the Python API -> the command that does the same; {} stands for the argument."""
+"""A call in an error text, or its start up to the bracket for any arguments -> the command that does the same; {}
+stands for these arguments."""
 CUT_OFF: Final = (
     "repeat `motorbus set-id`, `motorbus set-baud` or `motorbus kst provision`: it reads the state of the servo and "
     "continues; nothing was sent"
 )
-
-"""Advice after a change was interrupted."""
+"""Advice of `motorbus recover`, which sends nothing to these servos."""
 
 
 def say(event: object) -> str:
     """The text that a command prints for an event of a scan or of `provision`; "": none."""
-    if isinstance(event, Suspicion):
+    if isinstance(event, ScanWarning):
         place = f"#{event.node} " if event.node else ""
         return f"{place}at {event.rate} bit/s: {event.what}"
     if isinstance(event, Skipped):
@@ -440,7 +445,7 @@ def budget_frames(driver: BusDriver, node: int) -> Mapping[str, tuple[Sequence[C
     targets = [settings.download(node, goal, raw) for raw in raws]
     acknowledgement = sdo.encode_download_reply(node, goal.address, 0, extended=settings.extended)
     positions = [
-        sdo.encode_upload_reply(node, present.address, 0, goal.encode(raw), extended=settings.extended)
+        sdo.encode_upload_reply(node, present.address, 0, present.encode(raw), extended=settings.extended)
         for raw in raws
     ]
     return {
@@ -466,18 +471,22 @@ def move_together(bus: Any, goals: Mapping[int, float], *, wait: bool = True) ->
     """
     servos = [Servo(bus, node) for node in goals]
 
-    async def send_and_wait(targets: Sequence[Setpoint]) -> None:
-        for number, (servo, goal) in enumerate(zip(servos, targets, strict=True)):
-            send = motion.send_target(servo, goal)
-            await (several.or_all_stop(send) if number and wait else send)
-        if wait:
-            arrivals = map(motion.wait_arrival, servos, [goal.value for goal in targets])
-            await gather(*map(several.or_all_stop, arrivals))
+    async def send_and_wait(setpoints: Sequence[Setpoint]) -> None:
+        for servo, setpoint in zip(servos, setpoints, strict=True):
+            await several.or_all_stop(motion.send_target(servo, setpoint))
+        arrivals = map(motion.wait_arrival, servos, [setpoint.value for setpoint in setpoints])
+        await gather(*map(several.or_all_stop, arrivals))
 
     async def move() -> None:
-        raws = map(motion.target, servos, goals.values())
-        targets = [await motion.setpoint(servo, raw) for servo, raw in zip(servos, list(raws), strict=True)]
-        moving = [Moving(one, partial(motion.stop, one), partial(feedback.position, one)) for one in servos]
-        await (stopped_if_interrupted(send_and_wait(targets), *moving) if wait else send_and_wait(targets))
+        raws = [motion.target(servo, to) for servo, to in zip(servos, goals.values(), strict=True)]
+        setpoints = [await motion.setpoint(servo, raw) for servo, raw in zip(servos, raws, strict=True)]
+        if wait:
+            moving = [
+                Moving(one, partial(motion.stop, one), partial(feedback.position, one)) for one in servos
+            ]
+            await stopped_if_interrupted(send_and_wait(setpoints), *moving)
+            return
+        for servo, setpoint in zip(servos, setpoints, strict=True):
+            await motion.send_target(servo, setpoint)
 
     several.carried_out(bus, move())

@@ -56,7 +56,7 @@ from motorbus.families.feetech.driver.restoring import factory_restore
 from motorbus.families.feetech.driver.scanning import GLANCE, Skipped, scan
 from motorbus.families.feetech.driver.second import second_id, set_second_id
 from motorbus.families.feetech.driver.servo import AsyncServo, Servo, ServoMethods
-from motorbus.families.feetech.driver.sharing import Suspicion, duplicates
+from motorbus.families.feetech.driver.sharing import ScanWarning, duplicates
 from motorbus.families.feetech.driver.states import States, sync_read_raw, sync_read_states
 from motorbus.families.feetech.driver.torque import (
     disable_torque,
@@ -92,12 +92,12 @@ __all__ = [
     "Protection",
     "Recounted",
     "Recovery",
+    "ScanWarning",
     "Servo",
     "ServoMethods",
     "Settings",
     "Skipped",
     "States",
-    "Suspicion",
     "SyncWriter",
     "TorqueAfterWrite",
     "TorqueLimit",

@@ -17,7 +17,7 @@ from motorbus.errors import LinkLost, MotorbusError, NoReply, WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.identity import identify, ping_exchange
 from motorbus.families.feetech.driver.node import Node, as_nodes
-from motorbus.families.feetech.driver.sharing import Suspicion, duplicates
+from motorbus.families.feetech.driver.sharing import ScanWarning, duplicates
 
 DRAIN: Final = 0.02
 """s of quiet at a new rate: one that was busy may answer what it has buffered in a burst. Source: feetech-cli."""
@@ -36,7 +36,7 @@ async def scan(ids: Sequence[int] = (), rates: Sequence[int] = (), *, polls: int
     """Every servo that answers, with what it is; `ids` () means 0 to 253, `rates` () the present rate alone.
 
     The present rate of the bus is set again at the end, whatever happens. Reports `Found` as soon as one answers
-    (its identity is asked afterwards), `Progress`, a `Suspicion` where two servos seem to share an id, and `Skipped`
+    (its identity is asked afterwards), `Progress`, a `ScanWarning` where two servos seem to share an id, and `Skipped`
     for a rate that the link does not have. Each that is found is asked `polls` times whether it is alone; one whose
     answers are garbled in any case, and it counts as found, without an identity, when they stay so. Writes nothing.
     """
@@ -100,13 +100,13 @@ async def _shared(id: int, polls: int) -> bool:
     seen = await catch(_asked(id, polls))
     if isinstance(seen, LinkLost):
         raise seen
-    if not isinstance(seen, Suspicion) or not seen.suspected:
+    if not isinstance(seen, ScanWarning) or not seen.suspected:
         return False
     await Emit(seen)
     return True
 
 
-async def _asked(id: int, polls: int) -> Suspicion | None:
+async def _asked(id: int, polls: int) -> ScanWarning | None:
     """As `duplicates`, without its progress: that of the scan goes on."""
     if polls:
         return await duplicates(Node(id), polls, quiet=True)

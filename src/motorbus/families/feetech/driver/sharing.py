@@ -34,7 +34,7 @@ ENOUGH: Final = 10
 _ID: Final = 5
 
 
-class Suspicion(NamedTuple):
+class ScanWarning(NamedTuple):
     """What `polls` questions to one id at one rate (bit/s) have shown.
 
     That nothing was seen proves nothing: two servos with equal contents and equal timing answer as one.
@@ -77,7 +77,7 @@ class Suspicion(NamedTuple):
         return f"of {self.polls} answers {told or 'none was garbled, doubled or different'}"
 
 
-async def duplicates(node: Node, polls: int = POLLS, *, quiet: bool = False) -> Suspicion:
+async def duplicates(node: Node, polls: int = POLLS, *, quiet: bool = False) -> ScanWarning:
     """Does more than one servo answer to this id? Asks at most `polls` times, fewer when it is plain; writes nothing.
 
     Reports `Progress` unless `quiet`. Raises NoReply when there was no answer at all, RequestError for fewer polls
@@ -87,7 +87,7 @@ async def duplicates(node: Node, polls: int = POLLS, *, quiet: bool = False) -> 
         raise RequestError(
             f"{polls} polls", expected=f"1 to {MOST}", advice="nothing was sent", node=node.node
         )
-    seen = Suspicion(node.node, await SetBitrate(0), 0)
+    seen = ScanWarning(node.node, await SetBitrate(0), 0)
     first = b""
     silence: MotorbusError | None = None
     for number in range(polls):
@@ -112,7 +112,7 @@ async def duplicates(node: Node, polls: int = POLLS, *, quiet: bool = False) -> 
 
 
 def _told(answers: Sequence[bytes] | MotorbusError, first: bytes | None) -> str:
-    """Which count of a `Suspicion` this is, "" for what one servo does; `first` is what it cannot differ from."""
+    """Which count of a `ScanWarning` this is, "" for what one servo does; `first` is what it cannot differ from."""
     if isinstance(answers, WireError):
         return "garbled"
     if isinstance(answers, NoReply):

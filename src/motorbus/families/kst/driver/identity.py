@@ -88,7 +88,7 @@ async def set_node_id(node: Node, new: int) -> None:
     checked_id(new)
     if not await Exclusive(answers_alone(node)):
         await ask_presence(node)  # raises NoReply
-    if new != node.node and (await look(Node(new, node.settings))).replies:
+    if new != node.node and (await count_replies(Node(new, node.settings))).replies:
         raise id_taken(node.node, new)
     await write_node_id(node, new)
 
@@ -140,7 +140,7 @@ def set_bit_rate(node: Node, rate: int) -> Request[None]:
 # -- one servo or two ------------------------------------------------------------------------------------------
 
 
-class Look(NamedTuple):
+class ReplyCount(NamedTuple):
     """Result of one read: the node, the number of replies, the id read back (None: not read), and the time (s)."""
 
     node: int
@@ -149,14 +149,14 @@ class Look(NamedTuple):
     at: float
 
 
-def look(node: Node, name: str = "node_id") -> Request[Look]:
+def count_replies(node: Node, name: str = "node_id") -> Request[ReplyCount]:
     """Read an object once and count the replies; silence is a result."""
     row = node.table[name]
 
-    def decode(answer: Response) -> Look:
+    def decode(answer: Response) -> ReplyCount:
         replies = [reply for reply in decoded(answer) if reply.index in (row.address, 0)]  # 0: some aborts
         ids = [reply.data[0] for reply in replies if reply.kind == "upload" and name == "node_id"]
-        return Look(node.node, len(replies), ids[0] if ids else None, answer.at)
+        return ReplyCount(node.node, len(replies), ids[0] if ids else None, answer.at)
 
     return Request(node.settings.upload(node.node, row), ANY, decode, lane=node.node)
 
@@ -167,7 +167,7 @@ async def survey(node: Node) -> tuple[bool, str]:
     async def read_often() -> dict[str, list[int]]:
         counts: dict[str, list[int]] = {name: [] for name in OBJECTS}
         for name in OBJECTS * ROUNDS:
-            counts[name].append((await look(node, name)).replies)
+            counts[name].append((await count_replies(node, name)).replies)
         return counts
 
     counts, error = await gather(read_often(), WaitFor(is_bus_error, ERROR_TIME))

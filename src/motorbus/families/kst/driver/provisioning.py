@@ -16,11 +16,11 @@ from motorbus.core.scan import BitrateRestored
 from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate, Sleep
 from motorbus.errors import NoReply, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.kst.driver.identity import (
-    Look,
+    ReplyCount,
     answers_alone,
+    count_replies,
     id_taken,
     identify,
-    look,
     set_bit_rate,
     survey,
     write_node_id,
@@ -118,7 +118,7 @@ class Change:
         async with BitrateRestored():
             await Emit(Progress(0, STEPS, "looking for the servo"))
             node, rate, _ = await self._find()
-            before = await look(node)
+            before = await count_replies(node)
             if (node, rate) == (self.new, self.new_rate):
                 return None
             if rate != self.new_rate:
@@ -128,7 +128,7 @@ class Change:
                 await write_node_id(node, self.new.node)
             if rate != self.new_rate:
                 await set_bit_rate(node, self.new_rate)
-            written = await look(node)
+            written = await count_replies(node)
             await Emit(Progress(2, STEPS, "saving"))
             await save(node)
             return Place(node, rate, written.reads_back)
@@ -174,11 +174,11 @@ class Change:
         begun = await Sleep(0)
         silent = 0
         while True:
-            now = await self._look(place.node, place.rate)
+            now = await self._count_replies(place.node, place.rate)
             arrived = False
             if not now.replies or place.rate == self.new_rate:
                 with suppress(RequestError):  # the bus is in use at the old rate
-                    arrived = (await self._look(self.new, self.new_rate)).replies > 0
+                    arrived = (await self._count_replies(self.new, self.new_rate)).replies > 0
             if arrived and not now.replies:
                 return
             pending = now.reads_back == new != old  # it has not restarted
@@ -203,15 +203,15 @@ class Change:
                 )
             await Sleep(PERIOD)
 
-    async def _look(self, node: Node, rate: int) -> Look:
+    async def _count_replies(self, node: Node, rate: int) -> ReplyCount:
         """Read the id once; at another rate than that of the bus with the bus reserved."""
 
-        async def at_other_rate() -> Look:
+        async def at_other_rate() -> ReplyCount:
             async with BitrateRestored():
                 await set_named_rate(node.settings, rate)
-                return await look(node)
+                return await count_replies(node)
 
-        return await (look(node) if rate == self.rate else Exclusive(at_other_rate()))
+        return await (count_replies(node) if rate == self.rate else Exclusive(at_other_rate()))
 
     async def verify(self, place: Place | None) -> str:
         """Check that one servo answers at the new place, and none at the old one. Returns its firmware version."""
@@ -220,7 +220,7 @@ class Change:
             if self.new_rate != self.rate:
                 await SetBitrate(self.new_rate)
             moved = place is not None and place.rate == self.new_rate and place.node is not self.new
-            if place is not None and moved and (await look(place.node)).replies:
+            if place is not None and moved and (await count_replies(place.node)).replies:
                 raise self._answers_at_both(place.node.node)
             _, second = await survey(self.new)
             if second:

@@ -1,11 +1,13 @@
 """Find servos, and the bit rate of a bus.
 
-A scan reads the node id, first by one broadcast that all servos answer, then of each silent id. It writes nothing: a
-write to the target position presets the encoder of some servos. An abort counts as presence.
+A scan reads the node id: of all servos by one broadcast, then of each id that did not answer. It writes nothing: a
+write to the target position presets the encoder of some servos. An abort is an answer too. Source of the broadcast: a
+public demo driver.
 
-A frame at a wrong bit rate breaks the traffic of the others. So at another rate the adapter first listens, without
-acknowledging: a whole frame proves the rate, errors disprove it, silence proves nothing; slcan reports no errors.
-Source of the broadcast: a public demo driver; the rest: CiA 301.
+A frame at a wrong bit rate destroys frames of other devices. So at another rate the adapter first listens, without
+acknowledging: a valid frame proves the rate, errors disprove it, silence proves nothing; slcan reports no errors.
+
+The `lane` of a reply is the id of the servo that sent it.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate, WaitFor, 
 from motorbus.errors import LinkError, LinkLost, NoReply, RequestError, WireError
 from motorbus.families.kst import sdo
 from motorbus.families.kst.driver.feedback import position
-from motorbus.families.kst.driver.identity import identify, is_bus_error, look
+from motorbus.families.kst.driver.identity import count_replies, identify, is_bus_error
 from motorbus.families.kst.driver.node import BusSettings, Node, check_above_zero, checked_ids
 from motorbus.families.kst.driver.requests import decoded, upload
 from motorbus.families.kst.notifications import BusState
@@ -30,18 +32,23 @@ from motorbus.families.kst.profiles import RATES, bit_rate_code
 
 PASSES: Final = 2  # a silent id is read twice: a servo may miss the first frame after power-up
 BATCH: Final = 16  # ids that are read at the same time
-SHORT_LISTEN: Final = 0.25
-"""s to listen at a rate that the caller has named; two periods of traffic at 10 Hz."""
+SHORT_LISTEN: Final = (
+    0.25  # s to listen at a rate that the caller has named: traffic of 4 Hz and more is received
+)
 LISTEN: Final = 1.0  # s to listen at each rate of `scan_bit_rates`
 WRONG_RATE: Final = "the first frame caused a bus error and had no reply: this bus uses another rate"
 OTHER_FORMAT: Final = "no reply; servos with 29-bit identifiers need id_format=ext, others id_format=std"
 ERRORS: Final = "two servos with one id, another rate on the bus, bad wiring, or a missing terminator"
-TWICE: Final = "two answers to one request: two servos with one id; connect and provision them one at a time"
-TORN: Final = "its id comes, its position never: two servos with one id, whose answers break each other"
+TWO_REPLIES: Final = (
+    "two answers to one request: two servos with one id; connect and provision them one at a time"
+)
+NO_POSITION: Final = (
+    "it answers reads of its id, never of its position: two servos with one id, whose replies collide"
+)
 
 
-class Suspicion(NamedTuple):
-    """An event: a user should look at this node (0: the bus) at this rate (bit/s)."""
+class ScanWarning(NamedTuple):
+    """An event: a user should check this node (0: the bus) at this rate (bit/s)."""
 
     node: int
     rate: int
@@ -68,22 +75,24 @@ async def scan(settings: BusSettings, ids: Sequence[int] = (), rates: Sequence[i
     """All servos that answer, with their identity. `ids` (): all; `rates` (): the present one.
 
     At another rate than the present one the adapter listens first; a rate at which errors show that the bus is in use
-    is `Skipped`, and nothing follows a first broadcast that is broken. Reports `Found`, `Progress` and `Suspicion`.
+    is `Skipped`. If the first broadcast there causes a bus error, nothing more is sent at that rate. Reports `Found`,
+    `Progress` and `ScanWarning`. Raises RequestError for an impossible id or rate.
     """
-    nodes = checked_ids(ids or sdo.NODES)
-    present = await SetBitrate(0)
+    checked_ids(ids)
+    _check_rates(rates)
+    present = await SetBitrate(0)  # 0 reads the rate
+    if not rates:
+        return await _scan_at(settings, ids, present)
 
     async def scan_each() -> list[Found]:
         found: list[Found] = []
         async with BitrateRestored():
             for rate in rates:
                 other = rate != present
-                if await _use(settings, rate, listens=other):
-                    found += await _scan_at(settings, nodes, rate, broadcast=other or not ids, careful=other)
+                if await _select_rate(settings, rate, listen_first=other):
+                    found += await _scan_at(settings, ids, rate, careful=other)
         return found
 
-    if not rates:
-        return await _scan_at(settings, nodes, present, broadcast=not ids)
     return await Exclusive(scan_each())
 
 
@@ -94,39 +103,39 @@ async def scan_bit_rates(
     isolated: bool = False,
     seconds: float = LISTEN,
 ) -> BitRates:
-    """Find the bit rate of a bus: listen `seconds` at each rate, then, only with `isolated`, send.
+    """Find the bit rate of a bus: listen `seconds` at each rate, then, only with `isolated`, send at the silent ones.
 
-    The search ends at a rate with a whole frame. `isolated` says that no machine depends on this bus. A rate that the
+    The search ends at a rate with a valid frame. `isolated` says that no machine depends on this bus. A rate that the
     adapter lacks is `Skipped`. Raises RequestError for an impossible rate, and, unless `isolated`, for an adapter that
     cannot listen.
     """
-    for rate in rates:
-        bit_rate_code(rate)
+    _check_rates(rates)
     check_above_zero("seconds", seconds, "s")
 
     async def search() -> BitRates:
         activity: dict[int, LineActivity] = {}
         async with BitrateRestored():
             for number, rate in enumerate(rates, 1):
-                what = await catch(listen(settings, rate, seconds))
-                if isinstance(what, LineActivity):
-                    activity[rate] = what
-                    if what is LineActivity.TRAFFIC:
-                        return BitRates(rate, activity)
-                    await Emit(Progress(number, len(rates), f"{rate} bit/s: {what.value}"))
-                elif isinstance(what, LinkError) and not isinstance(what, LinkLost):
-                    await Emit(Skipped(rate, what.summary))  # the adapter cannot listen, or lacks this rate
-                else:
-                    raise what
+                try:
+                    activity[rate] = await listen(settings, rate, seconds)
+                except LinkLost:
+                    raise
+                except LinkError as error:
+                    await Emit(Skipped(rate, error.summary))  # the adapter cannot listen, or lacks this rate
+                    continue
+                if activity[rate] is LineActivity.TRAFFIC:
+                    return BitRates(rate, activity)
+                await Emit(Progress(number, len(rates), f"{rate} bit/s: {activity[rate].value}"))
             if not activity and not isolated:
                 raise RequestError(
                     "this adapter cannot listen without taking part, so its bit rate is not searched for",
                     expected="an adapter with a listen-only mode, or isolated=True if nothing depends on this bus",
                 )
             activity = activity or dict.fromkeys(rates, LineActivity.SILENCE)
-            for rate in activity if isolated else ():
-                if activity[rate] is LineActivity.SILENCE and await _use(settings, rate, listens=False):
-                    found = await _scan_at(settings, sdo.NODES, rate, broadcast=True, careful=True)
+            silent = [rate for rate, what in activity.items() if what is LineActivity.SILENCE]
+            for rate in silent if isolated else ():
+                if await _select_rate(settings, rate, listen_first=False):
+                    found = await _scan_at(settings, (), rate, careful=True)
                     if found:
                         return BitRates(rate, activity, tuple(found))
         return BitRates(None, activity)
@@ -137,92 +146,109 @@ async def scan_bit_rates(
 # -- rates -----------------------------------------------------------------------------------------------------
 
 
+def received(settings: BusSettings) -> BusState:
+    """What the open bus has received. Raises RequestError for settings of no open bus."""
+    if settings.state is None:
+        raise RequestError("these settings belong to no open bus", expected="those of settings_of(bus)")
+    return settings.state
+
+
+def _check_rates(rates: Sequence[int]) -> None:
+    for rate in rates:
+        bit_rate_code(rate)
+
+
 async def listen(settings: BusSettings, rate: int, seconds: float) -> LineActivity:
     """Listen at this rate without sending. Raises LinkError when the adapter cannot. The rate stays set."""
     await SetBitrate(rate, listen_only=True)
-    state = settings.state or BusState()
+    state = received(settings)
     frames, errors = state.frames, state.errors
-    frame, error = await gather(
-        WaitFor(lambda notification: not is_bus_error(notification), seconds), WaitFor(is_bus_error, seconds)
-    )
-    if frame is not None or state.frames > frames:
+    await WaitFor(
+        lambda notification: not is_bus_error(notification), seconds
+    )  # ends early; replies are counted too
+    if state.frames > frames:
         return LineActivity.TRAFFIC
-    return LineActivity.ERRORS if error is not None or state.errors > errors else LineActivity.SILENCE
+    return LineActivity.ERRORS if state.errors > errors else LineActivity.SILENCE
+
+
+async def _listen_if_possible(settings: BusSettings, rate: int) -> LineActivity | None:
+    try:
+        return await listen(settings, rate, SHORT_LISTEN)
+    except LinkLost:
+        raise
+    except LinkError:
+        return None  # the adapter cannot listen
 
 
 async def set_named_rate(settings: BusSettings, rate: int) -> None:
     """Set this rate after listening, if the adapter can. Raises RequestError if the bus is in use at another rate."""
-    activity = None
-    try:
-        activity = await listen(settings, rate, SHORT_LISTEN)
-    except LinkLost:
-        raise
-    except LinkError:
-        pass  # the adapter cannot listen
-    if activity is LineActivity.ERRORS:
+    if await _listen_if_possible(settings, rate) is LineActivity.ERRORS:
         raise RequestError(
-            f"nothing is sent at {rate} bit/s: {activity.value}",
+            f"nothing is sent at {rate} bit/s: {LineActivity.ERRORS.value}",
             cause="a frame at a wrong rate breaks the frames of other devices",
             advice="connect this servo alone, and call again",
         )
     await SetBitrate(rate)
 
 
-async def _use(settings: BusSettings, rate: int, *, listens: bool) -> bool:
-    """Set this rate, or report why it is left out."""
+async def _select_rate(settings: BusSettings, rate: int, *, listen_first: bool) -> bool:
+    """Set this rate; or report why it is `Skipped`, and return False."""
+    if listen_first and await _listen_if_possible(settings, rate) is LineActivity.ERRORS:
+        await Emit(Skipped(rate, LineActivity.ERRORS.value))
+        return False
     try:
-        await (set_named_rate(settings, rate) if listens else SetBitrate(rate))
+        await SetBitrate(rate)
     except LinkLost:
         raise
     except LinkError as error:
         await Emit(Skipped(rate, error.summary))
-    except RequestError:
-        await Emit(Skipped(rate, LineActivity.ERRORS.value))
-    else:
-        return True
-    return False
+        return False
+    return True
 
 
 # -- one rate --------------------------------------------------------------------------------------------------
 
 
 async def _scan_at(
-    settings: BusSettings, ids: Sequence[int], rate: int, *, broadcast: bool, careful: bool = False
+    settings: BusSettings, ids: Sequence[int], rate: int, *, careful: bool = False
 ) -> list[Found]:
-    """The servos that answer at the present rate. With `careful` nothing follows a first frame that is broken."""
-    state = settings.state or BusState()
+    """The servos that answer at the present rate (bit/s).
+
+    Without `ids`, or if `careful`, a broadcast comes first. With `careful` nothing follows a broadcast that breaks.
+    """
+    state = received(settings)
     errors = state.errors
-    there: list[int] = []
-    if broadcast:
+    nodes = checked_ids(ids or sdo.NODES)
+    counts: Counter[int] = Counter()
+    if careful or not ids:
         answer = await broadcast_ids(settings)
-        counts = Counter(reply.lane for reply in answer.replies if reply.lane in ids)
-        there = list(counts)
-        for node, count in counts.items():
+        counts.update(reply.lane for reply in answer.replies if reply.lane in nodes)
+        for node in counts:
             await Emit(Found(node, rate, None))
-            if count > 1:
-                await Emit(Suspicion(node, rate, TWICE))
-        if careful and not there and state.errors > errors:
-            await Emit(Suspicion(0, rate, WRONG_RATE))
+        if careful and not counts and state.errors > errors:
+            await Emit(ScanWarning(0, rate, WRONG_RATE))
             return []
+    answering = list(counts)
     for number in range(PASSES):
-        done = number * len(ids)
-        for batch in _batches([node for node in ids if node not in there]):
+        done = number * len(nodes)
+        for batch in _batches([node for node in nodes if node not in answering]):
             answers = await gather(*[_answers(Node(node, settings), rate) for node in batch])
-            there += [node for node, answered in zip(batch, answers, strict=True) if answered]
+            answering += [node for node, answers_now in zip(batch, answers, strict=True) if answers_now]
             done += len(batch)
-            await Emit(Progress(done, PASSES * len(ids), f"ids up to {batch[-1]} at {rate} bit/s"))
+            await Emit(Progress(done, PASSES * len(nodes), f"ids up to {batch[-1]} at {rate} bit/s"))
     if state.errors > errors:
-        await Emit(Suspicion(0, rate, f"{state.errors - errors} bus errors during the scan: {ERRORS}"))
-    if not there and not careful:
-        await Emit(Suspicion(0, rate, OTHER_FORMAT))
+        await Emit(ScanWarning(0, rate, f"{state.errors - errors} bus errors during the scan: {ERRORS}"))
+    if not answering and not careful:
+        await Emit(ScanWarning(0, rate, OTHER_FORMAT))
     found: list[Found] = []
-    for batch in _batches(sorted(there)):
-        nodes = [Node(node, settings) for node in batch]
-        if not broadcast:
-            for seen in await gather(*map(look, nodes)):
-                if seen.replies > 1:
-                    await Emit(Suspicion(seen.node, rate, TWICE))
-        found += await _identify(nodes, rate)
+    for batch in _batches(sorted(answering)):
+        servos = [Node(node, settings) for node in batch]
+        for one in await gather(*[count_replies(servo) for servo in servos if servo.node not in counts]):
+            counts[one.node] = one.replies
+        for node in batch:
+            if counts[node] > 1:
+                await Emit(ScanWarning(node, rate, TWO_REPLIES))
+        found += await _identify(servos, rate)
     return found
 
 
@@ -236,38 +262,43 @@ def broadcast_ids(settings: BusSettings, priority: Priority = Priority.CONFIGURA
 
     def decode(answer: Response) -> Response:
         pairs = zip(answer.replies, decoded(answer), strict=True)
-        mine = tuple(reply for reply, one in pairs if one.index in (row.address, 0))
+        mine = tuple(
+            reply for reply, one in pairs if one.index in (row.address, 0)
+        )  # 0: some aborts name no object
         return answer._replace(replies=mine)  # without late replies to other requests
 
     return Request(settings.upload(sdo.BROADCAST, row), ANY, decode, lane=EVERY_LANE, priority=priority)
 
 
-async def _answers(node: Node, rate: int) -> bool:
-    """Whether a servo answers, also with an invalid reply."""
-    row, within = node.table["node_id"], TimeoutClass.SCAN
+async def _answers(servo: Node, rate: int) -> bool:
+    """Whether a servo answers a read of its id, also with an abort or an invalid reply; reports it as `Found`."""
+    row, within = servo.table["node_id"], TimeoutClass.SCAN
     try:
-        await upload(node, row, lambda _: None, priority=Priority.CONFIGURATION, reply_within=within)
+        await upload(servo, row, lambda _: None, priority=Priority.CONFIGURATION, reply_within=within)
     except NoReply:
         return False
     except WireError as error:
-        await Emit(Suspicion(node.node, rate, error.summary))
-    await Emit(Found(node.node, rate, None))
+        await Emit(ScanWarning(servo.node, rate, error.summary))
+    await Emit(Found(servo.node, rate, None))
     return True
 
 
-async def _identify(nodes: Sequence[Node], rate: int) -> list[Found]:
-    identities = await gather(*[catch(identify(node)) for node in nodes])
-    positions = await gather(*[catch(position(node)) for node in nodes])
+async def _identify(servos: Sequence[Node], rate: int) -> list[Found]:
+    """Identify these servos; one that cannot be identified is found without identity."""
+    identities = await gather(*[catch(identify(servo)) for servo in servos])
+    positions = await gather(*[catch(position(servo)) for servo in servos])
     found: list[Found] = []
-    for node, identity, place in zip((one.node for one in nodes), identities, positions, strict=True):
+    for servo, identity, at in zip(servos, identities, positions, strict=True):
         if not isinstance(identity, Identity):
-            found.append(Found(node, rate, None))
+            found.append(Found(servo.node, rate, None))
             continue
-        found.append(Found(node, rate, identity))
+        found.append(Found(servo.node, rate, identity))
         pending = identity.details["reads_back_id"]
-        if pending not in (None, node):
-            what = f"answers as {node} and reads back the id {pending}: written, in force after a restart"
-            await Emit(Suspicion(node, rate, what))
-        if isinstance(place, NoReply):
-            await Emit(Suspicion(node, rate, TORN))
+        if pending not in (None, servo.node):
+            what = (
+                f"answers as {servo.node} and reads back the id {pending}: written, in force after a restart"
+            )
+            await Emit(ScanWarning(servo.node, rate, what))
+        if isinstance(at, NoReply):
+            await Emit(ScanWarning(servo.node, rate, NO_POSITION))
     return found

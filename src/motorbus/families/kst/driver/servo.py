@@ -22,6 +22,9 @@ class ServoMethods(Node):
 
     A servo is the `Node` that driver functions take as first argument; the subclasses add the bus. Creating one sends
     nothing. It has the settings of its bus; `profile` is for a bus with servos of several makers.
+
+    `set_node_id` and `set_bit_rate` only write. `set_id` and `set_baud`, as in all families, also save, wait for the
+    power cycle and verify: they are `provision` with one value.
     """
 
     ping = device_method(identity.ping)
@@ -71,7 +74,7 @@ class AsyncServo(ServoMethods, AsyncDevice):
 
 
 def settings_of(bus: object) -> BusSettings:
-    """The settings of this bus; those of the manual where it is no KST bus."""
+    """The settings of this bus; those of the manual for anything else."""
     found = getattr(getattr(bus, "driver", None), "settings", None)
     return found if isinstance(found, BusSettings) else DEFAULT
 

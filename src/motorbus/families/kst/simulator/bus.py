@@ -9,7 +9,7 @@ error passive.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from heapq import heappop, heappush
 from itertools import count
 from typing import Final, NamedTuple
@@ -26,9 +26,9 @@ from motorbus.families.kst.simulator.servo import Servo
 
 ERROR: Final = CanFrame(ERROR_FLAG | 0x88, bytes(8))
 """An adapter's report of a broken frame: protocol violation and bus error, the classes of SocketCAN."""
-PASSIVE: Final = 16
+PASSIVE_AFTER: Final = 16
 """Errors (of 8 points each) after which a transmitter is error passive, at 128 points (ISO 11898)."""
-DUPLICATE: Final = 1000  # the key of a servo whose id another one has is its unit number plus this
+DUPLICATE_KEY: Final = 1000  # a servo whose id another one has has its unit number plus this as key
 RETRY_BITS: Final = 100
 """Bits from the start of a broken frame to the next attempt; it depends on the bit that differs. # assumption"""
 
@@ -38,8 +38,7 @@ class Event(NamedTuple):
 
     `frame`  None: a report, made when it is sent
     `servo`  None: an error frame of the adapter
-    `epoch`  number of losses of supply of the servo (for a report: of changes of its reports) when the event was made;
-             if it has changed since, the event is void
+    `epoch`  the counter of `epoch_of` when the event was made; if it has changed since, the event is void
     """
 
     when: float
@@ -48,12 +47,12 @@ class Event(NamedTuple):
     frame: CanFrame | None
     epoch: int
 
-    @property
-    def is_void(self) -> bool:
-        servo = self.servo
-        return servo is not None and self.epoch != (
-            servo.power_losses if self.frame else servo.report_changes
-        )
+
+def epoch_of(servo: Servo | None, frame: CanFrame | None) -> int:
+    """The number of losses of supply of the servo; for a report, of starts and stops of its reports."""
+    if servo is None:
+        return 0
+    return servo.report_changes if frame is None else servo.power_losses
 
 
 class KstBus:
@@ -74,7 +73,7 @@ class KstBus:
         for node in ids:
             self._add(node, profile)
         for node in duplicates:
-            self._add(node, profile).delay = quirks.duplicate_delay
+            self.duplicate(node)
         if not self.servos:
             raise RequestError("a simulated bus needs at least one servo", expected="ids, such as 0x25")
 
@@ -91,19 +90,19 @@ class KstBus:
         """The servos by present id; a second one with an id has the key 1000 + its unit number."""
         found: dict[int, Servo] = {}
         for servo in self.servos:
-            found[DUPLICATE + servo.unit if servo.node in found else servo.node] = servo
+            found[DUPLICATE_KEY + servo.unit if servo.node in found else servo.node] = servo
         return found
 
     def duplicate(self, node: int) -> None:
         """Add a servo with this id and the rate of the first one. Raises RequestError when there is none."""
         if node not in self.nodes:
-            raise RequestError(f"no servo has the id {node}")
+            raise RequestError(f"no servo has the id {node}", expected=f"one of {sorted(self.nodes)}")
         first = self.nodes[node]
         second = self._add(node, first.profile)
         second.delay, second.bit_rate = self.quirks.duplicate_delay, first.bit_rate
 
     def tune(self, rate: int) -> None:
-        """Set the rate (bit/s) of the host; 0: that of each servo."""
+        """Set the rate (bit/s) of the host; 0: every servo receives, at any rate."""
         self.rate = rate or None
 
     def receive(self, data: Data, at: float) -> None:
@@ -126,29 +125,34 @@ class KstBus:
         return [
             servo
             for servo in self.servos
-            if node in (sdo.BROADCAST, servo.node) and self._receives(servo) and self._takes(frame)
+            if node in (sdo.BROADCAST, servo.node)
+            and self._has_host_rate(servo)
+            and self._accepts_format(frame)
         ]
 
-    def _receives(self, servo: Servo) -> bool:
+    def _has_host_rate(self, servo: Servo) -> bool:
         return servo.plugged and self.rate in (None, servo.bit_rate)
 
-    def _takes(self, frame: CanFrame) -> bool:
+    def _accepts_format(self, frame: CanFrame) -> bool:
         return self.quirks.id_format in ("asked", "ext" if frame.extended else "std")
 
     def _disturb(self) -> None:
-        """Servos at another rate answer a frame of the host with error flags; the adapter repeats it."""
-        others = [servo for servo in self.servos if servo.plugged and not self._receives(servo)]
-        active = any(servo.errors < PASSIVE for servo in others)
+        """Servos at another rate destroy a frame of the host until they are error passive; then it arrives.
+
+        The adapter repeats the frame and reports one error. It reports one too if no servo acknowledges the frame.
+        """
+        others = [servo for servo in self.servos if servo.plugged and not self._has_host_rate(servo)]
+        active = any(servo.errors < PASSIVE_AFTER for servo in others)
         for servo in others:
             servo.errors += 1
-        if active or (others and not any(map(self._receives, self.servos))):  # no servo acknowledges it
+        if active or (others and not any(map(self._has_host_rate, self.servos))):
             self._send(None, self.now, ERROR)
 
     def audience(self, data: Data) -> Audience:
-        """The receivers of a frame; none for a frame that no host sends."""
+        """The receivers of a frame at any rate; none for a frame that is no request."""
         if not isinstance(data, CanFrame) or (node := notifications.addressee(data)) is None:
             return Audience.NONE
-        taking = [servo.node for servo in self.servos if self._takes(data)]
+        taking = [servo.node for servo in self.servos if self._accepts_format(data)]
         if node == sdo.BROADCAST and taking:
             return Audience.EVERYONE
         return Audience.OURS if node in taking else Audience.NONE
@@ -156,13 +160,13 @@ class KstBus:
     # -- frames of the servos ------------------------------------------------------------------------------------
 
     def _send(self, servo: Servo | None, when: float, frame: CanFrame | None) -> None:
-        current = 0 if servo is None else servo.power_losses if frame else servo.report_changes
-        heappush(self._events, Event(when, next(self._order), servo, frame, current))
+        heappush(self._events, Event(when, next(self._order), servo, frame, epoch_of(servo, frame)))
 
     def _begin(self, at: float) -> None:
-        """Start the reports that run from power-up on. The clock may start at any time, so that is the first one seen.
+        """Start the reports that run from power-up on (`reports_ms`).
 
-        `due` returns -1 once before that, so that the caller passes its time.
+        The first time that the caller passes is the power-up: its clock may start anywhere. To get that time, `due`
+        returns -1 once, and the caller calls `advance` with the present time.
         """
         self._time_requested = True
         if not self._begun and at >= 0:
@@ -174,9 +178,12 @@ class KstBus:
         """Time (s) of the next frame, or None."""
         if not self._begun:
             return None if self._time_requested else -1.0
-        while self._events and self._events[0].is_void:
+        while self._events:
+            event = self._events[0]
+            if event.epoch == epoch_of(event.servo, event.frame):
+                return event.when
             heappop(self._events)
-        return self._events[0].when if self._events else None
+        return None
 
     def advance(self, to: float) -> list[tuple[float, Data]]:
         """All frames that start up to this time, each with its time, in order."""
@@ -189,34 +196,38 @@ class KstBus:
         return sent
 
     def _frames_at(self, moment: float) -> list[CanFrame]:
-        """What the host receives of all that starts at this time, in the order of arbitration.
+        """What the host receives of all that starts at this time: errors, then frames in the order of arbitration.
 
-        Lower identifiers go first. With one identifier equal frames become one and unequal ones break each other.
+        Lower identifiers go first. With one identifier equal frames become one and unequal ones break each other: the
+        n-th frame of a servo with this identifier competes with the n-th of the others.
         """
         received: list[CanFrame] = []
-        contests: dict[tuple[tuple[int, ...], int], list[tuple[Servo, CanFrame]]] = {}
-        numbers: Counter[tuple[int, CanFrame]] = Counter()
+        competing: dict[tuple[tuple[int, ...], int], list[tuple[Servo, CanFrame]]] = {}
+        sent: Counter[tuple[int, tuple[int, ...]]] = Counter()
         while (when := self.due()) is not None and when <= moment:
             event = heappop(self._events)
             servo = event.servo
-            frame = (event.frame or servo.report(moment)) if servo else ERROR
-            if servo is None or not self._receives(servo):
+            if servo is None:
                 received.append(ERROR)
                 continue
-            place = servo.unit, frame._replace(data=b"")
-            numbers[place] += 1  # one servo sends its own frames one after the other
-            contests.setdefault((precedence(frame), numbers[place]), []).append((servo, frame))
-        for key in sorted(contests):
-            frames = {frame for _, frame in contests[key]}
-            if len(frames) == 1:
-                received += frames
+            frame = event.frame or servo.report(moment)
+            if not self._has_host_rate(servo):
+                received.append(ERROR)
+                continue
+            rank = precedence(frame)
+            sent[servo.unit, rank] += 1
+            competing.setdefault((rank, sent[servo.unit, rank]), []).append((servo, frame))
+        for key in sorted(competing):
+            servos, frames = zip(*competing[key], strict=True)
+            if len(set(frames)) == 1:
+                received.append(frames[0])
             else:
-                self._collide([servo for servo, _ in contests[key]], moment)
+                self._collide(servos, moment)
         return received
 
-    def _collide(self, servos: list[Servo], moment: float) -> None:
+    def _collide(self, servos: Sequence[Servo], moment: float) -> None:
         """All abort and try again until they are error passive; then the frames are given up. # assumption"""
         for servo in servos:
-            servo.errors += PASSIVE
-        for number in range(1, PASSIVE + 1):
+            servo.errors += PASSIVE_AFTER
+        for number in range(1, PASSIVE_AFTER + 1):
             self._send(None, moment + number * RETRY_BITS / servos[0].bit_rate, ERROR)

@@ -7,17 +7,17 @@ from math import inf
 
 
 class Flash:
-    """Stored raw values by name. A save takes time; the last complete one counts."""
+    """Stored raw values by name. A save takes time; another one during it replaces it. Times never decrease."""
 
     def __init__(self, values: Mapping[str, int]) -> None:
-        self._stored = dict(values)
-        self._pending = self._stored
+        self._before = dict(values)
+        self._after = self._before
         self._begun = self._done = -inf
 
     def save(self, values: Mapping[str, int], at: float, duration: float) -> None:
         """Start to store these values."""
-        self._stored = self.stored(at)
-        self._pending = {name: values[name] for name in self._stored}
+        self._before = self.stored(at)
+        self._after = {name: values[name] for name in self._before}
         self._begun, self._done = at, at + duration
 
     def saving(self, at: float) -> bool:
@@ -30,9 +30,9 @@ class Flash:
 
     def stored(self, at: float) -> dict[str, int]:
         """The values of the last complete save."""
-        return self._stored if self.saving(at) else self._pending
+        return self._before if self.saving(at) else self._after
 
-    def cut(self, at: float, kept: str) -> None:
-        """The supply goes: an incomplete save has stored nothing (`kept` "old") or everything ("new")."""
-        self._stored = self._pending = self._pending if kept == "new" else self.stored(at)
+    def lose_power(self, at: float, kept: str) -> None:
+        """An incomplete save has stored nothing (`kept` "old") or everything ("new")."""
+        self._before = self._after = self._after if kept == "new" else self.stored(at)
         self._done = -inf

@@ -252,7 +252,7 @@ class Servo(PoweredDevice):
         """A save in progress is cut; the shaft stays."""
         now = self._now()
         self.motion = rest(now, self.motion.position(now))
-        self.flash.cut(now, self.quirks.flash_cut)
+        self.flash.lose_power(now, self.quirks.flash_cut)
         self.power_losses += 1
         self.set_reporting(False, now)
 
