@@ -25,7 +25,7 @@ def receive(frame: CanFrame, extended: bool = False) -> Event:
 
 @given(NODES, st.integers(-0x8000, 0x7FFF), st.sampled_from(["sdo", "pdo"]), st.booleans())
 def test_report_and_alarm_are_decoded_as_encoded(node: int, raw: int, form: str, extended: bool) -> None:
-    frame = notifications.encode_report(node, raw, form=form, extended=extended)
+    frame = notifications.encode_report(node, raw, form=form)._replace(extended=extended)
     assert frame.id == {"sdo": 0x580, "pdo": 0x180}[form] + node
     assert receive(frame, extended) == Notification(node, "report", frame.data)
     assert notifications.decode_report(frame.data) == raw

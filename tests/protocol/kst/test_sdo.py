@@ -24,13 +24,14 @@ CODE, TOGGLE, YES_OR_NO = st.integers(0, 0xFFFF_FFFF), st.integers(0, 1), st.boo
 def encode_request(request: sdo.SdoRequest) -> CanFrame:
     """The frame of a request with these fields."""
     node, kind, index, subindex, data, sized, toggle, extended = request
+    frame = sdo.encode_abort(node, index, subindex, int.from_bytes(data, "little"))
     if kind == "upload":
-        return sdo.encode_upload(node, index, subindex, extended=extended)
-    if kind == "download":
-        return sdo.encode_download(node, index, subindex, data, sized=sized, extended=extended)
-    if kind == "segment":
-        return sdo.encode_segment(node, toggle, extended=extended)
-    return sdo.encode_abort(node, index, subindex, int.from_bytes(data, "little"), extended=extended)
+        frame = sdo.encode_upload(node, index, subindex)
+    elif kind == "download":
+        frame = sdo.encode_download(node, index, subindex, data, sized=sized)
+    elif kind == "segment":
+        frame = sdo.encode_segment(node, toggle)
+    return frame._replace(extended=extended)
 
 
 def encode_reply(node: int, reply: sdo.SdoReply) -> CanFrame:

@@ -443,14 +443,11 @@ def budget_frames(driver: BusDriver, node: int) -> Mapping[str, tuple[Sequence[C
     goal, present = (settings.profile.table[name] for name in ("goal_position", "present_position"))
     raws = range(goal.low, goal.high + 1)
     targets = [settings.download(node, goal, raw) for raw in raws]
-    acknowledgement = sdo.encode_download_reply(node, goal.address, 0, extended=settings.extended)
-    positions = [
-        sdo.encode_upload_reply(node, present.address, 0, present.encode(raw), extended=settings.extended)
-        for raw in raws
-    ]
+    acknowledgement = sdo.encode_download_reply(node, goal.address, 0)
+    positions = [sdo.encode_upload_reply(node, present.address, 0, present.encode(raw)) for raw in raws]
     return {
-        "write": (targets, [acknowledgement]),
-        "read": ([settings.upload(node, present)], positions),
+        "write": (targets, [settings.format(acknowledgement)]),
+        "read": ([settings.upload(node, present)], list(map(settings.format, positions))),
     }
 
 
@@ -458,10 +455,10 @@ def report_frames(driver: BusDriver, node: int) -> list[CanFrame]:
     """For `motorbus budget`: a report of every position."""
     assert isinstance(driver, KstDriver)
     settings = driver.settings
-    profile, extended = settings.profile, settings.extended
+    profile = settings.profile
     form = profile.report_forms[0] if profile.report_forms else "sdo"
     positions = range(-profile.limit, profile.limit + 1)
-    return [notifications.encode_report(node, raw, form=form, extended=extended) for raw in positions]
+    return [settings.format(notifications.encode_report(node, raw, form=form)) for raw in positions]
 
 
 def move_together(bus: Any, goals: Mapping[int, float], *, wait: bool = True) -> None:

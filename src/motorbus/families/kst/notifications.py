@@ -50,9 +50,9 @@ class Start(NamedTuple):
     on: bool
 
 
-def encode_report(node: int, raw: int, *, form: str = "sdo", extended: bool = False) -> CanFrame:
+def encode_report(node: int, raw: int, *, form: str = "sdo") -> CanFrame:
     """A position (raw counts) under 0x580 + node, or with `form` "pdo" under 0x180 + node."""
-    return CanFrame(REPORT_FORMS[form] + node, raw.to_bytes(2, "little", signed=True) + b"\0\0", extended)
+    return CanFrame(REPORT_FORMS[form] + node, raw.to_bytes(2, "little", signed=True) + b"\0\0")
 
 
 def decode_report(data: bytes) -> int:
@@ -60,17 +60,17 @@ def decode_report(data: bytes) -> int:
     return int.from_bytes(data[:2], "little", signed=True)
 
 
-def encode_alarm(node: int, data: bytes = LOW_VOLTAGE, *, extended: bool = False) -> CanFrame:
+def encode_alarm(node: int, data: bytes = LOW_VOLTAGE) -> CanFrame:
     """An alarm of 4 bytes."""
-    return CanFrame(ALARM + node, data, extended)
+    return CanFrame(ALARM + node, data)
 
 
-def encode_boot(node: int, *, extended: bool = False) -> CanFrame:
+def encode_boot(node: int) -> CanFrame:
     """The heartbeat of a node that has just started."""
-    return CanFrame(HEARTBEAT + node, b"\0", extended)
+    return CanFrame(HEARTBEAT + node, b"\0")
 
 
-def encode_start(form: str, node: int, on: bool, *, extended: bool = False) -> CanFrame:
+def encode_start(form: str, node: int, on: bool) -> CanFrame:
     """Start or stop the reports of one node or of all (0); it has no reply.
 
     "vendor": identifier = node, `01 00` or `02 00`. "standard": NMT of CiA 301, identifier 0, `01 node` or `02 node`.
@@ -79,8 +79,8 @@ def encode_start(form: str, node: int, on: bool, *, extended: bool = False) -> C
         raise RequestError(f"there is no start form {form!r}", expected="vendor or standard")
     command = 1 if on else 2
     if form == "vendor":
-        return CanFrame(node, bytes((command, 0)), extended)
-    return CanFrame(0, bytes((command, node)), extended)
+        return CanFrame(node, bytes((command, 0)))
+    return CanFrame(0, bytes((command, node)))
 
 
 def decode_start(frame: CanFrame) -> Start | None:

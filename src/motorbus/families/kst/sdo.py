@@ -6,6 +6,8 @@
 Byte 0, the specifier: bits 7 to 5 are the kind; bit 1 (e): the data are in this frame, bit 0 (s): their length is
 stated, bits 3 and 2 (n): how many of the four data bytes are unused. Reserved bits are ignored (CiA 301).
 
+Encoders make frames with 11-bit identifiers; `CanFrame._replace(extended=True)` makes one of 29 bits.
+
 Source: KST CAN protocol manual, commands 1 to 9; CiA 301 for the specifier and for transfers in segments. Frames from a
 device never raise an error here. An id above 127 raises RequestError.
 """
@@ -75,29 +77,27 @@ class SdoReply(NamedTuple):
 # -- requests --------------------------------------------------------------------------------------------------
 
 
-def encode_upload(node: int, index: int, subindex: int = 0, *, extended: bool = False) -> CanFrame:
-    """Read an object of one node or of all (0): `40 il ih sub 00 00 00 00`. `extended`: 29-bit identifier."""
-    return _frame(REQUEST, node, _head(UPLOAD, index, subindex), extended)
+def encode_upload(node: int, index: int, subindex: int = 0) -> CanFrame:
+    """Read an object of one node or of all (0): `40 il ih sub 00 00 00 00`."""
+    return _frame(REQUEST, node, _head(UPLOAD, index, subindex))
 
 
-def encode_download(
-    node: int, index: int, subindex: int, data: bytes, *, sized: bool = False, extended: bool = False
-) -> CanFrame:
+def encode_download(node: int, index: int, subindex: int, data: bytes, *, sized: bool = False) -> CanFrame:
     """Write 1 to 4 bytes to an object of one node or of all (0): specifier 0x22, or `sized` as in CiA 301."""
     specifier = DOWNLOAD_UNSIZED
     if sized:
         specifier |= (EXPEDITED - len(data)) << 2 | _S
-    return _frame(REQUEST, node, _head(specifier, index, subindex) + data, extended)
+    return _frame(REQUEST, node, _head(specifier, index, subindex) + data)
 
 
-def encode_segment(node: int, toggle: int, *, extended: bool = False) -> CanFrame:
+def encode_segment(node: int, toggle: int) -> CanFrame:
     """Request the next segment of an upload; `toggle` is 0 for the first segment, then alternates."""
-    return _frame(REQUEST, node, bytes((SEGMENT | toggle << 4,)), extended)
+    return _frame(REQUEST, node, bytes((SEGMENT | toggle << 4,)))
 
 
-def encode_abort(node: int, index: int, subindex: int, code: int, *, extended: bool = False) -> CanFrame:
+def encode_abort(node: int, index: int, subindex: int, code: int) -> CanFrame:
     """Abort a transfer as the client; it has no reply."""
-    return _frame(REQUEST, node, _head(ABORT, index, subindex) + code.to_bytes(4, "little"), extended)
+    return _frame(REQUEST, node, _head(ABORT, index, subindex) + code.to_bytes(4, "little"))
 
 
 def decode_request(frame: CanFrame) -> SdoRequest | None:
@@ -152,47 +152,39 @@ def decode_reply(data: bytes) -> SdoReply | None:
     return SdoReply(kind, index, subindex, code=int.from_bytes(rest, "little") if kind == "abort" else 0)
 
 
-def encode_upload_reply(
-    node: int, index: int, subindex: int, data: bytes, *, extended: bool = False
-) -> CanFrame:
+def encode_upload_reply(node: int, index: int, subindex: int, data: bytes) -> CanFrame:
     """The value of an object, 1 to 4 bytes: specifier 4F, 4B, 47, 43."""
     specifier = UPLOAD | (EXPEDITED - len(data)) << 2 | _E | _S
-    return _frame(REPLY, node, _head(specifier, index, subindex) + data, extended)
+    return _frame(REPLY, node, _head(specifier, index, subindex) + data)
 
 
-def encode_upload_start(
-    node: int, index: int, subindex: int, size: int | None, *, extended: bool = False
-) -> CanFrame:
+def encode_upload_start(node: int, index: int, subindex: int, size: int | None) -> CanFrame:
     """Announce segments of `size` bytes in all: specifier 41; 40 without a stated size (None)."""
     if size is None:
-        return _frame(REPLY, node, _head(UPLOAD, index, subindex), extended)
-    return _frame(REPLY, node, _head(UPLOAD | _S, index, subindex) + size.to_bytes(4, "little"), extended)
+        return _frame(REPLY, node, _head(UPLOAD, index, subindex))
+    return _frame(REPLY, node, _head(UPLOAD | _S, index, subindex) + size.to_bytes(4, "little"))
 
 
-def encode_segment_reply(
-    node: int, toggle: int, data: bytes, last: bool, *, extended: bool = False
-) -> CanFrame:
+def encode_segment_reply(node: int, toggle: int, data: bytes, last: bool) -> CanFrame:
     """One segment of at most 7 bytes, with the toggle of its request."""
     specifier = toggle << 4 | (SEGMENT_BYTES - len(data)) << 1 | last
-    return _frame(REPLY, node, bytes((specifier,)) + data, extended)
+    return _frame(REPLY, node, bytes((specifier,)) + data)
 
 
-def encode_download_reply(node: int, index: int, subindex: int, *, extended: bool = False) -> CanFrame:
+def encode_download_reply(node: int, index: int, subindex: int) -> CanFrame:
     """Acknowledge a write: `60 il ih sub 00 00 00 00`."""
-    return _frame(REPLY, node, _head(DOWNLOADED, index, subindex), extended)
+    return _frame(REPLY, node, _head(DOWNLOADED, index, subindex))
 
 
-def encode_abort_reply(
-    node: int, index: int, subindex: int, code: int, *, extended: bool = False
-) -> CanFrame:
+def encode_abort_reply(node: int, index: int, subindex: int, code: int) -> CanFrame:
     """Refuse a request: `80 il ih sub` and the code. Source: KST CAN protocol manual, command 9."""
-    return _frame(REPLY, node, _head(ABORT, index, subindex) + code.to_bytes(4, "little"), extended)
+    return _frame(REPLY, node, _head(ABORT, index, subindex) + code.to_bytes(4, "little"))
 
 
-def _frame(base: int, node: int, data: bytes, extended: bool) -> CanFrame:
+def _frame(base: int, node: int, data: bytes) -> CanFrame:
     if not BROADCAST <= node < NODES.stop:
         raise RequestError(f"{node} is not a node id", expected="0 to 127", node=node)
-    return CanFrame(base + node, data.ljust(LENGTH, b"\0"), extended)
+    return CanFrame(base + node, data.ljust(LENGTH, b"\0"))
 
 
 def _head(specifier: int, index: int, subindex: int) -> bytes:

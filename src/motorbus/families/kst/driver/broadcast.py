@@ -60,7 +60,7 @@ async def broadcast_position(to: float, nodes: Sequence[int], settings: BusSetti
 
     async def start_and_move() -> tuple[int, ...]:
         if settings.must_start:
-            frame = encode_start(settings.nmt, sdo.BROADCAST, True, extended=settings.extended)
+            frame = settings.format(encode_start(settings.nmt, sdo.BROADCAST, True))
             priority, effect = Priority.CONTROL, Effect.MOTION
             await Request(frame, lane=EVERY_LANE, priority=priority, effect=effect, setpoints=setpoints)
             await Emit(Started(sdo.BROADCAST, frame))

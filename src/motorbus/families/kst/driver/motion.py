@@ -139,7 +139,7 @@ async def start(node: Node, goal: Setpoint | None = None) -> None:
 def start_request(node: Node, on: bool, goal: Setpoint | None = None) -> Request[object]:
     """Start or stop, in the form of this bus; it has no reply. A start that lets a servo move counts as torque on."""
     form = node.settings.nmt
-    frame = encode_start(form, node.node, on, extended=node.settings.extended)
+    frame = node.settings.format(encode_start(form, node.node, on))
     effect = Effect.NONE
     setpoints: tuple[Setpoint, ...] = ()
     if node.settings.must_start:

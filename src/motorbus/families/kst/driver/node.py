@@ -53,16 +53,18 @@ class BusSettings:
         """These settings with some replaced; the state is shared unless it is replaced."""
         return BusSettings(**{**self._given, "state": self.state, **changed})
 
+    def format(self, frame: CanFrame) -> CanFrame:
+        """The frame with an identifier of 11 or 29 bits, as the bus uses."""
+        return frame._replace(extended=self.extended)
+
     def upload(self, node: int, row: Register) -> CanFrame:
         """The request that reads this object of one servo or of all (0)."""
-        return sdo.encode_upload(node, row.address, row.subindex or 0, extended=self.extended)
+        return self.format(sdo.encode_upload(node, row.address, row.subindex or 0))
 
     def download(self, node: int, row: Register, raw: int) -> CanFrame:
         """The request that writes this object of one servo or of all (0). Raises RequestError outside its range."""
-        data, subindex = row.encode(raw), row.subindex or 0
-        return sdo.encode_download(
-            node, row.address, subindex, data, sized=self.sized, extended=self.extended
-        )
+        frame = sdo.encode_download(node, row.address, row.subindex or 0, row.encode(raw), sized=self.sized)
+        return self.format(frame)
 
 
 def _choice(name: str, value: object, choices: Iterable[str]) -> str:

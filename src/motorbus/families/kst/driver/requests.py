@@ -182,17 +182,17 @@ async def read_all_bytes(node: Node, row: Register) -> bytes:
         first = await upload(node, row, take)  # again: another request may have ended the transfer
         if first.kind == "upload":
             return first.data
-        data, extended = b"", node.settings.extended
+        data = b""
         for number in range(SEGMENTS):
-            frame = sdo.encode_segment(node.node, number % 2, extended=extended)
-            segment = await Request(frame, (sdo.segment_due(node.node, number % 2),), take, lane=node.node)
+            toggle = number % 2
+            frame = node.settings.format(sdo.encode_segment(node.node, toggle))
+            segment = await Request(frame, (sdo.segment_due(node.node, toggle),), take, lane=node.node)
             data += segment.data
             if segment.last:
                 break
         else:
-            index, subindex = row.address, row.subindex or 0
-            abort = sdo.encode_abort(node.node, index, subindex, GENERAL_ERROR, extended=extended)
-            await Request(abort, lane=node.node)
+            abort = sdo.encode_abort(node.node, row.address, row.subindex or 0, GENERAL_ERROR)
+            await Request(node.settings.format(abort), lane=node.node)
         if segment.last and first.size in (None, len(data)):
             return data
         raise UnexpectedReply(

@@ -210,7 +210,7 @@ class KstBus:
             if servo is None:
                 received.append(ERROR)
                 continue
-            frame = event.frame or servo.report(moment)
+            frame = (event.frame or servo.report(moment))._replace(extended=servo.extended)
             if not self._has_host_rate(servo):
                 received.append(ERROR)
                 continue

@@ -87,11 +87,11 @@ class SdoServer:
             data = bytes((quirks.x1, quirks.x2))
         else:
             data = (servo.read(row.name, at) & (1 << 8 * row.size) - 1).to_bytes(row.size, "little")
-        node, index, subindex, extended = servo.node, request.index, request.subindex, request.extended
+        node, index, subindex = servo.node, request.index, request.subindex
         if len(data) <= sdo.EXPEDITED:
-            return sdo.encode_upload_reply(node, index, subindex, data, extended=extended)
+            return sdo.encode_upload_reply(node, index, subindex, data)
         self._transfer = request, data, 0
-        return sdo.encode_upload_start(node, index, subindex, len(data), extended=extended)
+        return sdo.encode_upload_start(node, index, subindex, len(data))
 
     def _segment(self, request: sdo.SdoRequest) -> CanFrame:
         if self._transfer is None:
@@ -102,8 +102,7 @@ class SdoServer:
             return self._abort(first, TOGGLE)
         data, left = left[: sdo.SEGMENT_BYTES], left[sdo.SEGMENT_BYTES :]
         self._transfer = (first, left, toggle ^ 1) if left else None
-        node, extended = self._servo.node, request.extended
-        return sdo.encode_segment_reply(node, request.toggle, data, not left, extended=extended)
+        return sdo.encode_segment_reply(self._servo.node, request.toggle, data, not left)
 
     def _download(self, request: sdo.SdoRequest, row: Register, at: float) -> CanFrame | int | None:
         quirks = self._servo.quirks
@@ -121,10 +120,8 @@ class SdoServer:
             return code
         if row.name == "store" and quirks.save_reply == "none":
             return None
-        node, extended = self._servo.node, request.extended
-        return sdo.encode_download_reply(node, request.index, request.subindex, extended=extended)
+        return sdo.encode_download_reply(self._servo.node, request.index, request.subindex)
 
     def _abort(self, request: sdo.SdoRequest, code: int) -> CanFrame:
         """An abort repeats the index (manual, command 9) and also the sub-index of the request. # assumption"""
-        node, extended = self._servo.node, request.extended
-        return sdo.encode_abort_reply(node, request.index, request.subindex, code, extended=extended)
+        return sdo.encode_abort_reply(self._servo.node, request.index, request.subindex, code)

@@ -41,7 +41,7 @@ class Servo(PoweredDevice):
     `report_changes`  number of starts and stops of its reports; the next report is due by the last one only
     `delay`           s added to its replies
     `temperature`     (°C) and `load` (-1 to 1, a share of full torque) may be set
-    `extended`        the last request had a 29-bit identifier: unsolicited frames then have one as well
+    `extended`        the last request had a 29-bit identifier: the frames of the servo then have one as well
 
     `send(servo, time, frame)` sends a frame that starts at this time; without a frame `report` makes it then.
     """
@@ -96,8 +96,7 @@ class Servo(PoweredDevice):
     def alarm(self, data: bytes = notifications.LOW_VOLTAGE) -> None:
         """Send an alarm of four bytes now."""
         if self.plugged:
-            frame = notifications.encode_alarm(self.node, data, extended=self.extended)
-            self.send(self, self._now(), frame)
+            self.send(self, self._now(), notifications.encode_alarm(self.node, data))
 
     def status(self) -> dict[str, object]:
         """Its state as plain data; positions in raw counts."""
@@ -266,7 +265,7 @@ class Servo(PoweredDevice):
         self._interval = (self.quirks.reports_ms or self.values["report_interval"]) / 1000
         self.set_reporting(self.quirks.reports_ms > 0, at)
         if self.quirks.boot_notice and self.power_losses:
-            self.send(self, at, notifications.encode_boot(self.node, extended=self.extended))
+            self.send(self, at, notifications.encode_boot(self.node))
         if self._voltage < LOW_VOLTAGE:
             self.alarm()
 
@@ -287,4 +286,4 @@ class Servo(PoweredDevice):
     def report(self, at: float) -> CanFrame:
         """The report that is due, under 0x580 + id; XQPOWER sends another one under 0x180 + id, which is left out."""
         self.send(self, at + self._interval, None)
-        return notifications.encode_report(self.node, self._reading(at), extended=self.extended)
+        return notifications.encode_report(self.node, self._reading(at))
