@@ -86,7 +86,7 @@ def test_decoder_identifies_can_frame(frame: CanFrame, expected: tuple[str, int,
 
 
 def test_decoder_uses_receiver_of_family_without_recording_receiver() -> None:
-    request, reply = bytes.fromhex("AA5500010330 51"), bytes.fromhex("AA5A020100D190")
+    request, reply = bytes.fromhex("AA 55 00 01 03 CE CF"), bytes.fromhex("AA 5A 02 01 00 CD 91")
     decoder = Decoder(FAMILIES["template"])
     assert decoder.code_meaning == ""
     assert decoded(decoder, request, reply) == [("noise", -1, -1, "framing"), ("reply", -1, -1, "")]

@@ -1,41 +1,49 @@
-"""Requests and procedures of the Metronome. They send nothing themselves; a bus runs them."""
+"""Requests, then procedures, then the driver of a bus. They send nothing themselves; a bus runs them."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from functools import partial
+from math import inf
+from struct import Struct
 from typing import Any, Final, TypeVar
 
 from motorbus.core.access import readable_rows, writable_values
 from motorbus.core.arrival import wait_in_position
 from motorbus.core.family import AxisDriver, Explanation, Health, Identity, Receiver, State, Stop
+from motorbus.core.framing import FrameReceiver
 from motorbus.core.half_duplex import HalfDuplexSerial
 from motorbus.core.interrupted import Moving, stopped_if_interrupted
 from motorbus.core.register import Register, Storage, Value
 from motorbus.core.request import Effect, Expected, Precondition, Priority, Request, Response, TimeoutClass
 from motorbus.core.setpoint import Setpoint
-from motorbus.core.steps import Exclusive, Guard, catch
+from motorbus.core.steps import Exclusive, catch, with_cleanup
 from motorbus.core.stream import PositionStream, read_positions
 from motorbus.core.verify import write_verified
 from motorbus.errors import DeviceError, LimitExceeded, NoReply, RequestError, UnexpectedReply
 
 from . import protocol
 from .protocol import Command
-from .registers import TABLE
+from .registers import COUNT, TABLE
 
 T = TypeVar("T")
 
 GOAL: Final = TABLE["goal_position"]
-PRESENT: Final = TABLE["present_position"]
-TORQUE: Final = TABLE["torque_enable"]
+FEEDBACK: Final = Struct("<iBbB")
+"""The registers from present_position on: position (counts), moving, temperature (°C), torque."""
+METHODS: Final = {
+    "node_id": "the tool of the maker",
+    "lock": "write(), which opens and closes it",
+    "torque_enable": "enable_torque() or disable_torque()",
+}
+"""What writes a protected register."""
 
 
 class Promise(Enum):
     """What an acknowledged stop means."""
 
-    HOLD_ACCEPTED = "each servo that acknowledged brakes and then holds; its torque stays as it was"
+    HOLD = "each servo that acknowledged brakes and then holds; its torque stays as it was"
 
 
 class Node:
@@ -51,130 +59,111 @@ class Node:
         self.node: Final = node
         self.limits: tuple[float, float] | None = None
         self.alarm: tuple[str, ...] = ()
-        self.at = -math.inf
+        self.at = -inf
         self.last_move: object = None
 
 
-# -- requests ------------------------------------------------------------------------------------------------
-
-
 def request(
-    node: Node,
-    command: Command,
-    operands: bytes = b"",
-    *,
-    size: int = 0,
-    refusal: int = protocol.OVERHEAD,
-    decode: Callable[[bytes], T],
-    **options: Any,
+    node: Node, command: Command, operands: bytes, decode: Callable[[bytes], T], size: int = 0, **options: Any
 ) -> Request[T]:
-    """A request whose reply has `size` bytes of data, of which `decode` makes the value.
-
-    `refusal` is the length of a refusal, which raises DeviceError. `options` are those of `Request`. All requests are
-    repeatable, because goals are absolute.
-    """
+    """A request; `decode` makes its value of the `size` bytes of data in the reply. A refusal raises DeviceError."""
+    expected = Expected(node.node, node.node, protocol.OVERHEAD + size, refusal=protocol.OVERHEAD)
 
     def take(response: Response) -> T:
         reply = response.replies[0].data
-        status = reply[4]
-        node.alarm, node.at = protocol.alarms(status), response.at
-        if len(reply) != expected.length and not status & 15:
+        node.at = response.at
+        node.alarm = ("temperature",) if reply[4] & protocol.HOT else ()
+        if code := reply[4] & 15:
+            summary = f"node {node.node} refused {command.name}: {protocol.STATUS.get(code, code)}"
+            raise DeviceError(summary, code=code, node=node.node)
+        if len(reply) != expected.length:
             raise UnexpectedReply(f"node {node.node} replied to {command.name} without data", node=node.node)
-        if status & 15:
-            raise DeviceError(
-                f"node {node.node} refused {command.name}: {protocol.status_text(status)}",
-                code=status & 15,
-                node=node.node,
-            )
         return decode(reply[5:-2])
 
-    expected = Expected(node.node, node.node, protocol.OVERHEAD + size, refusal)
-    frame = protocol.encode_request(node.node, command, operands)
-    return Request(frame, (expected,), take, repeatable=True, **options)
+    frame = protocol.encode(protocol.REQUEST, node.node, command, operands)
+    return Request(
+        frame, (expected,), take, repeatable=True, **options
+    )  # goals are absolute: all may be repeated
 
 
 def read_row(node: Node, row: Register) -> Request[int]:
     """The raw value of one register."""
-    return request(node, Command.READ, bytes((row.address, row.size)), size=row.size, decode=row.decode)
+    return request(node, Command.READ, bytes((row.address, row.size)), row.decode, row.size)
 
 
-def write_row(node: Node, row: Register, raw: int, *setpoints: Setpoint, **options: Any) -> Request[None]:
+def write_row(node: Node, row: Register, raw: int, **options: Any) -> Request[None]:
     """Write one register. Raises RequestError for a raw value out of range."""
     return request(
         node,
         Command.WRITE,
         bytes((row.address,)) + row.encode(raw),
-        decode=_no_value,
+        lambda data: None,
         priority=Priority.CONTROL,
         effect=row.effect,
-        setpoints=setpoints,
         reply_within=TimeoutClass.STORE if row.storage is Storage.EEPROM else TimeoutClass.REPLY,
         **options,
     )
+
+
+def probe(node: Node, attempt: int = 0) -> Request[bool]:
+    """Read 8 to 23 bytes from address 0; True if the id among them is possible. No other reply has these lengths."""
+    size = 8 + attempt % 16
+    frame = protocol.encode(protocol.REQUEST, node.node, Command.READ, bytes((0, size)))
+    expected = Expected(node.node, node.node, protocol.OVERHEAD + size)
+
+    def decode(response: Response) -> bool:
+        return response.replies[0].data[5 + TABLE["node_id"].address] in protocol.IDS
+
+    return Request(frame, (expected,), decode, repeatable=True)
 
 
 def health(node: Node) -> Request[Health]:
     """Position (rad), temperature (°C), moving, alarm and torque, in one request."""
 
     def decode(data: bytes) -> Health:
-        position, temperature = to_position(data), TABLE["temperature"].decode(data[5:6])
-        state = State(node.at, position, temperature=temperature, moving=bool(data[4]), alarm=node.alarm)
-        return Health(state, torque=data[6] == 1)
+        counts, moving, temperature, torque = FEEDBACK.unpack(data)
+        state = State(node.at, counts * COUNT, temperature=temperature, moving=bool(moving), alarm=node.alarm)
+        return Health(state, torque=bool(torque))
 
     def positions(response: Response) -> dict[int, float]:
-        reply = response.replies[0].data
-        return {} if len(reply) < protocol.OVERHEAD + 7 else {node.node: to_position(reply[5:])}
+        counts, *_ = FEEDBACK.unpack(response.replies[0].data[5:-2])
+        return {node.node: counts * COUNT}
 
-    block = bytes((PRESENT.address, 7))
-    return request(node, Command.READ, block, size=7, decode=decode, reports_position=positions)
-
-
-def to_position(data: bytes) -> float:
-    """The present position (rad) at the start of these bytes."""
-    return float(PRESENT.to_value(PRESENT.decode(data[: PRESENT.size])))
+    block = bytes((TABLE["present_position"].address, FEEDBACK.size))
+    return request(node, Command.READ, block, decode, FEEDBACK.size, reports_position=positions)
 
 
 def telemetry(node: Node) -> Request[State]:
     """Position (rad), temperature (°C), moving and alarm."""
-    return health(node).convert(lambda health: health.state)
+    return health(node).convert(lambda found: found.state)
 
 
 def position(node: Node) -> Request[float]:
     """Present position (rad)."""
-    return health(node).convert(lambda health: health.state.position or 0.0)
+    return health(node).convert(lambda found: found.state.position or 0.0)
 
 
 def stop(node: Node) -> Request[Promise]:
     """Brake and hold; torque stays as it is."""
     return request(
-        node,
-        Command.STOP,
-        decode=lambda data: Promise.HOLD_ACCEPTED,
-        priority=Priority.STOP,
-        effect=Effect.MOTION,
+        node, Command.STOP, b"", lambda data: Promise.HOLD, priority=Priority.STOP, effect=Effect.MOTION
     )
 
 
 def disable_torque(node: Node) -> Request[None]:
     """Torque off: the shaft turns freely."""
-    return write_row(node, TORQUE, 0)
+    return write_row(node, TABLE["torque_enable"], 0)
 
 
-def probe(node: Node, attempt: int = 0) -> Request[bool]:
-    """Read 7 to 22 bytes from the model on; True if the id among them is possible. No other read has these lengths."""
-    size = 7 + attempt % 16
-
-    def decode(data: bytes) -> bool:
-        return data[TABLE["node_id"].address] in protocol.IDS
-
-    return request(node, Command.READ, bytes((0, size)), size=size, refusal=0, decode=decode)
-
-
-def _no_value(data: bytes) -> None:
-    """A reply without data."""
-
-
-# -- identity and registers ----------------------------------------------------------------------------------
+def goal(node: Node, to: float, bounds: tuple[float, float], **options: Any) -> Request[None]:
+    """Send a goal (rad). The gate checks that it is within these bounds (rad). Raises LimitExceeded if not finite."""
+    try:
+        raw = GOAL.to_raw(to)
+        setpoint = Setpoint(node.node, "position", float(GOAL.to_value(raw)), *bounds)
+        return write_row(node, GOAL, raw, setpoints=(setpoint,), **options)
+    except RequestError as error:
+        summary = f"node {node.node}: {error.summary}"
+        raise LimitExceeded(summary, expected=error.expected, node=node.node) from None
 
 
 async def ping(node: Node) -> bool:
@@ -190,7 +179,7 @@ async def identify(node: Node) -> Identity:
     model = await read_row(node, TABLE["model"])
     firmware = await read_row(node, TABLE["firmware"])
     known = model == TABLE["model"].default
-    name = "metronome" if known else f"unknown model 0x{model:04X}"
+    name = TABLE.name if known else f"unknown model 0x{model:04X}"
     return Identity(node.node, name, f"{firmware >> 8}.{firmware & 255}", TABLE.name if known else "")
 
 
@@ -200,48 +189,29 @@ async def read(node: Node, /, *names: str) -> dict[str, Value]:
 
 
 async def write(node: Node, /, **values: Value) -> None:
-    """Write registers by name in API units; all values are checked before the first is sent.
-
-    Raises RequestError for a value that is not written by name, VerificationFailed when a setting reads back different.
-    """
-    if values.get("torque_enable"):
-        raise RequestError("torque_enable is not written by name: use enable_torque()", node=node.node)
-    methods = {"node_id": "the tool of the maker", "lock": "write(), which opens and closes it"}
-    raws = writable_values(TABLE, values, Register.to_raw, node=node.node, methods=methods)
-    await Exclusive(_write_settings(node, [(row, raw) for row, raw in raws if row.storage is Storage.EEPROM]))
-    for row, raw in raws:
-        if row is GOAL:
-            await write_row(node, row, raw, await setpoint(node, raw))
-        elif row.storage is Storage.RAM:
-            await write_row(node, row, raw)
+    """Write registers by name in API units. Raises RequestError before anything is sent, or VerificationFailed."""
+    raws = writable_values(TABLE, values, Register.to_raw, node=node.node, methods=METHODS)
+    settings = [(row, raw) for row, raw in raws if row.storage is Storage.EEPROM]
+    if settings:
+        await Exclusive(with_cleanup(_write_settings(node, settings), lambda: _close_lock(node)))
+    if GOAL.name in values:
+        await move(node, values[GOAL.name], wait=False)
 
 
-class Unlocked(Guard):
-    """Settings can be written inside the block. The lock is closed after it, also after an error or an interrupt."""
-
-    def __init__(self, node: Node) -> None:
-        self._node = node
-
-    async def enter(self) -> None:
-        await write_row(self._node, TABLE["lock"], 0)
-
-    async def leave(self, error: BaseException | None) -> None:
-        lock = write_row(self._node, TABLE["lock"], 1)
-        if await catch(lock) is not None:  # no acknowledgement: write it again
-            await lock
-
-
-async def _write_settings(node: Node, values: Sequence[tuple[Register, int]]) -> None:
-    if not values:
-        return
+async def _write_settings(node: Node, settings: Sequence[tuple[Register, int]]) -> None:
+    """Open the lock, then write and verify each setting."""
     node.limits = None
-    async with Unlocked(node):
-        for row, raw in values:
-            write, read = partial(write_row, node, row, raw), partial(read_row, node, row)
-            await write_verified(write, read, raw, node=node.node, what=row.name)
+    await write_row(node, TABLE["lock"], 0)
+    for row, raw in settings:
+        send = partial(write_row, node, row, raw)
+        await write_verified(send, partial(read_row, node, row), raw, node=node.node, what=row.name)
 
 
-# -- motion --------------------------------------------------------------------------------------------------
+async def _close_lock(node: Node) -> None:
+    """Close the lock; without an acknowledgement once more."""
+    lock = write_row(node, TABLE["lock"], 1)
+    if await catch(lock) is not None:
+        await lock
 
 
 async def limits(node: Node) -> tuple[float, float]:
@@ -252,61 +222,46 @@ async def limits(node: Node) -> tuple[float, float]:
     return node.limits
 
 
-async def setpoint(node: Node, raw: int) -> Setpoint:
-    """What a goal asks of the servo, with its limits; the gate checks it."""
-    return Setpoint(node.node, "position", float(GOAL.to_value(raw)), *await limits(node))
-
-
-def to_goal(node: Node, to: float) -> int:
-    """The raw goal of a position (rad). Raises LimitExceeded for a position that no servo can have."""
-    raw = GOAL.to_raw(to) if math.isfinite(to) else GOAL.high + 1
-    if not GOAL.low <= raw <= GOAL.high:
-        raise LimitExceeded(
-            f"node {node.node}: {to} is no position", advice="give a number in rad", node=node.node
-        )
-    return raw
-
-
 async def enable_torque(node: Node) -> None:
     """Torque on without a jump: the goal becomes the present position first."""
-    here = await read_row(node, PRESENT)
-    await write_row(node, GOAL, here, await setpoint(node, here))
-    await write_row(node, TORQUE, 1)
+    await goal(node, await position(node), await limits(node))
+    await write_row(node, TABLE["torque_enable"], 1)
 
 
 async def move(node: Node, to: float, *, wait: bool = True) -> None:
-    """Move to `to` rad and return in position, at once with `wait=False`.
+    """Move to `to` rad; return in position, or at once with `wait=False`. An interrupt of the wait stops the servo.
 
-    An interrupted wait stops the servo. Raises LimitExceeded for a goal outside the limits, Stalled when it stops
-    elsewhere.
+    Raises LimitExceeded for a goal outside the limits, Stalled when the servo stops elsewhere.
     """
-    raw = to_goal(node, to)
-    await write_row(node, GOAL, raw, await setpoint(node, raw))
+    send = goal(node, to, await limits(node))
 
-    if wait:
-        arrival = wait_in_position(
+    async def send_and_wait() -> None:
+        await send
+        await wait_in_position(
             lambda: telemetry(node), to, node=node.node, tolerance=0.01, timeout=lambda way: 5.0 + 2.0 * way
         )
-        await stopped_if_interrupted(arrival, Moving(node, partial(stop, node), partial(position, node)))
+
+    if wait:
+        device = Moving(node, partial(stop, node), partial(position, node))
+        await stopped_if_interrupted(send_and_wait(), device)
+    else:
+        node.last_move = None  # an earlier move that is interrupted does not stop this one
+        await send
 
 
 async def open_stream(nodes: Sequence[Node], *, rate: int) -> PositionStream[Node]:
     """These servos for a control loop. Reads their limits and writes nothing."""
     known = {node: await limits(node) for node in nodes}
 
-    def goal(node: Node, to: float, precondition: Precondition) -> Request[None]:
-        raw = to_goal(node, to)
-        setpoint = Setpoint(node.node, "position", float(GOAL.to_value(raw)), *known[node])
-        return write_row(node, GOAL, raw, setpoint, precondition=precondition)
+    def send(node: Node, to: float, precondition: Precondition) -> Request[None]:
+        return goal(node, to, known[node], precondition=precondition)
 
     async def start(node: Node, speed: float | None) -> None:
         await enable_torque(node)  # the servo has no setting for a speed
 
     positions = [read_positions(node.node, position(node)) for node in nodes]
-    return PositionStream(nodes, positions, goal, start, lambda node: node.limits != known[node])
+    return PositionStream(nodes, positions, send, start, lambda node: node.limits != known[node])
 
-
-# -- the bus -------------------------------------------------------------------------------------------------
 
 _AXIS: Final = AxisDriver(
     state=telemetry,
@@ -325,25 +280,23 @@ class MetronomeDriver(HalfDuplexSerial):
     """Metronomes on one open bus; see `core.family.BusDriver`."""
 
     ids = protocol.IDS
-    longest_reply = protocol.OVERHEAD + protocol.MOST_DATA
 
     def receiver(self) -> Receiver:
-        return protocol.receiver()
+        return FrameReceiver(protocol.parser(protocol.REPLY), lambda frame: frame[2])
 
     def probe(self, node: int, attempt: int) -> Request[bool]:
         return probe(Node(node), attempt)
 
     def stop(self, nodes: Mapping[int, Response | None]) -> Stop:
-        frame = protocol.encode_request(protocol.BROADCAST, Command.STOP)
-        everyone = Request[Response](frame, priority=Priority.STOP, effect=Effect.MOTION)
-        each = [stop(Node(node)) for node in nodes]
-        return Stop((everyone, *each), Promise.HOLD_ACCEPTED.value)
+        frame = protocol.encode(protocol.REQUEST, protocol.BROADCAST, Command.STOP)
+        broadcast = Request[Response](frame, priority=Priority.STOP, effect=Effect.MOTION)
+        return Stop((broadcast, *[stop(Node(node)) for node in nodes]), Promise.HOLD.value)
 
     async def identify(self, node: int) -> Identity:
         return await identify(Node(node))
 
     def axis(self, model: str) -> AxisDriver:
-        return _AXIS if model == "metronome" else AxisDriver()
+        return _AXIS if model == TABLE.name else AxisDriver()
 
     def decode(self, data: bytes) -> list[Explanation]:
         return protocol.decode(data)

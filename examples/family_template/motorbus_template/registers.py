@@ -30,9 +30,7 @@ TABLE: Final = RegisterMap(
     (
         _read(name="model", address=0x00, size=2, storage=Storage.FACTORY, high=0xFFFF, default=0x0401),
         _read(name="firmware", address=0x02, size=2, storage=Storage.FACTORY, high=0xFFFF, default=0x0102),
-        _setting(
-            name="node_id", address=0x04, size=1, low=1, high=63, default=1, effect=Effect.IDENTITY, protected=True
-        ),
+        _setting(name="node_id", address=0x04, size=1, low=1, high=63, effect=Effect.IDENTITY, protected=True),
         _setting(name="min_position", address=0x05, default=-65536, effect=Effect.PERSISTENT, **_ANGLE),
         _setting(name="max_position", address=0x09, default=65536, effect=Effect.PERSISTENT, **_ANGLE),
         _command(
@@ -43,12 +41,6 @@ TABLE: Final = RegisterMap(
         _read(name="present_position", address=0x12, **_ANGLE),
         _read(name="moving", address=0x16, size=1, high=1, bits={0: "moving"}),
         _read(name="temperature", address=0x17, size=1, coding=Coding.TWOS_COMPLEMENT, low=-128, high=127, unit="°C"),
-        _command(
-            name="torque_enable", address=0x18, size=1, high=1, default=0, effect=Effect.TORQUE,
-            choices={0: "off", 1: "on"},
-        ),
+        _command(name="torque_enable", address=0x18, size=1, high=1, default=0, effect=Effect.TORQUE, protected=True),
     ),
-    title="Metronome servos",
 )  # fmt: skip
-END: Final = 0x19
-"""The first address without a register."""

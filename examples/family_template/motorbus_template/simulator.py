@@ -11,20 +11,12 @@ from motorbus.core.simulated import PoweredDevice, SerialLine
 from motorbus.errors import RequestError
 
 from . import protocol
-from .protocol import Command
-from .registers import COUNT, END, TABLE
+from .registers import COUNT, TABLE
 
 RATE: Final = 500_000
-REPLY_DELAY: Final = 0.0003
-"""s from the end of a request to the start of its reply. # assumption"""
-STORE_TIME: Final = 0.004
-"""s longer for a setting. # assumption"""
-SPEED: Final = 6.0 / COUNT
-"""counts/s. # assumption"""
-ACCELERATION: Final = 40.0 / COUNT
-"""counts/s². # assumption"""
-HOT: Final = 80
-"""°C above which the alarm is set. # assumption"""
+REPLY_DELAY: Final = 0.0003  # s from the end of a request to the start of its reply # assumption
+SPEED: Final = 6.0 / COUNT  # counts/s # assumption
+ACCELERATION: Final = 40.0 / COUNT  # counts/s² # assumption
 
 
 class Servo(PoweredDevice):
@@ -47,7 +39,7 @@ class Servo(PoweredDevice):
         }
 
     def power_off(self) -> None:
-        self._release(self._bus.now)
+        self._move(self._bus.now, 0.0)
 
     def power_on(self) -> None:
         self._values |= {row.name: row.default or 0 for row in TABLE.values() if row.storage is Storage.RAM}
@@ -56,30 +48,24 @@ class Servo(PoweredDevice):
     def status(self) -> dict[str, object]:
         return {"plugged": self.plugged, **self.memory}
 
-    def reply(self, command: int, operands: bytes, at: float) -> tuple[float, bytes]:
-        """Carry out a request; return the delay (s) and the reply."""
-        status, data, delay = 5, b"", REPLY_DELAY
-        if command == Command.STOP:
+    def reply(self, command: int, operands: bytes, at: float) -> bytes:
+        """Carry out a request; return the reply."""
+        status, data = 5, b""
+        if command == protocol.Command.STOP:
             status = 0
             self._move(at, 0.0)
-        elif command == Command.READ and len(operands) == 2:
+        elif command == protocol.Command.READ and len(operands) == 2:
+            memory = self.memory
+            image = b"".join(row.encode(memory[row.name]) for row in TABLE.values())  # they have no gaps
             start, end = operands[0], operands[0] + operands[1]
-            status, data = (0, self._image()[start:end]) if start < end <= END else (1, b"")
-        elif command == Command.WRITE and operands:
+            status, data = (0, image[start:end]) if start < end <= len(image) else (1, b"")
+        elif command == protocol.Command.WRITE and operands:
             status = self._write(operands[0], operands[1:], at)
-            row = TABLE.at(operands[0])
-            if row is not None and row.storage is Storage.EEPROM and not status:
-                delay += STORE_TIME
-        alarm = 1 << 4 if self.temperature > HOT else 0
-        return delay, protocol.encode_reply(self.id, alarm | status, data)
-
-    def _image(self) -> bytes:
-        image, memory = bytearray(END), self.memory
-        for row in TABLE.values():
-            image[row.address : row.address + row.size] = row.encode(memory[row.name])
-        return bytes(image)
+        alarm = protocol.HOT if self.temperature > 80 else 0
+        return protocol.encode(protocol.REPLY, self.id, alarm | status, data)
 
     def _write(self, address: int, data: bytes, at: float) -> int:
+        """Write one register; return the status."""
         row, values = TABLE.at(address), self._values
         if row is None or row.size != len(data):
             return 1
@@ -93,22 +79,13 @@ class Servo(PoweredDevice):
         if row.storage is Storage.EEPROM and values["lock"]:
             return 4
         values[row.name] = raw
-        if row.name == "torque_enable" and not raw:
-            self._release(at)
-        elif row.name in ("goal_position", "torque_enable") and values["torque_enable"]:
-            self._move(at, SPEED)
+        if row.name in ("goal_position", "torque_enable"):
+            self._move(at, SPEED if values["torque_enable"] else 0.0)  # without torque it brakes # assumption
         return 0
-
-    def _release(self, at: float) -> None:
-        """Friction holds the shaft at once."""
-        self._motion = plant.rest(at, self._motion.position(at))
 
     def _move(self, at: float, speed: float) -> None:
         """Move to the goal; with speed 0 brake."""
-        here, velocity = self._motion.position(at), self._motion.velocity(at)
-        if not speed and not velocity:
-            self._release(at)
-            return
+        here, velocity, _ = self._motion.state(at)
         goal = float(self._values["goal_position"])
         self._motion = plant.move(at, here, goal, velocity=velocity, speed=speed, acceleration=ACCELERATION)
 
@@ -127,6 +104,6 @@ class Metronomes(SerialLine[Servo]):
     def carry_out(self, frame: bytes, at: float) -> None:
         for servo in self.nodes.values():
             if servo.plugged and frame[2] in (servo.id, protocol.BROADCAST):
-                delay, reply = servo.reply(frame[4], frame[5:-2], at)
+                reply = servo.reply(frame[4], frame[5:-2], at)
                 if frame[2] != protocol.BROADCAST:
-                    self.send(at + delay, reply)
+                    self.send(at + REPLY_DELAY, reply)
