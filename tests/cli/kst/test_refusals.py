@@ -41,6 +41,7 @@ READS = ("#40", "#60", "#70")
         ("kst reverse BUS#37 on --yes", 2, "profile"),
         ("kst mid-point BUS#37 --yes", 2, "profile"),
         ("kst reports on BUS#37", 2, "profile"),
+        ("kst reports off BUS#37 --interval 10ms", 2, "no interval"),
         ("kst limits EXT#37 -1 1", 8, "--yes"),
         ("kst limits EXT#37 -1 --yes", 2, "one limit alone"),
         ("kst reverse EXT#37 on", 8, "--yes"),

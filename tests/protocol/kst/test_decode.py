@@ -155,3 +155,5 @@ def test_value_outside_its_range_or_of_an_unknown_object_is_shown() -> None:
         (0x1018, b"\x01\x02", "write 0x1018:0 = 513"),
     ):
         assert text in decode_one(sdo.encode_download(37, index, 0, data)).title
+    turned = decode_one(sdo.encode_upload_reply(37, 0x6002, 0, b"\xd0\x07"))
+    assert turned.title.endswith("200° (raw 2000, 10 per degree), outside -90° to 90° of profile kst")

@@ -29,7 +29,14 @@ from motorbus.families.kst.driver.bus import KstDriver
 from motorbus.families.kst.driver.node import checked_id
 from motorbus.families.kst.driver.scan import ScanWarning, scan_bit_rates
 from motorbus.families.kst.driver.servo import Servo, settings_of
-from motorbus.families.kst.profiles import PROFILES, bit_rate_code, current, temperature, version_text
+from motorbus.families.kst.profiles import (
+    PROFILES,
+    VERSIONS,
+    bit_rate_code,
+    current,
+    temperature,
+    version_text,
+)
 
 Device = Annotated[str, Parameter(name="BUS#ID", help="As kst:can://slcan/dev/ttyACM0#0x25.")]
 Switch = Literal["on", "off"]
@@ -43,7 +50,8 @@ app = App(
 )
 command = partial(device_command, app, Servo, Device)
 """Register a command: usage, note, examples. It is run with a `Run`: `write` asks for consent, or shows the frames of a
-dry run; `show` prints the result, in a dry run nothing. Without `consent` the command has no --yes."""
+dry run; `show` prints facts (as JSON) or their text, in a dry run nothing. `consent` names what --yes consents to, by
+default every write; with "" the command has no --yes."""
 
 
 def label(node: int) -> str:
@@ -265,8 +273,10 @@ def reports(
     interval: Annotated[str, Parameter(help="Time between two reports, as 10ms.")] = "",
 ) -> Exit:
     """Start or stop the position reports of a servo."""
-    seconds = units.parse(interval, "time") if interval else None
     on = switch == "on"
+    if interval and not on:
+        raise RequestError("reports that end have no interval", expected="--interval with `reports on` only")
+    seconds = units.parse(interval, "time") if interval else None
     run.write(lambda servo: servo.start_reports(seconds) if on else servo.stop_reports())
     text = f"reports of {run.label} switched {switch}; the servo does not acknowledge this"
     return run.show({"reports": on, "interval": seconds}, text)
@@ -398,7 +408,7 @@ def say(event: object) -> str:
 
 def meaning(row: Register, raw: int) -> str:
     """For `motorbus read`: the raw value of an object in words."""
-    if row.name in ("firmware_version", "software_version"):
+    if row.name in VERSIONS:
         return version_text(raw.to_bytes(row.size, "little"))
     for profile in PROFILES.values():
         if row is profile.status_row:

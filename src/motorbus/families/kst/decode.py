@@ -207,7 +207,7 @@ class _Frame:
         row = self.row
         size = stated or (row.size if row else 4)
         data = self.fields.rest[:size]
-        name = row.name if row else "data"
+        name, note = row.name if row else "data", ""
         if name in VERSIONS:
             text = f'"{version_text(data)}"'
         elif row is None or row.size != size:
@@ -224,8 +224,10 @@ class _Frame:
             return f"{ampere}, {degrees}"
         else:
             text = self._meaning(row, data)
-        self.fields.take(size, name, text)
-        return text.partition("; or,")[0]
+            if self._is_ambiguous:
+                note = f"; or, if command 7 was meant, the status 0x{data[0]:02X} 0x{data[1]:02X}"
+        self.fields.take(size, name, text + note)
+        return text
 
     def _meaning(self, row: Register, data: bytes) -> str:
         raw = row.decode(data)
@@ -236,8 +238,6 @@ class _Frame:
         text = str(raw)
         if row.unit == "rad":
             text, low, high = self._angle(raw), self._degrees(row.low), self._degrees(row.high)
-            if self._is_ambiguous:
-                text += f"; or, if command 7 was meant, the status 0x{data[0]:02X} 0x{data[1]:02X}"
         elif row.bits:
             names = ", ".join(name for bit, name in row.bits.items() if raw >> bit & 1)
             text = f"0x{raw:02X} ({names or 'none'})"
@@ -280,7 +280,7 @@ class _Frame:
                 guard = ", toggle bit of node guarding set" if data[0] & 0x80 else ""
                 what = notifications.STATES[data[0] & 0x7F] + guard
                 self.fields.take_rest("state", what)
-            case _:
+            case _:  # an emergency
                 code = int.from_bytes(data[:2], "little")
                 what = f"0x{code:04X}, {EMERGENCIES.get(code >> 12, 'not known')}"
                 bits = [name for bit, name in enumerate(ERROR_REGISTER) if data[2] >> bit & 1]

@@ -168,10 +168,11 @@ class Change:
     async def wait(self, place: Place, timeout: float) -> None:
         """Read at the old place and the new one in turn until the servo answers at the new one only.
 
-        Another rate is tried only while the servo is silent at the old one.
+        Another rate is tried only while the servo is silent at the old one. Raises VerificationFailed if it comes back
+        unchanged, OutcomeUnknown after `timeout` s or if a servo answers at both places.
         """
         old, new = place.node.node, self.new.node
-        begun = await Sleep(0)
+        begun = await Sleep(0)  # the time
         silent = 0
         while True:
             now = await self._count_replies(place.node, place.rate)
@@ -181,8 +182,10 @@ class Change:
                     arrived = (await self._count_replies(self.new, self.new_rate)).replies > 0
             if arrived and not now.replies:
                 return
-            pending = now.reads_back == new != old  # it has not restarted
-            forgotten = place.reads_back == new != old == now.reads_back
+            pending = new != old and now.reads_back == new  # it has not restarted
+            forgotten = (
+                new != old and place.reads_back == new and now.reads_back == old
+            )  # it has, without the new id
             if now.replies and (forgotten or (silent >= SILENT_READS and not pending)):
                 if arrived:
                     raise self._answers_at_both(old)
@@ -214,14 +217,14 @@ class Change:
         return await (count_replies(node) if rate == self.rate else Exclusive(at_other_rate()))
 
     async def verify(self, place: Place | None) -> str:
-        """Check that one servo answers at the new place, and none at the old one. Returns its firmware version."""
+        """Check that one servo answers with the new id, and none with the old one. Returns its firmware version."""
         new = self.new.node
         async with BitrateRestored():
             if self.new_rate != self.rate:
                 await SetBitrate(self.new_rate)
-            moved = place is not None and place.rate == self.new_rate and place.node is not self.new
-            if place is not None and moved and (await count_replies(place.node)).replies:
-                raise self._answers_at_both(place.node.node)
+            old = place.node if place is not None and place.rate == self.new_rate else self.new
+            if old is not self.new and (await count_replies(old)).replies:
+                raise self._answers_at_both(old.node)
             _, second = await survey(self.new)
             if second:
                 raise VerificationFailed(

@@ -131,10 +131,11 @@ async def scan_bit_rates(
                     "this adapter cannot listen without taking part, so its bit rate is not searched for",
                     expected="an adapter with a listen-only mode, or isolated=True if nothing depends on this bus",
                 )
-            activity = activity or dict.fromkeys(rates, LineActivity.SILENCE)
-            silent = [rate for rate, what in activity.items() if what is LineActivity.SILENCE]
-            for rate in silent if isolated else ():
-                if await _select_rate(settings, rate, listen_first=False):
+            silence = LineActivity.SILENCE
+            for rate in rates if isolated else ():
+                if activity.get(rate, silence) is silence and await _select_rate(
+                    settings, rate, listen_first=False
+                ):
                     found = await _scan_at(settings, (), rate, careful=True)
                     if found:
                         return BitRates(rate, activity, tuple(found))
@@ -159,13 +160,14 @@ def _check_rates(rates: Sequence[int]) -> None:
 
 
 async def listen(settings: BusSettings, rate: int, seconds: float) -> LineActivity:
-    """Listen at this rate without sending. Raises LinkError when the adapter cannot. The rate stays set."""
+    """Listen at this rate without sending, until a report or alarm comes. The rate stays set.
+
+    Replies and frames of other devices are counted too. Raises LinkError when the adapter cannot listen.
+    """
     await SetBitrate(rate, listen_only=True)
     state = received(settings)
     frames, errors = state.frames, state.errors
-    await WaitFor(
-        lambda notification: not is_bus_error(notification), seconds
-    )  # ends early; replies are counted too
+    await WaitFor(lambda notification: not is_bus_error(notification), seconds)
     if state.frames > frames:
         return LineActivity.TRAFFIC
     return LineActivity.ERRORS if state.errors > errors else LineActivity.SILENCE
@@ -284,7 +286,10 @@ async def _answers(servo: Node, rate: int) -> bool:
 
 
 async def _identify(servos: Sequence[Node], rate: int) -> list[Found]:
-    """Identify these servos; one that cannot be identified is found without identity."""
+    """Identify these servos; one that cannot be identified is found without identity.
+
+    Reports a `ScanWarning` for an id that is written and not in force, and for a position that cannot be read.
+    """
     identities = await gather(*[catch(identify(servo)) for servo in servos])
     positions = await gather(*[catch(position(servo)) for servo in servos])
     found: list[Found] = []

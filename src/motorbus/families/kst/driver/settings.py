@@ -54,7 +54,7 @@ def save(node: Node) -> Request[None]:
 async def store(node: Node, values: Sequence[tuple[Register, int]]) -> None:
     """Write these rows, read them back, save, and read them back again, with the bus reserved.
 
-    A row that reads so already is not written; values that this node has saved before are not saved again, because
+    Nothing is written if all rows read so already; values that this node has saved before are not saved again, because
     flash wears. Raises VerificationFailed when a row reads back different after three tries, or after the save.
     """
     wanted = {row.name: raw for row, raw in values}
@@ -113,13 +113,13 @@ async def set_mid_point(node: Node) -> float:
     row, profile = feature_row(node, "mid_point", "mid point"), node.profile
 
     async def write_and_save() -> float:
-        if not await position(node) and row.name in node.saved:
+        if await position(node) == 0 and row.name in node.saved:
             return 0.0
         node.limits = None
         node.saved.pop(row.name, None)
         await write_register(node, row, profile.mid_point_value, priority=Priority.CONFIGURATION)
         await save(node)
-        await Sleep(max(0.0, profile.mid_point_wait - profile.flash_wait))
+        await Sleep(max(0.0, profile.mid_point_wait - profile.flash_wait))  # `save` has waited for the flash
         node.saved[row.name] = profile.mid_point_value
         return await position(node)
 
@@ -134,8 +134,10 @@ def _limit_rows(node: Node) -> tuple[Register, Register]:
 async def travel_limits(node: Node) -> tuple[float, float]:
     """Lowest and highest position (rad) in the settings of the servo."""
     low, high = _limit_rows(node)
-    raws = await read_register(node, low, int), await read_register(node, high, int)
-    return float(low.to_value(raws[0])), float(high.to_value(raws[1]))
+    return (
+        float(low.to_value(await read_register(node, low, int))),
+        float(high.to_value(await read_register(node, high, int))),
+    )
 
 
 async def set_travel_limits(node: Node, low: float, high: float) -> None:

@@ -69,7 +69,7 @@ class KstBus:
         self._events: list[Event] = []
         self._order = count()
         self._begun = not quirks.reports_ms
-        self._time_requested = False
+        self._was_called = False
         for node in ids:
             self._add(node, profile)
         for node in duplicates:
@@ -137,9 +137,10 @@ class KstBus:
         return self.quirks.id_format in ("asked", "ext" if frame.extended else "std")
 
     def _disturb(self) -> None:
-        """Servos at another rate destroy a frame of the host until they are error passive; then it arrives.
+        """Servos at another rate destroy a frame of the host until they are error passive.
 
-        The adapter repeats the frame and reports one error. It reports one too if no servo acknowledges the frame.
+        The adapter repeats the frame until it arrives, so it is always delivered; it reports one error if a servo
+        destroyed it, or if only servos at another rate are there and none acknowledges it.
         """
         others = [servo for servo in self.servos if servo.plugged and not self._has_host_rate(servo)]
         active = any(servo.errors < PASSIVE_AFTER for servo in others)
@@ -166,10 +167,10 @@ class KstBus:
         """Start the reports that run from power-up on (`reports_ms`).
 
         The first time that the caller passes is the power-up: its clock may start anywhere. To get that time, `due`
-        returns -1 once, and the caller calls `advance` with the present time.
+        returns -1 until the first call of `receive` or `advance`.
         """
-        self._time_requested = True
-        if not self._begun and at >= 0:
+        self._was_called = True
+        if not self._begun and at >= 0:  # -1 comes from `due`
             self._begun = True
             for servo in self.servos:
                 servo.set_reporting(True, at)
@@ -177,7 +178,7 @@ class KstBus:
     def due(self) -> float | None:
         """Time (s) of the next frame, or None."""
         if not self._begun:
-            return None if self._time_requested else -1.0
+            return None if self._was_called else -1.0
         while self._events:
             event = self._events[0]
             if event.epoch == epoch_of(event.servo, event.frame):

@@ -62,7 +62,7 @@ class SdoServer:
         self._transfer = None  # a request ends a transfer (CiA 301)
         if request.kind == "abort":
             return None
-        reply: CanFrame | int | None = UNKNOWN_COMMAND
+        reply: CanFrame | int | None
         table = self._servo.profile.table
         row = table.at(request.index, request.subindex)
         if request.kind == "unknown":
@@ -77,7 +77,10 @@ class SdoServer:
         return self._abort(request, reply) if isinstance(reply, int) else reply
 
     def _upload(self, request: sdo.SdoRequest, row: Register, at: float) -> CanFrame | int:
-        """The value; the data bytes of the request are ignored (manual, command 4; reserved in CiA 301)."""
+        """The reply with the value, or an abort code.
+
+        The data bytes of the request are ignored (manual, command 4; reserved in CiA 301).
+        """
         if not row.readable:
             return WRITE_ONLY
         servo, quirks = self._servo, self._servo.quirks
