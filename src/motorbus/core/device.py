@@ -15,8 +15,8 @@ import inspect
 import re
 import sys
 from collections.abc import Callable, Coroutine
-from functools import cached_property
-from inspect import Parameter, Signature, getattr_static, signature
+from inspect import Parameter, getattr_static, signature
+from types import MethodType
 from typing import Any, ClassVar, Concatenate, Generic, ParamSpec, Protocol, Self, TypeVar, overload
 
 from motorbus.core.steps import Runnable
@@ -41,22 +41,24 @@ class AsyncRunner(Protocol):
 class _Device:
     """Base of devices. A copy of a device drops the cached methods: they are bound to the original."""
 
-    _is_async: ClassVar[bool] = False
+    _is_async: ClassVar[bool]
 
-    def _check_bus(self, bus: object) -> None:
+    def __init__(self, bus: Any) -> None:
         if getattr(bus, "is_async", self._is_async) is not self._is_async:
             needed, opener = ("an async", "open_async") if self._is_async else ("a blocking", "open")
             raise RequestError(
                 f"{type(self).__name__} needs {needed} bus, not {bus!r}",
                 advice=f"open the bus with motorbus.{opener}; nothing was sent",
             )
+        self.bus = bus
 
     def __getstate__(self) -> dict[str, Any]:
         kind = type(self)
-        cached = {
-            name for name in self.__dict__ if isinstance(getattr_static(kind, name, None), MethodDescriptor)
+        return {
+            name: value
+            for name, value in vars(self).items()
+            if not isinstance(getattr_static(kind, name, None), MethodDescriptor)
         }
-        return {name: value for name, value in self.__dict__.items() if name not in cached}
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {getattr(self, 'node', '')} on {getattr(self, 'bus', None)!r}>"
@@ -65,9 +67,8 @@ class _Device:
 class BlockingDevice(_Device):
     """A device whose methods run on a blocking bus. Raises RequestError for an async bus."""
 
-    def __init__(self, bus: BlockingRunner) -> None:
-        self._check_bus(bus)
-        self.bus = bus
+    _is_async = False
+    bus: BlockingRunner
 
 
 class AsyncDevice(_Device):
@@ -77,17 +78,14 @@ class AsyncDevice(_Device):
     """
 
     _is_async = True
-
-    def __init__(self, bus: AsyncRunner) -> None:
-        self._check_bus(bus)
-        self.bus = bus
+    bus: AsyncRunner
 
 
 class MethodDescriptor(Generic[P, T]):
     """Base of descriptors that make a method of a driver function; a subclass says how the method runs it.
 
-    On a class it gives a function with the signature of the method; `function` of that is the driver function.
-    `returns` names the types in which a driver function returns its value.
+    The method has the signature of the driver function, which is its attribute `function`. `returns` names the types in
+    which a driver function returns its value.
     """
 
     returns: ClassVar[str] = "Request|Procedure|Runnable"
@@ -96,56 +94,39 @@ class MethodDescriptor(Generic[P, T]):
         self.function = function
         self.name = getattr(function, "__name__", "")
         self.__doc__ = function.__doc__
-        self._of_class: dict[type, Any] = {}
+        self._methods: dict[type, Any] = {}
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
 
-    @cached_property
-    def signature(self) -> Signature:
-        """Of the method, with the type of its value."""
-        found = signature(self.function)
-        first, *rest = found.parameters.values()
-        parameters = [first.replace(name="self", annotation=Parameter.empty), *rest]
-        return found.replace(
-            parameters=parameters,
-            return_annotation=re.sub(rf"^(?:{self.returns})\[(.*)\]$", r"\1", str(found.return_annotation)),
-        )
+    def make_method(self) -> Callable[..., Any]:
+        """A function that calls the driver function and runs its result."""
+        raise NotImplementedError
 
     def of_class(self, owner: type) -> Any:
         """The method as an attribute of this class."""
-        if owner not in self._of_class:
-            descriptor: Any = self
+        if owner not in self._methods:
+            method: Any = self.make_method()
+            shown = signature(self.function)
+            first, *rest = shown.parameters.values()
+            method.__name__ = self.name
+            method.__qualname__ = f"{owner.__name__}.{self.name}"
+            method.__doc__ = self.function.__doc__
+            method.__signature__ = shown.replace(
+                parameters=[first.replace(name="self", annotation=Parameter.empty), *rest],
+                return_annotation=re.sub(
+                    rf"^(?:{self.returns})\[(.*)\]$", r"\1", str(shown.return_annotation)
+                ),
+            )
+            method.function = self.function
+            if getattr(owner, "_is_async", False) and sys.version_info >= (3, 12):
+                inspect.markcoroutinefunction(method)
+            self._methods[owner] = method
+        return self._methods[owner]
 
-            def method(self: Any, *args: Any, **kwargs: Any) -> Any:
-                return descriptor.__get__(self, type(self))(*args, **kwargs)
-
-            self._describe(method, owner, self.signature)
-            method.function = self.function  # type: ignore[attr-defined]
-            self._of_class[owner] = method
-        return self._of_class[owner]
-
-    def method(self, owner: Any, carry_out: Callable[[Any], Any]) -> Any:
-        """The method of `owner`: calls the function and passes the result to `carry_out`."""
-        function = self.function
-
-        def call(*args: Any, **kwargs: Any) -> Any:
-            return carry_out(function(owner, *args, **kwargs))
-
-        return self._described(call, owner)
-
-    def _described(self, call: Callable[..., Any], owner: object) -> Callable[..., Any]:
-        shown = self.signature
-        self._describe(call, type(owner), shown.replace(parameters=list(shown.parameters.values())[1:]))
-        return call
-
-    def _describe(self, method: Any, owner: type, shown: Signature) -> None:
-        method.__name__ = self.name
-        method.__qualname__ = f"{owner.__name__}.{self.name}"
-        method.__doc__ = self.function.__doc__
-        method.__signature__ = shown
-        if getattr(owner, "_is_async", False) and sys.version_info >= (3, 12):
-            inspect.markcoroutinefunction(method)
+    def of_object(self, one: Any) -> Any:
+        """The method bound to this object."""
+        return MethodType(self.of_class(type(one)), one)
 
 
 class device_method(MethodDescriptor[P, T]):  # noqa: N801 - used like a function
@@ -159,6 +140,16 @@ class device_method(MethodDescriptor[P, T]):  # noqa: N801 - used like a functio
     def __init__(self, function: Callable[Concatenate[Any, P], Runnable[T]]) -> None:
         super().__init__(function)
 
+    def make_method(self) -> Callable[..., Any]:
+        function: Callable[..., Any] = self.function
+
+        def method(device: Any, /, *args: Any, **kwargs: Any) -> Any:
+            # A call without arguments costs less than one with empty ones.
+            procedure = function(device, *args, **kwargs) if args or kwargs else function(device)
+            return device.bus.run(procedure)
+
+        return method
+
     @overload
     def __get__(self, device: None, owner: type) -> Self: ...
     @overload
@@ -168,15 +159,8 @@ class device_method(MethodDescriptor[P, T]):  # noqa: N801 - used like a functio
     def __get__(self, device: Any, owner: type) -> Any:
         if device is None:
             return self.of_class(owner)
-        function: Callable[..., Any] = self.function
-
-        # As `method` does for the descriptors of `motion`, with one call less per use.
-        def call(*args: Any, **kwargs: Any) -> Any:
-            procedure = function(device, *args, **kwargs) if args or kwargs else function(device)
-            return device.bus.run(procedure)
-
-        method = self._described(call, device)
+        method = self.of_object(device)
         # Cache it, so that the next call skips this descriptor; not if a subclass overrides it and calls `super`.
-        if getattr_static(type(device), self.name, None) is self:
-            device.__dict__[self.name] = method
+        if getattr_static(owner, self.name, None) is self:
+            vars(device)[self.name] = method
         return method

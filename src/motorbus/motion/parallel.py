@@ -78,9 +78,15 @@ class together(MethodDescriptor[P, T]):  # noqa: N801 - reads as a word in a lis
     @overload
     def __get__(self, machine: LedAsync, owner: type) -> Callable[P, Coroutine[Any, Any, T]]: ...
     def __get__(self, machine: Any, owner: type) -> Any:
-        if machine is None:
-            return self.of_class(owner)
-        return self.method(machine, lambda work: machine.conductor.run(work))
+        return self.of_class(owner) if machine is None else self.of_object(machine)
+
+    def make_method(self) -> Callable[..., Any]:
+        function: Callable[..., Any] = self.function
+
+        def method(machine: Any, /, *args: Any, **kwargs: Any) -> Any:
+            return machine.conductor.run(function(machine, *args, **kwargs))
+
+        return method
 
 
 def settled(results: Mapping[str, Any]) -> dict[str, Any]:

@@ -334,10 +334,16 @@ class looped(MethodDescriptor[P, T]):  # noqa: N801 - reads as a word in a list 
     @overload
     def __get__(self, machine: LedAsync, owner: type) -> Callable[P, Coroutine[Any, Any, T]]: ...
     def __get__(self, machine: Any, owner: type) -> Any:
-        if machine is None:
-            return self.of_class(owner)
-        carry_out = _blocking if isinstance(machine, Led) else _awaiting
-        return self.method(machine, lambda errand: carry_out(machine, errand))
+        return self.of_class(owner) if machine is None else self.of_object(machine)
+
+    def make_method(self) -> Callable[..., Any]:
+        function: Callable[..., Any] = self.function
+
+        def method(machine: Any, /, *args: Any, **kwargs: Any) -> Any:
+            carry_out: Callable[..., Any] = _blocking if isinstance(machine, Led) else _awaiting
+            return carry_out(machine, function(machine, *args, **kwargs))
+
+        return method
 
 
 @contextmanager
