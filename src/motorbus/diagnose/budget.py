@@ -12,8 +12,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from motorbus.core.can_bits import bits, unstuffed
-from motorbus.core.can_frame import CanFrame
+from motorbus.core.can_bits import bits, least
+from motorbus.core.can_frame import REMOTE_FLAG, CanFrame
 from motorbus.errors import RequestError
 
 
@@ -123,7 +123,7 @@ def budget(
         bitrate=bitrate,
         transfers=costs,
         bits=total,
-        unstuffed=sum(max(map(unstuffed, frames)) for transfer in cycle for frames in transfer.frames),
+        unstuffed=sum(max(map(_unstuffed, frames)) for transfer in cycle for frames in transfer.frames),
         time=time,
         besides=others,
         loop_rate=loop_rate,
@@ -134,6 +134,10 @@ def budget(
         latency=latency,
         turnaround=turnaround,
     )
+
+
+def _unstuffed(frame: CanFrame) -> int:
+    return least(0 if frame.id & REMOTE_FLAG else len(frame.data), frame.extended)
 
 
 def _cost(transfer: Transfer, bitrate: int) -> Cost:
