@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import sys
 import tomllib
-from dataclasses import replace
+from dataclasses import dataclass, fields
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -98,20 +98,25 @@ def possible(family: Family, ids: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(range(1, most + 1)) if most and len(ids) >= most else ids
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Kind(Family):
+    """A family whose simulated devices all have one register map; `options` of its simulator say which."""
+
+    options: dict[str, str]
+
+    def open(self, **settings: object) -> BusDriver:
+        names = {option.name for option in self.link.settings}
+        own = {name: value for name, value in self.options.items() if name in names}
+        return super().open(**{**own, **settings})
+
+    def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
+        chosen: dict[str, Any] = {**self.options, **options}
+        return super().simulator(ids, **(chosen | ({"model": model} if model else {})))
+
+
 def _kind(family: Family, key: str, options: dict[str, str]) -> Family:
-    """The family whose simulated devices all have one register map; `options` of its simulator say which."""
-    names = {option.name for option in family.link.settings}
-    settings = {name: value for name, value in options.items() if name in names}
-
-    def driver(one: Family, **given: object) -> BusDriver:
-        return family.driver(one, **{**settings, **given})
-
-    def simulator(ids: tuple[int, ...], model: str = "", **given: object) -> Simulator:
-        chosen: dict[str, Any] = {**options, **given}
-        return family.simulator(ids, **(chosen | ({"model": model} if model else {})))
-
-    registers = {key: family.registers[key]}
-    return replace(family, registers=registers, driver=driver, simulator=simulator)
+    facts = {one.name: getattr(family, one.name) for one in fields(family)}
+    return _Kind(**{**facts, "registers": {key: family.registers[key]}, "options": options})
 
 
 def _kinds(name: str, family: Family) -> dict[str, Family]:

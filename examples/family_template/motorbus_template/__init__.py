@@ -9,7 +9,7 @@ from motorbus.core.family import DeviceTypes, Family, LinkSpec
 
 from . import driver
 from .registers import TABLE
-from .simulator import RATE, Metronomes
+from .simulator import RATE
 
 
 class _Methods(driver.Node):
@@ -47,5 +47,5 @@ FAMILY: Final = Family(
     registers={TABLE.name: TABLE},
     devices=DeviceTypes(Servo, AsyncServo),
     driver=driver.MetronomeDriver,
-    simulator=Metronomes,
+    simulator_module=f"{__name__}.simulator",
 )

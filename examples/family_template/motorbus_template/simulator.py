@@ -107,3 +107,6 @@ class Metronomes(SerialLine[Servo]):
                 reply = servo.reply(frame[4], frame[5:-2], at)
                 if frame[2] != protocol.BROADCAST:
                     self.send(at + REPLY_DELAY, reply)
+
+
+simulate: Final = Metronomes

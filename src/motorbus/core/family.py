@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from enum import Enum
+from importlib import import_module
 from typing import Any, NamedTuple, Protocol
 
 from motorbus.core.guarantees import Guarantees
@@ -358,12 +359,7 @@ class BusDriver(Protocol):
 
     window: int
     full_duplex: bool
-
-    @property
-    def family(self) -> Family: ...
-
-    def lane(self, node: int) -> int:
-        """The lane of this node. Requests on one lane never overlap; all nodes of a serial line have lane 0."""
+    family: Family
 
     def air_time(self, request: Request[Any], rate: int) -> float:
         """Time (s) on the wire of the request and all expected replies, with the gaps of the protocol."""
@@ -413,14 +409,14 @@ class Family:
 
     `name`       the scheme of a bus address
     `registers`  all register maps, by name
-    `safety`     the safety properties of its devices; None if the family declares none
     `driver`     makes the `BusDriver` of a bus: driver(family, **settings). Raises RequestError for a bad setting
-    `simulator`  makes a simulated bus: simulator(ids, model, **options); model "" is the default model of the family.
-                 Raises RequestError for bad ids, models and options
-    `simulator_options`  the options of `simulator`; a function, so that the simulator is imported only when used
-    `recording`  makes the receiver for recordings of one direction, "rx" from the devices, "tx" to them, "" unknown or
-                 mixed; None: the receiver of the bus decodes them
-    `cli`        module with the shell commands of this family; "" without
+    `safety`     the safety properties of its devices; None if the family declares none
+
+    Dotted names of modules that are imported on first use; "" without
+
+    `simulator_module`  has `simulate(ids, model, **options)`, and `OPTIONS` if it has options
+    `recording_module`  has `Recording`; without it the receiver of the bus decodes recordings
+    `cli`               has the shell commands of this family
     """
 
     name: str
@@ -428,10 +424,9 @@ class Family:
     registers: Mapping[str, RegisterMap]
     devices: DeviceTypes
     driver: Callable[..., BusDriver]
-    simulator: Callable[..., Simulator]
-    simulator_options: Callable[[], tuple[Option, ...]] = tuple
-    recording: Callable[[str], RecordingReceiver] | None = None
     safety: Guarantees | None = None
+    simulator_module: str
+    recording_module: str = ""
     cli: str = ""
 
     def open(self, **settings: object) -> BusDriver:
@@ -444,3 +439,19 @@ class Family:
                     expected=f"one of {', '.join(known)}" if known else "no setting",
                 )
         return self.driver(self, **settings)
+
+    def simulator(self, ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
+        """A simulated bus; model "" is the default model. Raises RequestError for bad ids, models and options."""
+        simulator: Simulator = import_module(self.simulator_module).simulate(ids, model, **options)
+        return simulator
+
+    def simulator_options(self) -> tuple[Option, ...]:
+        """The options of `simulator`."""
+        return getattr(import_module(self.simulator_module), "OPTIONS", ())
+
+    def recording(self, direction: str) -> RecordingReceiver | None:
+        """A receiver for recordings of one direction: "rx" from the devices, "tx" to them, "" unknown or mixed."""
+        if not self.recording_module:
+            return None
+        receiver: RecordingReceiver = import_module(self.recording_module).Recording(direction)
+        return receiver

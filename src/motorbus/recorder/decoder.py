@@ -166,7 +166,7 @@ def _receiver(family: Family, direction: str) -> RecordingReceiver:
         raise RequestError(
             f"there is no direction {direction!r}", expected='"rx" from the devices, "tx" to them, "" both'
         )
-    return family.recording(direction) if family.recording else _BusReceiver(family)
+    return family.recording(direction) or _BusReceiver(family)
 
 
 class _BusReceiver:

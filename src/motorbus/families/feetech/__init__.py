@@ -19,11 +19,9 @@ from motorbus.core.family import (
     LinkSpec,
     Option,
     Receiver,
-    Simulator,
     Stop,
 )
 from motorbus.core.half_duplex import HalfDuplexSerial
-from motorbus.core.recording import RecordingReceiver
 from motorbus.core.request import Request, Response
 from motorbus.core.steps import Procedure, Runnable
 from motorbus.families.feetech import driver, wire
@@ -166,40 +164,12 @@ class FeetechDriver(HalfDuplexSerial):
         return explain(data)
 
 
-def _simulator(ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
-    from motorbus.families.feetech.simulator import simulate
-
-    return simulate(ids, model, **options)
-
-
-def _simulator_options() -> tuple[Option, ...]:
-    from motorbus.families.feetech.simulator import OPTIONS
-
-    return (
-        Option(
-            "baud",
-            int,
-            BAUD_CODES[0],
-            "rate of the bus in bit/s; servos of the STS series ship with 1000000",
-        ),
-        Option("ids", str, "1", "ids of the simulated servos, as 1-6 or 1+4+7"),
-        Option("model", str, "sts3215", "model of the simulated servos, or one for each joined by +"),
-        *OPTIONS,
-    )
-
-
 _ESTOP_HOLD: Final = Option(
     "estop_hold",
     str,
     "",
     "ids of servos that an emergency stop holds where they are, as 1+4, instead of letting them go",
 )
-
-
-def _recording(direction: str) -> RecordingReceiver:
-    from motorbus.families.feetech.wire.recording import Recording
-
-    return Recording(direction)
 
 
 FAMILY: Final = Family(
@@ -214,9 +184,8 @@ FAMILY: Final = Family(
     registers=TABLES,
     devices=DeviceTypes(Servo, AsyncServo),
     driver=FeetechDriver,
-    simulator=_simulator,
-    simulator_options=_simulator_options,
-    recording=_recording,
+    simulator_module="motorbus.families.feetech.simulator",
+    recording_module="motorbus.families.feetech.wire.recording",
     safety=ASSURANCE,
     cli="motorbus.cli.feetech",
 )

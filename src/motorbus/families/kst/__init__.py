@@ -8,15 +8,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from motorbus.core.family import (
-    DeviceTypes,
-    Family,
-    LinkSpec,
-    Option,
-    Simulator,
-)
+from motorbus.core.family import DeviceTypes, Family, LinkSpec, Option
 from motorbus.core.guarantees import Guarantee, Guarantees, Level
-from motorbus.core.recording import RecordingReceiver
 from motorbus.core.scan import Skipped
 from motorbus.families.kst.driver.broadcast import (
     broadcast_bit_rate,
@@ -95,33 +88,14 @@ GUARANTEES: Final = Guarantees(
 """Source: the CAN protocol sheets of the makers: they have a target position, no stop, torque switch or heartbeat."""
 
 
-def _simulator(ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
-    from motorbus.families.kst.simulator import simulate
-
-    return simulate(ids, model, **options)
-
-
-def _simulator_options() -> tuple[Option, ...]:
-    from motorbus.families.kst.simulator import OPTIONS
-
-    return OPTIONS
-
-
-def _recording(direction: str) -> RecordingReceiver:
-    from motorbus.families.kst.recording import Recording
-
-    return Recording()
-
-
 FAMILY: Final = Family(
     name="kst",
     link=LinkSpec("frames", DEFAULT_RATE, RATES, _SETTINGS, stops=("hold",)),
     registers=TABLES,
     devices=DeviceTypes(Servo, AsyncServo),
     driver=KstDriver,
-    simulator=_simulator,
-    simulator_options=_simulator_options,
-    recording=_recording,
+    simulator_module="motorbus.families.kst.simulator",
+    recording_module="motorbus.families.kst.recording",
     safety=GUARANTEES,
     cli="motorbus.families.kst.cli",
 )

@@ -19,6 +19,8 @@ class Recording:
         "node"
     )
 
+    def __init__(self, direction: str = "") -> None: ...
+
     def feed(self, frame: Any) -> list[RecordedEvent]:
         """Take one CAN frame; return it, or noise."""
         return [classify(frame)]

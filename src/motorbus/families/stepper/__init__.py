@@ -35,10 +35,8 @@ from motorbus.core.family import (
     LinkSpec,
     Option,
     Receiver,
-    Simulator,
     Stop,
 )
-from motorbus.core.recording import RecordingReceiver
 from motorbus.core.request import Request, Response
 from motorbus.core.steps import Procedure, Runnable
 from motorbus.families.stepper import driver, wire
@@ -148,9 +146,6 @@ class StepperDriver:
     def _node(self, node: int = wire.ONLY) -> driver.Node:
         return driver.Node(node, self.motor, self.order, self.memory)
 
-    def lane(self, node: int) -> int:
-        return 0
-
     def air_time(self, request: Request[Any], rate: int) -> float:
         return line.air_time(request, rate)
 
@@ -187,33 +182,14 @@ class StepperDriver:
         return explain(data, self.order)
 
 
-def _simulator(ids: tuple[int, ...], model: str = "", **options: object) -> Simulator:
-    from motorbus.families.stepper.simulator import simulate
-
-    return simulate(ids, model, **options)
-
-
-def _simulator_options() -> tuple[Option, ...]:
-    from motorbus.families.stepper.simulator import OPTIONS
-
-    return OPTIONS
-
-
-def _recording(direction: str) -> RecordingReceiver:
-    from motorbus.families.stepper.wire.recording import Recording
-
-    return Recording(direction)
-
-
 FAMILY: Final = Family(
     name="stepper",
     link=LinkSpec("bytes", RATE, (RATE,), _SETTINGS, only=wire.ONLY),
     registers=TABLES,
     devices=DeviceTypes(Controller, AsyncController),
     driver=StepperDriver,
-    simulator=_simulator,
-    simulator_options=_simulator_options,
-    recording=_recording,
+    simulator_module="motorbus.families.stepper.simulator",
+    recording_module="motorbus.families.stepper.wire.recording",
     safety=ASSURANCE,
     cli="motorbus.cli.stepper",
 )

@@ -63,9 +63,6 @@ class KstDriver:
         self.family = family
         self.settings = DEFAULT.replace(state=BusState(), **settings)
 
-    def lane(self, node: int) -> int:
-        return node
-
     def air_time(self, request: Request[Any], rate: int) -> float:
         """s on the wire for the request and all replies, with typical stuffing; a broadcast has up to 127 replies."""
         frame = request.wire
