@@ -29,7 +29,7 @@ def test_those_that_are_built_in_say_it() -> None:
 
 
 def test_every_sentence_is_one_and_no_watchdog_is_claimed(declared: Family) -> None:
-    for about, point in assurance(declared).points():
+    for about, point in assurance(declared).points().items():
         assert point.text.strip(), about
         assert not point.text.endswith("."), about
     assert assurance(declared).watchdog.given is Level.NO

@@ -40,7 +40,12 @@ class FrameParser:
         found: list[tuple[bytes, str]] = []
         buffer, start, noise, fault = self._buffer + data, 0, 0, "framing"
         while start < len(buffer):
-            size = self._size(buffer[start:])
+            rest = buffer[start:]
+            size: int | None = 0
+            if rest.startswith(self._headers):
+                size = self._length(rest)
+            elif any(header.startswith(rest) for header in self._headers):
+                size = None
             if (size is None or size > len(buffer) - start) and not end:
                 break
             frame = buffer[start : start + size] if size and size <= len(buffer) - start else b""
@@ -57,12 +62,6 @@ class FrameParser:
             found.append((buffer[noise:start], fault))
         self._buffer = buffer[start:]
         return found
-
-    def _size(self, data: bytes) -> int | None:
-        """Bytes of the frame at the start of `data`; None: unknown yet, 0: no frame."""
-        if data.startswith(self._headers):
-            return self._length(data)
-        return None if any(header.startswith(data) for header in self._headers) else 0
 
 
 class FrameReceiver:

@@ -6,9 +6,9 @@ a machine use it. A text states a fact; `Level` states how far a user can rely o
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from enum import Enum
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 
 class Level(Enum):
@@ -55,25 +55,20 @@ class Guarantees(NamedTuple):
     watchdog: Guarantee
     led: bool = False
 
-    def points(self) -> Iterator[tuple[str, Guarantee]]:
-        """Yield the title and the point of each property, in display order."""
-        for name, title in _TITLES.items():
-            if name == "estops":
-                for policy, point in self.estops.items():
-                    yield f"{title}: {policy}" if policy else title, point
-            else:
-                yield title, getattr(self, name)
-
-
-_TITLES: Final = {
-    "measured": "measures its position",
-    "limits": "limits of its own",
-    "stop": "a stop",
-    "estops": "emergency stop",
-    "alone": "when the host dies",
-    "ends": "every motion ends",
-    "torque": "torque switch",
-    "restart": "restart is noticed",
-    "strain": "load and heat",
-    "watchdog": "watchdog in it",
-}
+    def points(self) -> dict[str, Guarantee]:
+        """The properties by title, in display order."""
+        estops = {
+            f"emergency stop: {action}".removesuffix(": "): point for action, point in self.estops.items()
+        }
+        return {
+            "measures its position": self.measured,
+            "limits of its own": self.limits,
+            "a stop": self.stop,
+            **estops,
+            "when the host dies": self.alone,
+            "every motion ends": self.ends,
+            "torque switch": self.torque,
+            "restart is noticed": self.restart,
+            "load and heat": self.strain,
+            "watchdog in it": self.watchdog,
+        }

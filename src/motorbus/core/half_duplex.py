@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Final
 
-from motorbus.core.family import Family, Found, Identity
+from motorbus.core.family import BusDriver, Family, Found
 from motorbus.core.request import ANY, Request, TimeoutClass
-from motorbus.core.scan import BitrateRestored, scan_ids, scan_rates
-from motorbus.core.steps import Exclusive, Procedure, Runnable, SetBitrate
+from motorbus.core.scan import scan_ids, scan_rates
+from motorbus.core.steps import Exclusive, Procedure, SetBitrate
 
 BITS: Final = 10
 """Bits of a byte on the wire: start, eight of data, stop."""
 
 
-class HalfDuplexSerial:
+class HalfDuplexSerial(BusDriver):
     """Base of serial drivers; a subclass adds `receiver probe stop identify axis decode`, its ids and its figures."""
 
     window = 1
@@ -41,28 +41,18 @@ class HalfDuplexSerial:
     def __init__(self, family: Family) -> None:
         self.family = family
 
-    def lane(self, node: int) -> int:
-        """All nodes share one lane."""
-        return 0
-
     def air_time(self, request: Request[Any], rate: int) -> float:
-        """s on the wire of the request and its replies."""
-        replies = 0
-        if request.expected is ANY:
-            replies = self.broadcast_bytes
-        else:
-            for expected in request.expected:
-                replies += expected.length
+        replies = self.broadcast_bytes
+        if request.expected is not ANY:
+            replies = sum(expected.length for expected in request.expected)
         return (len(request.wire) + replies) * BITS / rate
 
     def turnaround(self, request: Request[Any]) -> float:
-        """s of devices before and between their replies."""
         if request.expected is ANY:
             return self.broadcast_delay
         return self.delays[request.reply_within] + self.delay_per_reply * len(request.expected)
 
     def quiet_time(self, rate: int) -> float:
-        """s after which no part of an old reply can arrive."""
         return self.longest_reply * BITS / rate + self.longest_gap
 
     def echo_test(self) -> Request[Any] | None:
@@ -71,27 +61,15 @@ class HalfDuplexSerial:
 
     async def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> list[Found]:
         """Probe each id twice; see `BusDriver.scan`."""
-        present = await SetBitrate(0)
-        if not rates:
-            return await self._scan(ids, present)
-        return await Exclusive(self._scan_rates(ids, rates))
 
-    async def _scan_rates(self, ids: tuple[int, ...], rates: tuple[int, ...]) -> list[Found]:
-        async with BitrateRestored():
-            return await scan_rates(rates, lambda rate: self._scan(ids, rate))
-
-    def _scan(self, ids: tuple[int, ...], rate: int) -> Procedure[list[Found]]:
         def ping(node: int) -> Request[bool]:
             probe = self.probe(node, 0)
             within = TimeoutClass.SCAN
             return Request(probe.wire, probe.expected, probe.decode, reply_within=within, repeatable=True)
 
-        return scan_ids(ids or tuple(self.ids), rate, ping, self.identify)
+        def scan_at(rate: int) -> Procedure[list[Found]]:
+            return scan_ids(ids or tuple(self.ids), rate, ping, self.identify)
 
-    def probe(self, node: int, attempt: int) -> Request[bool]:
-        """See `BusDriver.probe`."""
-        raise NotImplementedError
-
-    def identify(self, node: int) -> Runnable[Identity]:
-        """See `BusDriver.identify`."""
-        raise NotImplementedError
+        if not rates:
+            return await scan_at(await SetBitrate(0))
+        return await Exclusive(scan_rates(rates, scan_at))

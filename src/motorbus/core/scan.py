@@ -35,20 +35,21 @@ class BitrateRestored(Guard):
 
 
 async def scan_rates(rates: Sequence[int], scan: Callable[[int], Procedure[list[T]]]) -> list[T]:
-    """Run `scan(rate)` at each of these rates, and join the results. Run it in a `BitrateRestored`.
+    """Run `scan(rate)` at each of these rates, join the results and restore the rate of the bus.
 
     A rate that the adapter does not have is reported as `Skipped`.
     """
     found: list[T] = []
-    for rate in rates:
-        try:
-            await SetBitrate(rate)
-        except LinkLost:
-            raise
-        except LinkError as error:
-            await Emit(Skipped(rate, error.summary))
-            continue
-        found += await scan(rate)
+    async with BitrateRestored():
+        for rate in rates:
+            try:
+                await SetBitrate(rate)
+            except LinkLost:
+                raise
+            except LinkError as error:
+                await Emit(Skipped(rate, error.summary))
+                continue
+            found += await scan(rate)
     return found
 
 

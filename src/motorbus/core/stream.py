@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Final, Generic, Protocol, TypeVar
 
 from motorbus.core.family import Positions
@@ -51,21 +52,23 @@ class PositionStream(Generic[N]):
 
     def goals(self, to: Mapping[int, float]) -> Sequence[Request[None]]:
         """A request with a goal (rad) for each of these devices."""
-        return [self._request(self._device(node), position) for node, position in to.items()]
+        requests = []
+        for node, position in to.items():
+            device = self._device(node)
+            precondition = partial(self._check_settings, device)
+            if error := precondition():
+                raise error
+            requests.append(self._goal(device, position, precondition))
+        return requests
 
-    def _request(self, device: N, position: float) -> Request[None]:
-        def precondition(_: Stops | None = None) -> RequestError | None:
-            if not self._is_changed(device):
-                return None
-            return RequestError(
-                f"the settings of node {device.node} were written since this stream was made",
-                advice="end the loop and begin another",
-                node=device.node,
-            )
-
-        if error := precondition():
-            raise error
-        return self._goal(device, position, precondition)
+    def _check_settings(self, device: N, _: Stops | None = None) -> RequestError | None:
+        if not self._is_changed(device):
+            return None
+        return RequestError(
+            f"the settings of node {device.node} were written since this stream was made",
+            advice="end the loop and begin another",
+            node=device.node,
+        )
 
     async def start(self, speeds: Mapping[int, float]) -> None:
         """Prepare all devices at the same time; then raise the first error."""

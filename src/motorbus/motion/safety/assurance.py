@@ -89,7 +89,7 @@ def assured(
 
 
 def _points(said: Guarantees | None) -> dict[str, Guarantee]:
-    return {} if said is None else dict(said.points())
+    return {} if said is None else said.points()
 
 
 def _bounded(name: str, spec: AxisSpec, family: Family, said: Guarantees | None, period: float) -> Bounded:
