@@ -56,7 +56,8 @@ def test_an_angle_is_typed_with_or_without_unit(text: str, number: float) -> Non
 
 
 @pytest.mark.parametrize(
-    ("text", "raw"), [("2048raw", False), ("2048", True), ("0x800", True), ("2048raw", True)]
+    ("text", "raw"),
+    [("2048raw", False), (" 0x800 raw", False), ("2048", True), ("0x800", True), ("2048raw", True)],
 )
 def test_a_raw_value_is_said_to_be_one(text: str, raw: bool) -> None:
     assert quantity.typed(ANGLE, text, raw=raw) == (2048, True, False)
@@ -75,6 +76,8 @@ def test_a_plain_number_may_be_named(text: str, number: int) -> None:
         (ANGLE, "far"),
         (ANGLE, ""),
         (ANGLE, "1A"),
+        (ANGLE, "raw"),
+        (ANGLE, "2.5raw"),
         (MODE, "sideways"),
         (MODE, "1.5"),
     ],

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.core.units import SCALES, parse, rate, raw, real, show, whole, written
+from motorbus.core.units import SCALES, parse, rate, real, show, whole
 from motorbus.errors import RequestError
 
 
@@ -65,14 +65,6 @@ def test_what_cannot_be_meant_is_refused(text: str, quantity: str, says: str) ->
 
 
 @pytest.mark.parametrize(
-    ("text", "value"),
-    [("100raw", 100), ("-5 raw", -5), ("0x64 raw", 100), ("100", None), ("90deg", None), ("", None)],
-)
-def test_raw_only_when_the_text_says_so(text: str, value: int | None) -> None:
-    assert raw(text) == value
-
-
-@pytest.mark.parametrize(
     ("value", "quantity", "text"),
     [
         (pi / 2, "position", "1.5708 rad (90.0°)"),
@@ -87,28 +79,6 @@ def test_raw_only_when_the_text_says_so(text: str, value: int | None) -> None:
 )
 def test_values_for_people(value: float, quantity: str, text: str) -> None:
     assert show(value, quantity) == text
-
-
-@pytest.mark.parametrize(
-    ("value", "quantity", "unit", "text"),
-    [
-        (pi / 2, "position", "deg", "90 deg"),
-        (-pi, "position", "turn", "-0.5 turn"),
-        (1.25, "position", "rad", "1.25 rad"),
-        (0.123456789012345, "length", "mm", "123.456789012345 mm"),
-        (0.03, "length", "mm", "30 mm"),
-    ],
-)
-def test_a_value_is_written_as_people_would(value: float, quantity: str, unit: str, text: str) -> None:
-    assert written(value, quantity, unit) == text
-
-
-@given(
-    st.floats(-1e6, 1e6), st.sampled_from([(kind, unit) for kind in sorted(SCALES) for unit in SCALES[kind]])
-)
-def test_what_is_written_is_read_as_the_same_number(value: float, said: tuple[str, str]) -> None:
-    quantity, unit = said
-    assert parse(written(value, quantity, unit), quantity) == value
 
 
 @given(st.text(max_size=12), st.sampled_from(sorted(SCALES)))

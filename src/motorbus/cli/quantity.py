@@ -34,9 +34,9 @@ def typed(entry: Register, text: str, *, raw: bool = False) -> Typed:
     named = {name.casefold(): number for number, name in entry.choices.items()}
     if text.casefold() in named:
         return Typed(named[text.casefold()], True, True)
-    said = units.raw(text)
-    if said is not None or raw:
-        return Typed(_whole(entry, text) if said is None else said, True)
+    number = text.strip().removesuffix("raw")
+    if raw or number != text.strip():
+        return Typed(_whole(entry, number), True)
     if entry.unit in units.QUANTITIES:
         return Typed(units.parse(text, units.QUANTITIES[entry.unit]), False)
     return Typed(_whole(entry, text), True)

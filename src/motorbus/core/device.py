@@ -39,8 +39,6 @@ class AsyncRunner(Protocol):
 
 
 class _Device:
-    """Base of devices. A copy of a device drops the cached methods: they are bound to the original."""
-
     _is_async: ClassVar[bool]
 
     def __init__(self, bus: Any) -> None:
@@ -51,14 +49,6 @@ class _Device:
                 advice=f"open the bus with motorbus.{opener}; nothing was sent",
             )
         self.bus = bus
-
-    def __getstate__(self) -> dict[str, Any]:
-        kind = type(self)
-        return {
-            name: value
-            for name, value in vars(self).items()
-            if not isinstance(getattr_static(kind, name, None), MethodDescriptor)
-        }
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {getattr(self, 'node', '')} on {getattr(self, 'bus', None)!r}>"
@@ -92,7 +82,6 @@ class MethodDescriptor(Generic[P, T]):
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self.function = function
-        self.name = getattr(function, "__name__", "")
         self.__doc__ = function.__doc__
         self._methods: dict[type, Any] = {}
 
@@ -124,9 +113,10 @@ class MethodDescriptor(Generic[P, T]):
             self._methods[owner] = method
         return self._methods[owner]
 
-    def of_object(self, one: Any) -> Any:
-        """The method bound to this object."""
-        return MethodType(self.of_class(type(one)), one)
+    def bind(self, one: Any, owner: type) -> Any:
+        """The method of this object, or that of the class if `one` is None."""
+        method = self.of_class(owner)
+        return method if one is None else MethodType(method, one)
 
 
 class device_method(MethodDescriptor[P, T]):  # noqa: N801 - used like a function
@@ -157,10 +147,8 @@ class device_method(MethodDescriptor[P, T]):  # noqa: N801 - used like a functio
     @overload
     def __get__(self, device: AsyncDevice, owner: type) -> Callable[P, Coroutine[Any, Any, T]]: ...
     def __get__(self, device: Any, owner: type) -> Any:
-        if device is None:
-            return self.of_class(owner)
-        method = self.of_object(device)
-        # Cache it, so that the next call skips this descriptor; not if a subclass overrides it and calls `super`.
-        if getattr_static(owner, self.name, None) is self:
-            vars(device)[self.name] = method
-        return method
+        # The function replaces this descriptor in the class: the next call is a plain one. A subclass of this
+        # descriptor may check each access, and a class that overrides the method gets here by `super`.
+        if type(self) is device_method and getattr_static(owner, self.name, None) is self:
+            setattr(owner, self.name, self.of_class(owner))
+        return self.bind(device, owner)

@@ -22,38 +22,27 @@ from motorbus.errors import RequestError
 
 
 class Option(NamedTuple):
-    """An option `name=value` of a family, in a bus string or a flag.
-
-    `choices` are all valid values, () if not listed. `source`: where the simulated behaviour is documented, or that it
-    is assumed; "" where it needs none.
-    """
+    """An option `name=value` of a family, in a bus string or a flag."""
 
     name: str
     kind: type
     default: object
     help: str
-    choices: tuple[object, ...] = ()
-    source: str = ""
+    choices: tuple[object, ...] = ()  # all valid values; () if not listed
+    source: str = ""  # where the simulated behaviour is documented, or that it is assumed
 
 
 class LinkSpec(NamedTuple):
-    """Facts of a family that are needed before a bus is opened.
+    """Facts of a family that are needed before a bus is opened."""
 
-    `kind`      "bytes" or "frames"
-    `rate`      default rate (bit/s)
-    `rates`     rates (bit/s) that a device may have, for a scan of all rates
-    `settings`  options of a bus, simulated or not: arguments of `Family.open`
-    `only`      id of the only device on a line of this family; None: there may be several
-    `stops`     possible actions of an emergency stop on an axis, "torque_off" and "hold", the default first; () if
-                unknown. A family with both has a setting `estop_hold`: the ids that an emergency stop holds
-    """
-
-    kind: str
-    rate: int
-    rates: tuple[int, ...] = ()
-    settings: tuple[Option, ...] = ()
-    only: int | None = None
+    kind: str  # "bytes" or "frames"
+    rate: int  # bit/s by default
+    rates: tuple[int, ...] = ()  # bit/s that a device may have, for a scan of all rates
+    settings: tuple[Option, ...] = ()  # of a bus, simulated or not: arguments of `Family.open`
+    only: int | None = None  # id of the only device on a line of this family; None: several are possible
     stops: tuple[str, ...] = ()
+    """Possible actions of an emergency stop on an axis, "torque_off" and "hold", the default first; () if unknown. A
+    family with both has a setting `estop_hold`: the ids that an emergency stop holds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,37 +65,25 @@ class Found(NamedTuple):
 
 
 class IdChanged(NamedTuple):
-    """An event for `Emit` before a device gets another id: from now on `new` may reach the device `node`.
+    """An event for `Emit` before the first write that gives a device another id: `new` may reach it from now on."""
 
-    `node` is None if the device is unknown. The event precedes the first write.
-    """
-
-    node: int | None
+    node: int | None  # None if the device is unknown
     new: int
 
 
 class Quality(Enum):
-    """Reliability of a sample.
+    """Reliability of a sample."""
 
-    FRESH      new and plausible
-    REPEATED   an older sample again
-    CONFIRMED  implausible after the last one, but equal to a suspect one before it
-    SUSPECT    implausible and not confirmed
-    """
-
-    FRESH = "fresh"
-    REPEATED = "repeated"
-    CONFIRMED = "confirmed"
-    SUSPECT = "suspect"
+    FRESH = "fresh"  # new and plausible
+    REPEATED = "repeated"  # an older sample again
+    CONFIRMED = "confirmed"  # implausible after the last one, but equal to a suspect one before it
+    SUSPECT = "suspect"  # implausible and not confirmed
 
 
 class State(NamedTuple):
-    """One sample of a device in API units (rad, rad/s, fraction, A, V, °C); None for values it does not report.
+    """One sample of a device in API units (rad, rad/s, fraction, A, V, °C); None for values it does not report."""
 
-    `at` is the arrival time (s, link clock), `alarm` the names of the alarm bits that are set.
-    """
-
-    at: float
+    at: float  # arrival time (s, link clock)
     position: float | None = None
     velocity: float | None = None
     load: float | None = None
@@ -114,21 +91,17 @@ class State(NamedTuple):
     voltage: float | None = None
     temperature: float | None = None
     moving: bool | None = None
-    alarm: tuple[str, ...] = ()
+    alarm: tuple[str, ...] = ()  # names of the alarm bits that are set
     quality: Quality = Quality.FRESH
 
 
 class Health(NamedTuple):
-    """Health of a device, from one short request. Values that it does not report are None, in `state` too.
-
-    `torque`: torque is on; None without a torque switch. `blank`: volatile settings have their power-up values, as
-    after a restart. `restarts`: number of start-up messages received from the device.
-    """
+    """Health of a device, from one short request. Values that it does not report are None, in `state` too."""
 
     state: State
-    torque: bool | None = None
-    blank: bool | None = None
-    restarts: int | None = None
+    torque: bool | None = None  # torque is on; None without a torque switch
+    blank: bool | None = None  # volatile settings have their power-up values, as after a restart
+    restarts: int | None = None  # number of start-up messages received from the device
 
 
 class Positions(NamedTuple):
@@ -224,13 +197,10 @@ class RawMemory(Protocol):
 
 
 class Remark(NamedTuple):
-    """A note of a simulated device that no host receives: what it ignored, what a fault did.
+    """A note of a simulated device that no host receives: what it ignored, what a fault did."""
 
-    `number` counts from 1; `at` is in s since the start of the simulation, as in a script of inputs.
-    """
-
-    number: int
-    at: float
+    number: int  # from 1
+    at: float  # s since the start of the simulation, as in a script of inputs
     text: str
 
 
@@ -351,15 +321,11 @@ class AxisDriver:
 
 
 class BusDriver(Protocol):
-    """A family on one open bus: all that the bus and its users ask. It may keep what it learns on that bus.
+    """A family on one open bus: all that the bus and its users ask. It may keep what it learns on that bus."""
 
-    `window`      maximum number of lanes in flight
-    `full_duplex` a stop waits only for the request being sent, not for its reply
-    """
-
-    window: int
-    full_duplex: bool
     family: Family
+    window: int  # maximum number of lanes in flight
+    full_duplex: bool  # a stop waits only for the request being sent, not for its reply
 
     def air_time(self, request: Request[Any], rate: int) -> float:
         """Time (s) on the wire of the request and all expected replies, with the gaps of the protocol."""
@@ -405,29 +371,19 @@ class BusDriver(Protocol):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Family:
-    """A device family: its facts, and functions that make its parts.
+    """A device family: its facts, and what makes its parts."""
 
-    `name`       the scheme of a bus address
-    `registers`  all register maps, by name
-    `driver`     makes the `BusDriver` of a bus: driver(family, **settings). Raises RequestError for a bad setting
-    `safety`     the safety properties of its devices; None if the family declares none
-
-    Dotted names of modules that are imported on first use; "" without
-
-    `simulator_module`  has `simulate(ids, model, **options)`, and `OPTIONS` if it has options
-    `recording_module`  has `Recording`; without it the receiver of the bus decodes recordings
-    `cli`               has the shell commands of this family
-    """
-
-    name: str
+    name: str  # the scheme of a bus address
     link: LinkSpec
-    registers: Mapping[str, RegisterMap]
+    registers: Mapping[str, RegisterMap]  # all register maps, by name
     devices: DeviceTypes
     driver: Callable[..., BusDriver]
+    """driver(family, **settings) makes the driver of a bus. Raises RequestError for a bad setting."""
     safety: Guarantees | None = None
-    simulator_module: str
-    recording_module: str = ""
-    cli: str = ""
+    # Names of modules that are imported on first use.
+    simulator_module: str  # has `simulate(ids, model, **options)`, and `OPTIONS` if it has options
+    recording_module: str = ""  # has `Recording(direction)`; "": the receiver of the bus decodes recordings
+    cli: str = ""  # has the shell commands of this family
 
     def open(self, **settings: object) -> BusDriver:
         """The driver of one open bus. Raises RequestError for an unknown or invalid setting."""

@@ -27,33 +27,20 @@ class Guarantee(NamedTuple):
 
 
 class Guarantees(NamedTuple):
-    """The safety properties of each device of a family.
+    """The safety properties of each device of a family."""
 
-    `measured`  the device measures and reports its position
-    `limits`    the device keeps travel limits by itself
-    `stop`      what an acknowledged stop means
-    `estops`    what an emergency stop means, by its action on an axis (see `LinkSpec.stops`); key "" where the
-                action cannot be chosen
-    `alone`     what the device does in a loop or a move when its host fails or the cable breaks
-    `ends`      every motion ends by itself
-    `torque`    the host can switch torque off
-    `restart`   a restart is detected, so earlier goals do not move the device after it
-    `strain`    the device reports its load, so the host can end an overload
-    `watchdog`  the device stops by itself when its host falls silent
-    `led`       the device follows small goals of a loop; otherwise it moves by a profile of its own
-    """
-
-    measured: Guarantee
-    limits: Guarantee
-    stop: Guarantee
+    measured: Guarantee  # the device measures and reports its position
+    limits: Guarantee  # the device keeps travel limits by itself
+    stop: Guarantee  # what an acknowledged stop means
     estops: Mapping[str, Guarantee]
-    alone: Guarantee
-    ends: Guarantee
-    torque: Guarantee
-    restart: Guarantee
-    strain: Guarantee
-    watchdog: Guarantee
-    led: bool = False
+    """What an emergency stop means, by its action on an axis (see `LinkSpec.stops`); key "" if it has no choice."""
+    alone: Guarantee  # what the device does in a loop or a move when its host fails or the cable breaks
+    ends: Guarantee  # every motion ends by itself
+    torque: Guarantee  # the host can switch torque off
+    restart: Guarantee  # a restart is detected, so earlier goals do not move the device after it
+    strain: Guarantee  # the device reports its load, so the host can end an overload
+    watchdog: Guarantee  # the device stops by itself when its host falls silent
+    led: bool = False  # the device follows small goals of a loop; otherwise it moves by a profile of its own
 
     def points(self) -> dict[str, Guarantee]:
         """The properties by title, in display order."""

@@ -42,9 +42,12 @@ class HalfDuplexSerial(BusDriver):
         self.family = family
 
     def air_time(self, request: Request[Any], rate: int) -> float:
-        replies = self.broadcast_bytes
-        if request.expected is not ANY:
-            replies = sum(expected.length for expected in request.expected)
+        replies = 0
+        if request.expected is ANY:
+            replies = self.broadcast_bytes
+        else:
+            for expected in request.expected:
+                replies += expected.length
         return (len(request.wire) + replies) * BITS / rate
 
     def turnaround(self, request: Request[Any]) -> float:

@@ -177,14 +177,12 @@ def _braked(at: float, position: float, velocity: float, goal: float, accelerati
 class Drive:
     """Electrical model of a motor, for plausible readings.
 
-    `top_speed` is the speed without load at full duty, `idle_current` (A) the current without load, `stall_current` (A)
-    that at full torque. `torque` of the methods is the external load as a fraction of the stall torque, signed like
-    velocity.
+    `torque` of the methods is the external load as a fraction of the stall torque, signed like velocity.
     """
 
-    top_speed: float
-    idle_current: float
-    stall_current: float
+    top_speed: float  # without load at full duty
+    idle_current: float  # A without load
+    stall_current: float  # A at full torque
 
     def duty(self, velocity: float, torque: float = 0.0) -> float:
         """Duty cycle of the motor voltage, -1 to 1; FEETECH calls it load."""

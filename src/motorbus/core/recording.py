@@ -11,18 +11,12 @@ ABSENT: Final = -1
 
 
 class RecordedFrame(NamedTuple):
-    """One valid frame of a recording.
+    """One valid frame of a recording."""
 
-    `data`  the whole frame; a CAN frame as `CanFrame.flat()` serializes it
-    `kind`  "request", "reply", "notice" (unsolicited), or "either": a repeated request, its echo or a reply
-    `node`  sender or receiver; `ABSENT` if the frame does not contain it
-    `code`  content as a number of the family; `ABSENT` if the family has none
-    """
-
-    data: bytes
-    kind: str
-    node: int
-    code: int
+    data: bytes  # the whole frame; a CAN frame as `CanFrame.flat()` serializes it
+    kind: str  # "request", "reply", "notice" (unsolicited), or "either": a repeated request, its echo or a reply
+    node: int  # sender or receiver; `ABSENT` if the frame does not contain it
+    code: int  # content as a number of the family; `ABSENT` if the family has none
 
 
 RecordedEvent: TypeAlias = RecordedFrame | Noise

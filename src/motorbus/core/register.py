@@ -64,36 +64,29 @@ class Coding(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Register:
-    """One addressable value of a device.
-
-    `address` is the register number, or the CANopen index with `subindex`; `size` is in bytes. `low` and `high` bound
-    the raw value; value = raw * scale in `unit` (empty unit: a plain number). `choices` names single values, `bits`
-    single bits. `default` is the raw value as shipped, where known. `source` names the source of each fact. `conflict`
-    lists what sources say where they disagree or none confirms it, and the choice made; empty without a doubt. `note`
-    holds other facts. A `protected` row is not written by name and not copied to another device.
-    """
+    """One addressable value of a device. Its value is the raw value times `scale`, in `unit`."""
 
     name: str
-    address: int
-    size: int
+    address: int  # the register number, or the CANopen index
+    size: int  # bytes
     access: Access
     storage: Storage
-    source: str
+    source: str  # of each fact
     subindex: int | None = None
     order: str = "little"
     coding: Coding = Coding.UNSIGNED
     sign_bit: int | None = None
-    unit: str = ""
+    unit: str = ""  # "" for a plain number
     scale: float = 1.0
-    low: int = 0
+    low: int = 0  # raw, as `high`
     high: int = 0
-    default: int | None = None
-    choices: Mapping[int, str] = field(default_factory=dict)
-    bits: Mapping[int, str] = field(default_factory=dict)
+    default: int | None = None  # the raw value as shipped, where known
+    choices: Mapping[int, str] = field(default_factory=dict)  # names of single values
+    bits: Mapping[int, str] = field(default_factory=dict)  # names of single bits
     effect: Effect = Effect.NONE
-    protected: bool = False
-    conflict: str = ""
-    note: str = ""
+    protected: bool = False  # not written by name and not copied to another device
+    conflict: str = ""  # what sources say where they disagree or none confirms it, and the choice made
+    note: str = ""  # other facts
 
     @property
     def readable(self) -> bool:

@@ -6,7 +6,7 @@ A `Request` is a step: a procedure awaits it, see `core.steps`.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from enum import Enum, IntEnum
 from typing import Any, ClassVar, Final, Generic, NamedTuple, TypeAlias, TypeVar
 
@@ -49,15 +49,12 @@ class TimeoutClass(IntEnum):
 
 
 class Expected(NamedTuple):
-    """An expected reply: its node, the key that identifies it, and its exact length in bytes.
-
-    `refusal` is the length of a refusal where that differs; 0: none. A probe accepts no refusal.
-    """
+    """An expected reply: its node, the key that identifies it, and its exact length in bytes."""
 
     node: int
     key: Key
     length: int
-    refusal: int = 0
+    refusal: int = 0  # length of a refusal where that differs; 0: none, as for a probe
 
     def accepts(self, key: Key, size: int) -> bool:
         """A reply with this key and number of bytes is this one."""
@@ -85,27 +82,21 @@ class Reply(NamedTuple):
 
 
 class Notification(NamedTuple):
-    """A frame that a device sent unsolicited: a report, an alarm, the end of a program.
-
-    `at` is its arrival time (s, link clock), set by the bus.
-    """
+    """A frame that a device sent unsolicited: a report, an alarm, the end of a program."""
 
     node: int
     kind: str
     data: bytes
-    at: float = 0.0
+    at: float = 0.0  # arrival time (s, link clock), set by the bus
 
 
 class Noise(NamedTuple):
-    """Bytes that are no reply and no notice.
-
-    `fault` is "framing" or "checksum": the bytes may be a damaged reply of a node that was asked recently. Or it is
-    "foreign": a whole frame of other traffic. `lane` is the lane of the bytes, None if any node may have sent them.
-    """
+    """Bytes that are no reply and no notice."""
 
     data: bytes
     fault: str
-    lane: int | None = None
+    """"framing" or "checksum": maybe a damaged reply of a node asked recently; "foreign": a frame of other traffic."""
+    lane: int | None = None  # None if any node may have sent them
 
 
 Event: TypeAlias = Reply | Notification | Noise
@@ -147,41 +138,33 @@ class Step(Generic[T_co]):
 
 @dataclass(slots=True, eq=False, repr=False)
 class Request(Step[T_co]):
-    """One request and its expected replies. It is immutable, except for `prepared`, and may be sent again.
-
-    `wire`         the bytes or the CAN frame to send
-    `expected`     one `Expected` per reply; () for none; `ANY` for all replies before the deadline
-    `decode`       response -> value; None: the value is the `Response`. Matching of replies does not use it
-    `lane`         requests on the same lane never overlap
-    `effect`       highest effect of the registers that it writes
-    `setpoints`    what it asks of each node, for the gate
-    `repeatable`   sending it twice has the same effect as sending it once
-    `deferred`     its setpoints wait in the node, or it makes waiting setpoints take effect
-    `precondition` checked before each attempt that moves or switches torque, as for stops or changed settings
-    `alternate`    makes an equivalent request with replies of another length. The bus alternates where replies carry no
-                   number, so that a second copy of the last reply is not taken for the next one
-    `decode_exact` fast path of `decode` for a request that is kept: decodes the bytes of all expected replies at once
-    `prepared`     state that a bus keeps for it
-    `reports_position`  True: the replies begin with the present position, so a stop can hold it. A function, for the
-                   gate: response -> position (rad) by node, without the nodes whose reply does not give it
-    """
+    """One request and its expected replies. It is immutable, except for `prepared`, and may be sent again."""
 
     wire: Final[Data]
     expected: Final[tuple[Expected, ...] | Any_] = ()
+    """One for each reply; () for none; `ANY` for all replies before the deadline."""
     decode: Callable[[Response], T_co] | None = None
+    """Response -> value; None: the value is the `Response`. Matching of replies does not use it."""
     _: KW_ONLY
-    lane: Final[int] = 0
+    lane: Final[int] = 0  # requests on the same lane never overlap
     priority: Final[Priority] = Priority.POLL
-    effect: Final[Effect] = Effect.NONE
-    setpoints: Final[tuple[Setpoint, ...]] = ()
+    effect: Final[Effect] = Effect.NONE  # highest effect of the registers that it writes
+    setpoints: Final[tuple[Setpoint, ...]] = ()  # what it asks of each node, for the gate
     reply_within: Final[TimeoutClass] = TimeoutClass.REPLY
-    repeatable: Final[bool] = False
+    repeatable: Final[bool] = False  # sending it twice has the same effect as sending it once
     reports_position: Final[bool | Callable[[Response], Mapping[int, float]]] = False
+    """True: the replies begin with the present position, so a stop can hold it. A function, for the gate: response ->
+    position (rad) by node, without the nodes whose reply does not give it."""
     precondition: Final[Precondition | None] = None
+    """Checked before each attempt that moves or switches torque, as for stops or changed settings."""
     deferred: Final[Deferred | None] = None
+    """Its setpoints wait in the node, or it makes waiting setpoints take effect."""
     alternate: Callable[[], Request[T_co]] | None = None
+    """Makes an equivalent request with replies of another length. The bus alternates where replies carry no number, so
+    that a second copy of the last reply is not taken for the next one."""
     decode_exact: ExactDecoder[T_co] | None = None
-    prepared: Any = field(default=None, init=False)
+    """Fast path of `decode` for a request that is kept: decodes the bytes of all expected replies at once."""
+    prepared: Any = field(default=None, init=False)  # state that a bus keeps for it
 
     group: ClassVar[Any] = None
     prechecked: ClassVar[bool] = False
@@ -194,9 +177,8 @@ class Request(Step[T_co]):
 
     def with_decoder(self, decode: Callable[[Response], T]) -> Request[T]:
         """The same request with another `decode`, without `alternate` and `decode_exact`."""
-        own = ("wire", "expected", "decode", "alternate", "decode_exact", "prepared")
-        rest = [name for name in Request.__slots__ if name not in own]
-        return Request(self.wire, self.expected, decode, **{name: getattr(self, name) for name in rest})
+        same: Any = self
+        return replace(same, decode=decode, alternate=None, decode_exact=None)
 
     def convert(self, function: Callable[[T_co], T]) -> Request[T]:
         """The same request, whose value is `function` of the value of this one."""

@@ -67,24 +67,24 @@ async def scan_ids(
     found: dict[int, Found] = {}
     for number in range(PASSES):
         for count, node in enumerate(ids, number * len(ids) + 1):
-            if node not in found and await _answers(ping(node)):
-                found[node] = Found(node, rate, await _identity(identify(node)))
-                await Emit(found[node])
+            if node not in found and (device := await _find(node, rate, ping, identify)):
+                found[node] = device
+                await Emit(device)
             await Emit(Progress(count, PASSES * len(ids), f"{rate} bit/s"))
     return [found[node] for node in ids if node in found]
 
 
-async def _answers(ping: Runnable[bool]) -> bool:
+async def _find(
+    node: int, rate: int, ping: Callable[[int], Runnable[bool]], identify: Callable[[int], Runnable[Identity]]
+) -> Found | None:
     try:
-        return await ping
+        if not await ping(node):
+            return None
     except NoReply:
-        return False
-    except WireError:
-        return True
-
-
-async def _identity(identify: Runnable[Identity]) -> Identity | None:
-    try:
-        return await identify
-    except (DeviceError, NoReply, WireError):
         return None
+    except WireError:
+        pass
+    try:
+        return Found(node, rate, await identify(node))
+    except (DeviceError, NoReply, WireError):
+        return Found(node, rate, None)

@@ -107,26 +107,19 @@ class Progress(NamedTuple):
 
 
 class JournalEntry(NamedTuple):
-    """An event for `Emit` that must be on disk before the next step: the state of a guarded change.
+    """An event for `Emit` that must be on disk before the next step: the state of a guarded change."""
 
-    `change`  the driver function that makes the change, as "set_id"
-    `state`   ASKED    requested, conditions not yet checked; not stored, but refused while another change on the bus
-                       is unfinished
-              INTENT   the next step may change something
-              OUTCOME  the change has ended; `facts["outcome"]` says how
-              Any other word is a step that was reached.
-    `facts`   of INTENT: plain data that suffices to finish or revert the change, with the id of the device as "node".
-              Optional texts for the user: "what" is unfinished, its "cause", and "advice" ({bus} in it is replaced)
-    """
-
-    change: str
-    state: str
+    change: str  # the driver function that makes the change, as "set_id"
+    state: str  # ASKED, INTENT, OUTCOME, or the name of a step that was reached
     facts: dict[str, object]
+    """Of INTENT: plain data that suffices to finish or revert the change, with the id of the device as "node". Optional
+    texts for the user: "what" is unfinished, its "cause", and "advice" ({bus} in it is replaced)."""
 
 
 ASKED: Final = "asked"
-INTENT: Final = "intent"
-OUTCOME: Final = "outcome"
+"""Requested, conditions not yet checked. Not stored, but refused while another change on the bus is unfinished."""
+INTENT: Final = "intent"  # the next step may change something
+OUTCOME: Final = "outcome"  # the change has ended; `facts["outcome"]` says how
 REACHED: Final = "reached"  # in the facts of a resumed change: its states so far, in order
 READABLE: Final = "readable"  # in the facts: True for a change that only reads or leaves readings valid
 

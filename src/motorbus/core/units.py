@@ -1,7 +1,7 @@
 """Conversion between quantities as text (`90deg`, `30rpm`, `5 mm`) and numbers in API units.
 
 The API has one unit per quantity: rad, rad/s, rad/s², A, V, °C, s, a fraction for load, and m, m/s, m/s² for linear
-axes. A number without a unit is in the API unit. Raw counts are not a quantity: see `raw`.
+axes. A number without a unit is in the API unit. Raw counts are not a quantity.
 """
 
 from __future__ import annotations
@@ -36,15 +36,11 @@ SCALES: Mapping[str, Mapping[str, float]] = {
     "voltage": {"V": 1.0, "mV": 1e-3},
     "temperature": {"°C": 1.0, "degC": 1.0, "C": 1.0},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "min": 60.0},
-    "load": {"%": 0.01, "fraction": 1.0},
+    "load": {"fraction": 1.0, "%": 0.01},
 }
-"""By quantity and unit, the value of one unit in the API unit. The first unit with 1.0 is the API unit."""
+"""By quantity and unit, the value of one unit in the API unit, which is the first one."""
 
-_API_UNITS = {
-    quantity: next(unit for unit, scale in scales.items() if scale == 1.0)
-    for quantity, scales in SCALES.items()
-}
-QUANTITIES: Mapping[str, str] = {unit: quantity for quantity, unit in _API_UNITS.items()}
+QUANTITIES: Mapping[str, str] = {next(iter(units)): quantity for quantity, units in SCALES.items()}
 """The quantity of each API unit, which is also the unit of a table row."""
 
 MIN_RATE: Final = 1e-6
@@ -53,12 +49,9 @@ MAX_RATE: Final = 1e6
 """Hz; one byte takes longer than such a cycle on the fastest bus."""
 
 _MILLIMETRES = {"length": "mm", "linear velocity": "mm/s", "linear acceleration": "mm/s²"}
-_LONG = 16
-"""Characters; a number with its unit of this length was not written by a person."""
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _RATE = re.compile(r"(\d+(?:\.\d+)?)([kM])", re.ASCII)
 _FACTORS = {"k": 1000, "M": 1_000_000}
-_RAW = re.compile(r"([+-]?(?:0[xX][0-9a-fA-F]+|\d+))\s*raw", re.ASCII)
 
 
 def parse(text: str, quantity: str) -> float:
@@ -83,24 +76,6 @@ def parse(text: str, quantity: str) -> float:
     if not isfinite(value):
         raise _refused(text, quantity, "is too large to be a number")
     return value
-
-
-def raw(text: str) -> int | None:
-    """`100raw` or `0x64 raw` -> 100; None for text that does not end with `raw`.
-
-    Raises RequestError if a text that ends with `raw` is not a whole number.
-    """
-    stripped = text.strip()
-    if not stripped.endswith("raw"):
-        return None
-    match = _RAW.fullmatch(stripped)
-    if match is None:
-        raise RequestError(
-            f"{text!r} is not a raw value",
-            expected="a whole number followed by raw, such as 2048raw",
-            advice="nothing was sent",
-        )
-    return int(match[1], 16 if "x" in match[1].lower() else 10)
 
 
 def whole(text: str) -> int:
@@ -145,25 +120,6 @@ def show(value: float, quantity: str) -> str:
         return f"{value * 1000:.3f} {_MILLIMETRES[quantity]}"
     decimals = {"acceleration": 2, "current": 3, "voltage": 1, "temperature": 0}[quantity]
     return f"{value:.{decimals}f} {next(iter(SCALES[quantity]))}"
-
-
-def written(value: float, quantity: str, unit: str) -> str:
-    """Text of a value in the API unit, for a file: the fewest digits in `unit` that `parse` reads as the same number.
-
-    In the API unit where no digits in `unit` do, or where that text is long (16 characters) and the API unit shorter,
-    as for 2 rad. Raises KeyError for a unit that `quantity` does not have.
-    """
-    plain = f"{_plain(value)} {_API_UNITS[quantity]}"
-    number = value / SCALES[quantity][unit]
-    for digits in range(1, 18):
-        text = f"{_plain(float(f'{number:.{digits}g}'))} {unit}"
-        if parse(text, quantity) == value:
-            return text if len(text) < _LONG or len(text) <= len(plain) else plain
-    return plain
-
-
-def _plain(number: float) -> str:
-    return repr(number).removesuffix(".0")
 
 
 def _unit_fault(unit: str, quantity: str) -> str:

@@ -78,7 +78,7 @@ class together(MethodDescriptor[P, T]):  # noqa: N801 - reads as a word in a lis
     @overload
     def __get__(self, machine: LedAsync, owner: type) -> Callable[P, Coroutine[Any, Any, T]]: ...
     def __get__(self, machine: Any, owner: type) -> Any:
-        return self.of_class(owner) if machine is None else self.of_object(machine)
+        return self.bind(machine, owner)
 
     def make_method(self) -> Callable[..., Any]:
         function: Callable[..., Any] = self.function

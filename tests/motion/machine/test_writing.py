@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import tomllib
+from math import pi
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from motorbus.core import units
 from motorbus.errors import RequestError
 from motorbus.motion.machine import BusSpec, Machine
-from motorbus.motion.machine.writing import quoted, write
+from motorbus.motion.machine.writing import quantity_text, quoted, write
 from tests.motion.machine.files import GOOD, axis
 
 FRESH = """\
@@ -106,3 +108,26 @@ def test_what_no_file_may_say_is_not_written(parts: dict[str, float]) -> None:
 @given(st.text(st.characters(exclude_categories=["Cs"])))
 def test_any_text_can_be_quoted(text: str) -> None:
     assert tomllib.loads(f"it = {quoted(text)}") == {"it": text}
+
+
+@pytest.mark.parametrize(
+    ("value", "quantity", "unit", "text"),
+    [
+        (pi / 2, "position", "deg", "90 deg"),
+        (-pi, "position", "turn", "-0.5 turn"),
+        (1.25, "position", "rad", "1.25 rad"),
+        (0.123456789012345, "length", "mm", "123.456789012345 mm"),
+        (0.03, "length", "mm", "30 mm"),
+    ],
+)
+def test_quantity_text_has_the_fewest_digits(value: float, quantity: str, unit: str, text: str) -> None:
+    assert quantity_text(value, quantity, unit) == text
+
+
+@given(
+    st.floats(-1e6, 1e6),
+    st.sampled_from([(kind, unit) for kind, all in units.SCALES.items() for unit in all]),
+)
+def test_quantity_text_parses_to_the_same_number(value: float, shown: tuple[str, str]) -> None:
+    quantity, unit = shown
+    assert units.parse(quantity_text(value, quantity, unit), quantity) == value

@@ -16,6 +16,8 @@ HEAD: Final = (
     "# A machine: its buses, what moves on them, and how far and how fast it may.",
     "# Angles, lengths and velocities have a unit, in quotes.",
 )
+LONG: Final = 16
+"""Characters; a number with its unit of this length was not written by a person."""
 COLUMN: Final = 30
 """Before it no comment begins, so that those of most lines stand below each other."""
 
@@ -70,7 +72,26 @@ def _value(value: Any, key: Key, axis: AxisSpec | None) -> str:
         return str(value)
     quantity = key.measure.of(axis.linear)
     unit = _unit(quantity, axis.unit)
-    return quoted(units.written(value, quantity, unit)) if unit else str(value)
+    return quoted(quantity_text(value, quantity, unit)) if unit else str(value)
+
+
+def quantity_text(value: float, quantity: str, unit: str) -> str:
+    """Text of a value in the API unit: the fewest digits in `unit` that `units.parse` reads as the same number.
+
+    In the API unit where no digits in `unit` do, or where that text is long (16 characters) and the API unit shorter,
+    as for 2 rad.
+    """
+    plain = f"{_plain(value)} {next(iter(units.SCALES[quantity]))}"
+    number = value / units.SCALES[quantity][unit]
+    for digits in range(1, 18):
+        text = f"{_plain(float(f'{number:.{digits}g}'))} {unit}"
+        if units.parse(text, quantity) == value:
+            return text if len(text) < LONG or len(text) <= len(plain) else plain
+    return plain
+
+
+def _plain(number: float) -> str:
+    return repr(number).removesuffix(".0")
 
 
 def _unit(quantity: str, seen: str) -> str:
