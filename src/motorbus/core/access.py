@@ -35,12 +35,8 @@ def writable_values(
     found = []
     for name, value in values.items():
         row = table[name]
-        refusal = ""
-        if not row.writable:
-            refusal = "it can only be read"
-        elif row.protected:
-            refusal = f"use {methods[name]}"
-        if refusal:
+        if row.protected or not row.writable:
+            refusal = f"use {methods[name]}" if row.writable else "it can only be read"
             raise RequestError(
                 f"{name} is not written by name: {refusal}", advice="nothing was sent", node=node
             )

@@ -9,12 +9,9 @@ from motorbus.core.family import State
 from motorbus.core.steps import Procedure, Runnable, Sleep
 from motorbus.errors import MotionError, MotorbusError, Stalled
 
-PERIOD: Final = 0.02
-"""s between two samples; one axis that is waited for takes a tenth of a bus at most."""
-STALL_TIME: Final = 0.5
-"""s without progress after which a device counts as stalled."""
-PROGRESS: Final = 0.003
-"""rad; a smaller change counts as noise."""
+PERIOD: Final = 0.02  # s between two samples; one axis that is waited for takes a tenth of a bus at most
+STALL_TIME: Final = 0.5  # s without progress after which a device counts as stalled
+PROGRESS: Final = 0.003  # rad; a smaller change counts as noise
 
 
 async def wait_in_position(

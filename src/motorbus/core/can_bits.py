@@ -13,8 +13,7 @@ from typing import Final
 
 from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
 
-INTERFRAME: Final = 3
-"""Bits between two frames; counted with the first."""
+INTERFRAME: Final = 3  # bits between two frames; counted with the first
 ERROR_BITS: Final = 23
 """Error flag with the flags of all nodes superposed (12), delimiter (8), interframe space (3)."""
 

@@ -7,8 +7,7 @@ from typing import Final, NamedTuple
 
 ERROR_FLAG: Final = 1 << 29
 """Set in the identifier of an adapter's report of a bus error, as in SocketCAN; such a frame is no data frame."""
-REMOTE_FLAG: Final = 1 << 30
-"""Set in the identifier of a remote frame."""
+REMOTE_FLAG: Final = 1 << 30  # set in the identifier of a remote frame
 
 
 class Audience(Enum):

@@ -10,7 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from enum import Enum
+from functools import cached_property
 from importlib import import_module
+from math import inf
 from typing import Any, NamedTuple, Protocol
 
 from motorbus.core.guarantees import Guarantees
@@ -30,6 +32,7 @@ class Option(NamedTuple):
     help: str
     choices: tuple[object, ...] = ()  # all valid values; () if not listed
     source: str = ""  # where the simulated behaviour is documented, or that it is assumed
+    span: tuple[float, float] = (0.0, inf)  # range of a number without choices
 
 
 class LinkSpec(NamedTuple):
@@ -268,8 +271,8 @@ def unsupported(*args: object, **kwargs: object) -> Any:
 class AxisDriver:
     """What devices of one model can do, in SI units; a family gives those that the model supports.
 
-    Each is a function of a device (see `DeviceTypes`), several for `stream`, and returns a procedure or a step. `names`
-    are the given ones, and `name in driver` tests for one. Others raise RequestError when called.
+    Each is a function of a device (see `DeviceTypes`), several for `stream`, and returns a procedure or a step.
+    `name in driver` tests for one. Others raise RequestError when called.
     """
 
     state: Callable[[Any], Runnable[State]] = unsupported
@@ -281,21 +284,16 @@ class AxisDriver:
     temperature: Callable[[Any], Runnable[float]] = unsupported
     health: Callable[[Any], Runnable[Health]] = unsupported
     """For an identified device a request that can be kept."""
-    enable_torque: Callable[[Any], Runnable[None]] = unsupported
-    """Torque on without a jump."""
+    enable_torque: Callable[[Any], Runnable[None]] = unsupported  # torque on without a jump
     disable_torque: Callable[[Any], Runnable[Any]] = unsupported
-    move: Callable[..., Runnable[Any]] = unsupported
-    """move(device, to, *, wait): to a position (rad)."""
+    move: Callable[..., Runnable[Any]] = unsupported  # move(device, to, *, wait): to a position (rad)
     stop: Callable[[Any], Runnable[Any]] = unsupported
     """Decelerate and hold; returns a promise, an Enum whose name begins with HOLD, see `Stop`."""
     move_by: Callable[..., Runnable[Any]] = unsupported
     """move_by(device, angle, *, velocity, wait): rad from the present position."""
-    jog: Callable[..., Runnable[Any]] = unsupported
-    """jog(device, velocity, seconds): turn for a time."""
-    home: Callable[..., Runnable[Any]] = unsupported
-    """home(device, *, deadline): to the home switch."""
-    run: Callable[..., Runnable[Any]] = unsupported
-    """run(device, number, *, timeout): a stored program."""
+    jog: Callable[..., Runnable[Any]] = unsupported  # jog(device, velocity, seconds): turn for a time
+    home: Callable[..., Runnable[Any]] = unsupported  # home(device, *, deadline): to the home switch
+    run: Callable[..., Runnable[Any]] = unsupported  # run(device, number, *, timeout): a stored program
     limits: Callable[[Any], Runnable[tuple[float, float]]] = unsupported
     """Lowest and highest position (rad) in its settings; read if unknown."""
     travel: Callable[[Any], Runnable[tuple[float, float] | None]] = unsupported
@@ -310,11 +308,11 @@ class AxisDriver:
     """keep_time(device, angle, timing, *, velocity, acceleration) -> Turned: turn by `angle` (rad) with its own
     profile, begin and end with the other devices of `timing`; at most `velocity` (rad/s) and `acceleration` (rad/s²)
     where the device supports that."""
-    names: frozenset[str] = field(init=False, repr=False)
 
-    def __post_init__(self) -> None:
-        given = [one.name for one in fields(self) if one.init and getattr(self, one.name) is not one.default]
-        object.__setattr__(self, "names", frozenset(given))
+    @cached_property
+    def names(self) -> frozenset[str]:
+        """The capabilities that are given."""
+        return frozenset(one.name for one in fields(self) if getattr(self, one.name) is not unsupported)
 
     def __contains__(self, name: object) -> bool:
         return name in self.names
@@ -407,7 +405,5 @@ class Family:
 
     def recording(self, direction: str) -> RecordingReceiver | None:
         """A receiver for recordings of one direction: "rx" from the devices, "tx" to them, "" unknown or mixed."""
-        if not self.recording_module:
-            return None
-        receiver: RecordingReceiver = import_module(self.recording_module).Recording(direction)
-        return receiver
+        module = self.recording_module
+        return import_module(module).Recording(direction) if module else None

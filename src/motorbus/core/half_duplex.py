@@ -10,8 +10,7 @@ from motorbus.core.request import ANY, Request, TimeoutClass
 from motorbus.core.scan import scan_ids, scan_rates
 from motorbus.core.steps import Exclusive, Procedure, SetBitrate
 
-BITS: Final = 10
-"""Bits of a byte on the wire: start, eight of data, stop."""
+BITS: Final = 10  # bits of a byte on the wire: start, eight of data, stop
 
 
 class HalfDuplexSerial(BusDriver):
@@ -19,22 +18,18 @@ class HalfDuplexSerial(BusDriver):
 
     window = 1
     full_duplex = False
-    ids: ClassVar[Sequence[int]] = range(1, 254)
-    """All ids that a device can have."""
+    ids: ClassVar[Sequence[int]] = range(1, 254)  # all ids that a device can have
     delays: ClassVar[Mapping[TimeoutClass, float]] = {
         TimeoutClass.REPLY: 0.005,
         TimeoutClass.SCAN: 0.010,
         TimeoutClass.STORE: 0.100,
     }
     """Maximum s of a device between request and reply."""
-    delay_per_reply: ClassVar[float] = 0.0
-    """Maximum s added by each device that replies."""
+    delay_per_reply: ClassVar[float] = 0.0  # maximum s added by each device that replies
     broadcast_delay: ClassVar[float] = 0.5
     """s in which all devices have replied to a request that expects `ANY`."""
-    broadcast_bytes: ClassVar[int] = 1024
-    """Bytes of all these replies."""
-    longest_reply: ClassVar[int] = 256
-    """Bytes."""
+    broadcast_bytes: ClassVar[int] = 1024  # bytes of all these replies
+    longest_reply: ClassVar[int] = 256  # bytes
     longest_gap: ClassVar[float] = 0.040
     """s that a device, the adapter and the host together may hold back a reply."""
 

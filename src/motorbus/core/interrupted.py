@@ -14,14 +14,11 @@ from motorbus.errors import MotorbusError, RequestError
 
 T = TypeVar("T")
 
-PERIOD: Final = 0.02
-"""s between two position readings of a stopped device."""
+PERIOD: Final = 0.02  # s between two position readings of a stopped device
 TOLERANCE: Final = 0.006
 """rad within which a device at rest stays; the coarsest position has counts of 0.005 rad."""
-REST_TIME: Final = 0.1
-"""s for which it must stay within the tolerance."""
-TIMEOUT: Final = 1.0
-"""s after which the readings end, at rest or not."""
+REST_TIME: Final = 0.1  # s for which it must stay within the tolerance
+TIMEOUT: Final = 1.0  # s after which the readings end, at rest or not
 
 
 class Device(Protocol):
@@ -64,9 +61,8 @@ class _Move(Guard):
             return  # the move ended by itself
         results = await gather(*[catch(Exclusive(self._stop(moving))) for moving in self._devices])
         stopped = [pair for pair in zip(self._devices, results, strict=True) if pair[1]]
-        places = await gather(*[catch(_place(moving, result)) for moving, result in stopped])
-        for (moving, result), place in zip(stopped, places, strict=True):
-            error.add_note(_note(moving.device.node, result, place))
+        for note in await gather(*[_note(moving, result) for moving, result in stopped]):
+            error.add_note(note)
 
     async def _stop(self, moving: Moving) -> str:
         """Run it inside `Exclusive`: a newer move is then ordered either before the check or after the stop."""
@@ -78,19 +74,19 @@ class _Move(Guard):
         return "holds" if promise.name.startswith("HOLD") else f"{promise.value};"
 
 
-def _note(node: int, result: str | MotorbusError, place: str | MotorbusError) -> str:
+async def _note(moving: Moving, result: str | MotorbusError) -> str:
+    node = moving.device.node
     if isinstance(result, MotorbusError):
         fix = result.advice if isinstance(result, RequestError) else f"`motorbus stop BUS#{node}` stops it"
         return f"#{node} may still be moving: {result.summary}; {fix}"
+    place = await catch(_rest_place(moving))
     if isinstance(place, MotorbusError):
         return f"#{node}: {result}, and its position is not known: {place.summary}"
     return f"#{node}: {result}{place}"
 
 
-async def _place(moving: Moving, result: str | MotorbusError) -> str:
+async def _rest_place(moving: Moving) -> str:
     """Return the text of the position at which a stopped device came to rest, or of its last reading."""
-    if isinstance(result, MotorbusError):
-        return ""
     begin = since = await Sleep(0)
     rest: float | None = None
     while True:

@@ -6,8 +6,7 @@ from typing import Final, NamedTuple, Protocol, TypeAlias
 
 from motorbus.core.request import Data, Noise
 
-ABSENT: Final = -1
-"""Node or code of a packet that has none."""
+ABSENT: Final = -1  # node or code of a packet that has none
 
 
 class RecordedFrame(NamedTuple):

@@ -11,8 +11,7 @@ from motorbus.errors import DeviceError, LinkError, LinkLost, NoReply, WireError
 
 T = TypeVar("T")
 
-PASSES: Final = 2
-"""A silent id is pinged twice: a device may miss the first frame after power-up."""
+PASSES: Final = 2  # a silent id is pinged twice: a device may miss the first frame after power-up
 
 
 class Skipped(NamedTuple):
@@ -64,27 +63,25 @@ async def scan_ids(
     `rate` (bit/s) is the present one. Reports `Progress`, and `Found` at once. A device that cannot be identified, or
     whose replies are damaged (as those of two devices with one id), is found without identity.
     """
+
+    async def find(node: int) -> Found | None:
+        try:
+            if not await ping(node):
+                return None
+        except NoReply:
+            return None
+        except WireError:
+            pass
+        try:
+            return Found(node, rate, await identify(node))
+        except (DeviceError, NoReply, WireError):
+            return Found(node, rate, None)
+
     found: dict[int, Found] = {}
     for number in range(PASSES):
         for count, node in enumerate(ids, number * len(ids) + 1):
-            if node not in found and (device := await _find(node, rate, ping, identify)):
+            if node not in found and (device := await find(node)):
                 found[node] = device
                 await Emit(device)
             await Emit(Progress(count, PASSES * len(ids), f"{rate} bit/s"))
     return [found[node] for node in ids if node in found]
-
-
-async def _find(
-    node: int, rate: int, ping: Callable[[int], Runnable[bool]], identify: Callable[[int], Runnable[Identity]]
-) -> Found | None:
-    try:
-        if not await ping(node):
-            return None
-    except NoReply:
-        return None
-    except WireError:
-        pass
-    try:
-        return Found(node, rate, await identify(node))
-    except (DeviceError, NoReply, WireError):
-        return Found(node, rate, None)

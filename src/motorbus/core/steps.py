@@ -25,8 +25,7 @@ T5 = TypeVar("T5")
 T_co = TypeVar("T_co", covariant=True)
 
 Procedure: TypeAlias = Coroutine[Step[Any], Any, T]
-Runnable: TypeAlias = "Coroutine[Step[Any], Any, T] | Step[T]"
-"""What a bus runs: a procedure or a step."""
+Runnable: TypeAlias = "Coroutine[Step[Any], Any, T] | Step[T]"  # what a bus runs: a procedure or a step
 
 
 @dataclass(slots=True, eq=False)

@@ -7,7 +7,7 @@ dataclass; parsing, ranges, errors and help are the same for all families.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import Field, field, fields
+from dataclasses import field, fields
 from difflib import get_close_matches
 from math import inf, isfinite, nan
 from typing import Any, TypeVar
@@ -34,11 +34,7 @@ def switch(
 
 def options(kind: type[Any]) -> tuple[Option, ...]:
     """The switches of this dataclass as options of a bus string."""
-    keys = ("help", "choices", "source")
-    return tuple(
-        Option(one.name, type(one.default), one.default, *(one.metadata[key] for key in keys))
-        for one in fields(kind)
-    )
+    return tuple(Option(one.name, type(one.default), one.default, **one.metadata) for one in fields(kind))
 
 
 def switched(kind: type[S], family: str, given: Mapping[str, object]) -> S:
@@ -46,7 +42,7 @@ def switched(kind: type[S], family: str, given: Mapping[str, object]) -> S:
 
     Raises RequestError for an unknown name, with similar names, and for an invalid value.
     """
-    known = {one.name: one for one in fields(kind)}  # type: ignore[arg-type]  # S is a dataclass
+    known = {option.name: option for option in options(kind)}
     for name in given.keys() - known.keys():
         near = get_close_matches(name, known, n=3)
         raise RequestError(
@@ -57,26 +53,25 @@ def switched(kind: type[S], family: str, given: Mapping[str, object]) -> S:
     return kind(**{name: _value(known[name], value) for name, value in given.items()})
 
 
-def _value(one: Field[Any], value: object) -> object:
-    choices, span = one.metadata["choices"], one.metadata["span"]
+def _value(option: Option, value: object) -> object:
+    refusal = f"option {option.name}: {value!r} is not possible"
     found: object = ("no", "yes")[value] if isinstance(value, bool) else str(value)
-    if isinstance(one.default, bool):
+    if isinstance(option.default, bool):
         word = str(value).lower()
         if word not in _YES | _NO:
-            raise RequestError(f"option {one.name}: {value!r} is neither yes nor no", expected="yes or no")
+            raise RequestError(f"option {option.name}: {value!r} is neither yes nor no", expected="yes or no")
         return word in _YES
-    if isinstance(one.default, int | float):
-        is_int = isinstance(one.default, int)
+    if isinstance(option.default, int | float):
+        is_int = isinstance(option.default, int)
+        low, high = option.span
         try:
             found = number = (units.whole if is_int else units.real)(str(value))
         except ValueError:
             number = nan
-        if not (isfinite(number) and span[0] <= number <= span[1]):
+        if not (isfinite(number) and low <= number <= high):
             what = "a whole number" if is_int else "a number"
-            bounds = f"{span[0]:g} or more" if span[1] == inf else f"{span[0]:g} to {span[1]:g}"
-            raise RequestError(f"option {one.name}: {value!r} is not possible", expected=f"{what}, {bounds}")
-    if choices and found not in choices:
-        raise RequestError(
-            f"option {one.name}: {value!r} is not possible", expected=f"one of {', '.join(map(str, choices))}"
-        )
+            bounds = f"{low:g} or more" if high == inf else f"{low:g} to {high:g}"
+            raise RequestError(refusal, expected=f"{what}, {bounds}")
+    if option.choices and found not in option.choices:
+        raise RequestError(refusal, expected=f"one of {', '.join(map(str, option.choices))}")
     return found

@@ -43,10 +43,8 @@ SCALES: Mapping[str, Mapping[str, float]] = {
 QUANTITIES: Mapping[str, str] = {next(iter(units)): quantity for quantity, units in SCALES.items()}
 """The quantity of each API unit, which is also the unit of a table row."""
 
-MIN_RATE: Final = 1e-6
-"""Hz of a cyclic operation: one cycle in 11.6 days."""
-MAX_RATE: Final = 1e6
-"""Hz; one byte takes longer than such a cycle on the fastest bus."""
+MIN_RATE: Final = 1e-6  # Hz of a cyclic operation: one cycle in 11.6 days
+MAX_RATE: Final = 1e6  # Hz; one byte takes longer than such a cycle on the fastest bus
 
 _MILLIMETRES = {"length": "mm", "linear velocity": "mm/s", "linear acceleration": "mm/s²"}
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
@@ -97,8 +95,7 @@ def _checked(text: str) -> str:
     return text
 
 
-LONG: Final = 1e6
-"""`show` gives six significant digits from this size on; a float may have 300."""
+LONG: Final = 1e6  # `show` gives six significant digits from this size on; a float may have 300
 
 
 def show(value: float, quantity: str) -> str:
