@@ -92,8 +92,8 @@ class MethodDescriptor(Generic[P, T]):
         """A function that calls the driver function and runs its result."""
         raise NotImplementedError
 
-    def of_class(self, owner: type) -> Any:
-        """The method as an attribute of this class."""
+    def bind(self, one: Any, owner: type) -> Any:
+        """The method of this object, or that of the class if `one` is None."""
         if owner not in self._methods:
             method: Any = self.make_method()
             shown = signature(self.function)
@@ -111,12 +111,8 @@ class MethodDescriptor(Generic[P, T]):
             if getattr(owner, "_is_async", False) and sys.version_info >= (3, 12):
                 inspect.markcoroutinefunction(method)
             self._methods[owner] = method
-        return self._methods[owner]
-
-    def bind(self, one: Any, owner: type) -> Any:
-        """The method of this object, or that of the class if `one` is None."""
-        method = self.of_class(owner)
-        return method if one is None else MethodType(method, one)
+        found = self._methods[owner]
+        return found if one is None else MethodType(found, one)
 
 
 class device_method(MethodDescriptor[P, T]):  # noqa: N801 - used like a function
@@ -150,5 +146,5 @@ class device_method(MethodDescriptor[P, T]):  # noqa: N801 - used like a functio
         # The function replaces this descriptor in the class: the next call is a plain one. A subclass of this
         # descriptor may check each access, and a class that overrides the method gets here by `super`.
         if type(self) is device_method and getattr_static(owner, self.name, None) is self:
-            setattr(owner, self.name, self.of_class(owner))
+            setattr(owner, self.name, self.bind(None, owner))
         return self.bind(device, owner)

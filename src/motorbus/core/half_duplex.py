@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, ClassVar, Final
 
 from motorbus.core.family import BusDriver, Family, Found
 from motorbus.core.request import ANY, Request, TimeoutClass
-from motorbus.core.scan import scan_ids, scan_rates
-from motorbus.core.steps import Exclusive, Procedure, SetBitrate
+from motorbus.core.scan import BitrateRestored, Skipped
+from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate
+from motorbus.errors import DeviceError, LinkError, LinkLost, NoReply, WireError
 
+PASSES: Final = 2  # of a scan: a device may miss the first frame after power-up
 BITS: Final = 10  # bits of a byte on the wire: start, eight of data, stop
 
 
@@ -58,16 +61,46 @@ class HalfDuplexSerial(BusDriver):
         return self.probe(self.ids[0], 0)
 
     async def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> list[Found]:
-        """Probe each id twice; see `BusDriver.scan`."""
+        """Ping each id, a silent one twice; see `BusDriver.scan`. A rate that the adapter lacks is `Skipped`."""
+        nodes = ids or tuple(self.ids)
+        if rates:
+            return await Exclusive(self._scan_rates(nodes, rates))
+        return await self._scan_ids(nodes, await SetBitrate(0))
 
-        def ping(node: int) -> Request[bool]:
-            probe = self.probe(node, 0)
-            within = TimeoutClass.SCAN
-            return Request(probe.wire, probe.expected, probe.decode, reply_within=within, repeatable=True)
+    async def _scan_rates(self, ids: tuple[int, ...], rates: tuple[int, ...]) -> list[Found]:
+        found = []
+        async with BitrateRestored():
+            for rate in rates:
+                try:
+                    await SetBitrate(rate)
+                except LinkLost:
+                    raise
+                except LinkError as error:
+                    await Emit(Skipped(rate, error.summary))
+                    continue
+                found += await self._scan_ids(ids, rate)
+        return found
 
-        def scan_at(rate: int) -> Procedure[list[Found]]:
-            return scan_ids(ids or tuple(self.ids), rate, ping, self.identify)
+    async def _scan_ids(self, ids: tuple[int, ...], rate: int) -> list[Found]:
+        found: dict[int, Found] = {}
+        for number in range(PASSES):
+            for count, node in enumerate(ids, number * len(ids) + 1):
+                if node not in found and (device := await self._find(node, rate)):
+                    found[node] = device
+                    await Emit(device)
+                await Emit(Progress(count, PASSES * len(ids), f"{rate} bit/s"))
+        return [found[node] for node in ids if node in found]
 
-        if not rates:
-            return await scan_at(await SetBitrate(0))
-        return await Exclusive(scan_rates(rates, scan_at))
+    async def _find(self, node: int, rate: int) -> Found | None:
+        """Ping an id; damaged replies, as those of two devices with one id, count as a device without identity."""
+        try:
+            if not await replace(self.probe(node, 0), reply_within=TimeoutClass.SCAN):
+                return None
+        except NoReply:
+            return None
+        except WireError:
+            pass
+        try:
+            return Found(node, rate, await self.identify(node))
+        except (DeviceError, NoReply, WireError):
+            return Found(node, rate, None)
