@@ -7,9 +7,8 @@ from typing import Final
 from motorbus.core.device import AsyncDevice, AsyncRunner, BlockingDevice, BlockingRunner, device_method
 from motorbus.core.family import DeviceTypes, Family, LinkSpec
 
-from . import driver
+from . import driver, simulator
 from .registers import TABLE
-from .simulator import RATE
 
 
 class _Methods(driver.Node):
@@ -43,9 +42,9 @@ class AsyncServo(_Methods, AsyncDevice):
 
 FAMILY: Final = Family(
     name="template",
-    link=LinkSpec("bytes", RATE, (RATE, 250_000)),
+    link=LinkSpec("bytes", simulator.RATE, (simulator.RATE, 250_000)),
     registers={TABLE.name: TABLE},
     devices=DeviceTypes(Servo, AsyncServo),
     driver=driver.MetronomeDriver,
-    simulator_module=f"{__name__}.simulator",
+    simulator_module=simulator.__name__,
 )
