@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import json
-import socket
-import subprocess
-import sys
 from math import radians
 from pathlib import Path
 
 import pytest
 
-from motorbus.cli.simulated import Simulated
+import motorbus
 from motorbus.families.kst.eds import eds
 from motorbus.families.kst.profiles import PROFILES
 from motorbus.simulation.named import Simulation
@@ -75,33 +71,16 @@ def test_bit_rate_takes_effect_after_save_and_power_cycle(servos: Simulation, ru
     assert run("ping", device, "--bitrate", "250000").code == 0
 
 
-def power_cycle(control: Path) -> None:
-    with socket.socket(socket.AF_UNIX) as connection:
-        connection.connect(str(control))
-        connection.sendall(b"power-cycle\n")
-        assert connection.recv(100).startswith(b"ok")
-
-
-def test_provision_reports_each_step_and_verifies_after_the_power_cycle(
-    on_slcan: Simulated, tmp_path: Path, run: Run
-) -> None:
-    words = ["kst", "provision", f"{on_slcan.bus}#0x25", "--new-id", "0x27", "--yes", "--json"]
-    with subprocess.Popen(
-        [sys.executable, "-m", "motorbus", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout is not None
-        events = []
-        for line in process.stdout:
-            events.append(json.loads(line))
-            if events[-1]["event"] == "power-cycle":
-                power_cycle(tmp_path / "control")
-        _, err = process.communicate(timeout=60)
-    assert process.returncode == 0, err
-    assert {one["schema"] for one in events} == {"motorbus.kst.provision/1"}
-    assert [one["event"] for one in events if one["event"] != "progress"] == ["power-cycle", "provisioned"]
-    assert (events[-1]["id"], events[-1]["from"], events[-1]["resumed"]) == (39, 37, False)
-    assert "switch the supply of this servo off and on again now" in err
-    assert [one["id"] for one in run("scan", on_slcan.bus, "--json").document["devices"]] == [38, 39]
+def test_provision_reports_each_step_and_verifies_after_the_power_cycle(run: Run) -> None:
+    with motorbus.simulate("kst", ids="0x25+0x26", faults="at 9 s: power-cycle 37") as servos:
+        ran = run("kst", "provision", f"{servos.url}#0x25", "--new-id", "0x27", "--yes", "--json")
+        assert ran.code == 0, ran.err
+        assert {one["schema"] for one in ran.records} == {"motorbus.kst.provision/1"}
+        events = [one for one in ran.records if one["event"] != "progress"]
+        assert [one["event"] for one in events] == ["power-cycle", "provisioned"]
+        assert (events[-1]["id"], events[-1]["from"], events[-1]["resumed"]) == (39, 37, False)
+        assert "switch the supply of this servo off and on again now" in ran.err
+        assert [one["id"] for one in run("scan", servos.url, "--json").document["devices"]] == [38, 39]
 
 
 def test_provision_resumes_after_a_timeout(servos: Simulation, run: Run) -> None:

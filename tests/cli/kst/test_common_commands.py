@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -11,6 +12,7 @@ import motorbus
 from motorbus import families
 from motorbus.cli import faces
 from motorbus.cli.simulated import Simulated
+from motorbus.errors import LinkError
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
 
@@ -37,23 +39,34 @@ def test_estop_holds_moving_servos_and_names_silent_ones(
     assert ("tx 600#" in ran.err) is not bool(which)  # a broadcast costs time; named ids need none
 
 
-def test_estop_stops_another_process(on_slcan: Simulated, run: Run) -> None:
-    command = [sys.executable, "-c", MOVING, on_slcan.bus]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline()
-        (stop,) = run("estop", on_slcan.bus, "--json").document["buses"]
-        _, err = process.communicate(timeout=30)
+@pytest.mark.usefixtures("state_folder", "patient")
+def test_estop_stops_another_process(tmp_path: Path, run: Run) -> None:
+    with Simulated("kst", ids="0x25+0x26", link=tmp_path / "can") as simulated:
+        command = [sys.executable, "-c", MOVING, simulated.bus]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            assert process.stdout is not None
+            assert process.stdout.readline()
+            (stop,) = run("estop", simulated.bus, "--json").document["buses"]
+            _, err = process.communicate(timeout=30)
     assert (stop["acknowledged"], str(process.pid) in stop["by"]) == ([37], True)
     assert "Interrupted" in err
 
 
-def test_scan_skips_rates_that_the_adapter_lacks(on_slcan: Simulated, run: Run) -> None:
-    ran = run("scan", on_slcan.bus, "--ids", "37-38", "--bitrate", "all", "--json")
+def test_scan_skips_rates_that_the_adapter_lacks(
+    servos: Simulation, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def tune(rate: int) -> None:
+        if rate == 800_000:
+            raise LinkError("this adapter has no such rate")
+        set_rate(rate)
+
+    set_rate = servos.simulator.tune
+    monkeypatch.setattr(servos.simulator, "tune", tune)
+    ran = run("scan", servos.url, "--ids", "37-38", "--bitrate", "all", "--json")
     assert ran.code == 0, ran.err
     assert [(one["id"], one["bitrate"]) for one in ran.document["devices"]] == [(37, 500_000), (38, 500_000)]
     assert "nothing was sent at 800000 bit/s" in ran.err
-    silent = run("read", f"{on_slcan.bus},bitrate=250000#37")
+    silent = run("read", f"{servos.url},bitrate=250000#37")
     assert silent.code == 5
     assert "--bitrate all" in silent.err
 
