@@ -130,6 +130,7 @@ def kst(profile: str, method: str, *arguments: Any, name: str = "", **fields: An
         call=Call(method, arguments, fields.pop("options", {})),
         state=lambda device: (kst_address(device), device.raw_position, kept_rows(device)),
         address=kst_address,
+        contents=lambda device: (device.status(), device.memory),
         guarded=False,
         atomic=True,
         **fields,
