@@ -39,6 +39,10 @@ def feetech_address(device: Any) -> tuple[int, int]:
     return status["id"], status["baud_rate"]
 
 
+def feetech_contents(device: Any) -> object:
+    return device.status(), device.pending, bytes(device.memory.live), bytes(device.memory.stored)
+
+
 def feetech(kind: str, method: str, *arguments: Any, name: str = "", **fields: Any) -> Command:
     subject = SUBJECTS[f"feetech-{kind}"]
     return Command(
@@ -47,6 +51,7 @@ def feetech(kind: str, method: str, *arguments: Any, name: str = "", **fields: A
         ids=(OLD, OTHER),
         call=Call(method, arguments, fields.pop("options", {})),
         address=feetech_address,
+        contents=feetech_contents,
         **{"state": rows(subject), **fields},
     )
 
@@ -79,6 +84,7 @@ def guarded_writes() -> Iterator[Command]:
             call=Call("write", options={row.name: row.to_value(raw)}),
             state=rows(subject),
             address=lambda device, address=address: address,  # type: ignore[misc]
+            contents=feetech_contents if subject.name == "feetech" else None,
             restart=2,
             cuts=0 if key == "feetech-sts" else 30,
             pairs=50 if key == "feetech-sts" else 0,
@@ -189,6 +195,10 @@ WRITTEN = replace(
 )
 
 
+def stepper_contents(device: Any) -> object:
+    return device.status(), dict(device.store.stored), [device.memory[name] for name in device.memory]
+
+
 def stepper(method: str, *arguments: Any, name: str = "", **fields: Any) -> Command:
     subject = SUBJECTS["stepper"]
 
@@ -206,6 +216,7 @@ def stepper(method: str, *arguments: Any, name: str = "", **fields: Any) -> Comm
         call=Call(method, arguments, fields.pop("options", {})),
         state=state,
         address=lambda device: (1, subject.link.rate),
+        contents=stepper_contents,
         prepare=prepare,
         **fields,
     )
