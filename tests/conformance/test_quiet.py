@@ -33,23 +33,16 @@ def looks(there: World) -> dict[str, Runnable[Any]]:
     return found | ({"echo test": test} if test is not None else {})
 
 
-def test_looking_has_no_effect(subject: Family) -> None:
+def test_looking_has_no_effect_and_is_marked_repeatable(subject: Family) -> None:
     with world(subject) as there:
         before = there.settings()
         for name, operation in looks(there).items():
             steps = Steps(there.bus)
             steps.run(operation)
             assert {request.effect for request in steps.requests} == {Effect.NONE}, name
+            assert [one for one in steps.requests if not one.repeatable and not is_group(one)] == [], name
             assert [request.setpoints for request in steps.requests if request.setpoints] == []
         assert there.settings() == before
-
-
-def test_what_looks_is_marked_repeatable(subject: Family) -> None:
-    with world(subject) as there:
-        for name, operation in looks(there).items():
-            steps = Steps(there.bus)
-            steps.run(operation)
-            assert [one for one in steps.requests if not one.repeatable and not is_group(one)] == [], name
 
 
 def is_group(request: Request[Any]) -> bool:

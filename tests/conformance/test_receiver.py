@@ -173,11 +173,6 @@ def judged(receiver: Receiver, pieces: Iterable[Data]) -> None:
 
 
 @given(data=st.data())
-def test_garbage_never_raises_and_is_never_hoarded(family: Family, data: st.DataObject) -> None:
-    judged(family.open().receiver(), data.draw(st.lists(deliveries[family.link.kind], max_size=30)))
-
-
-@given(data=st.data())
 def test_frames_among_garbage_are_never_hoarded(family: Family, data: st.DataObject) -> None:
     known = st.sampled_from([vector.data for vector in vectors(family.name)])
     judged(
@@ -216,11 +211,11 @@ def test_garbage_is_explained_to_the_last_byte(family: Family, data: bytes) -> N
 
 
 @given(data=st.data())
-def test_a_simulator_survives_garbage(subject: Family, data: st.DataObject) -> None:
-    simulator = subject.simulator(possible(subject, (1, 2, 3)))
-    simulator.tune(subject.link.rate)
+def test_a_simulator_survives_garbage(family: Family, data: st.DataObject) -> None:
+    simulator = family.simulator(possible(family, (1, 2, 3)))
+    simulator.tune(family.link.rate)
     at = 0.0
-    for piece in data.draw(st.lists(deliveries[subject.link.kind], max_size=10)):
+    for piece in data.draw(st.lists(deliveries[family.link.kind], max_size=10)):
         simulator.receive(piece, at)
         at += 0.01
         moments = [when for when, _ in simulator.advance(at)]

@@ -40,7 +40,7 @@ def met(there: World) -> None:
 
 
 def positions(there: World) -> list[float]:
-    return [there.device(node).telemetry().position for node in IDS]
+    return [there.device(node).position() for node in IDS]
 
 
 def under_way(there: World) -> None:
@@ -164,7 +164,6 @@ def test_at_any_moment_of_a_move(mover: Family) -> None:
 
     async def stopped_at(number: int) -> bool:
         with world(mover) as there:
-            met(there)
             switch_on(there.device(NODE))
             to = there.device(NODE).position() + WAY
             operations = [said(there.device(NODE), "move", to)]
