@@ -184,11 +184,14 @@ def test_at_any_moment_of_a_move(mover: Family) -> None:
             await bus.close()
         return over
 
-    number = 0
-    while not asyncio.run(stopped_at(number)):
-        number += 1 if number < 40 else 20
-        assert number < MOST
-    assert number > 10
+    async def stop_at_each() -> int:
+        number = 0
+        while not await stopped_at(number):
+            number += 1 if number < 40 else 20
+            assert number < MOST
+        return number
+
+    assert asyncio.run(stop_at_each()) > 10
 
 
 def test_what_stops_does_not_switch_on_or_keep(family: Family) -> None:
