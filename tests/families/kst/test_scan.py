@@ -94,7 +94,7 @@ def test_silent_bus_is_sent_to_only_where_it_is_isolated() -> None:
         assert (found.rate, [one.node for one in found.found]) == (125_000, [5])
         assert bench.servo().ping() is False, "the bus has its rate again"
         bench[5].unplug()
-        assert bench.bus.run(scan_bit_rates(bench.settings, isolated=True)).rate is None
+        assert bench.bus.run(scan_bit_rates(bench.settings, rates=RATES[:2], isolated=True)).rate is None
 
 
 def test_adapter_that_cannot_listen_needs_an_isolated_bus() -> None:
