@@ -187,7 +187,7 @@ def test_at_any_moment_of_a_move(mover: Family) -> None:
     async def stop_at_each() -> int:
         number = 0
         while not await stopped_at(number):
-            number += 1 + number // 10
+            number += 1 + number // 5
             assert number < MOST
         return number
 
