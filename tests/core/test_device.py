@@ -99,14 +99,35 @@ def test_a_class_shows_the_methods_of_its_face() -> None:
         assert not inspect.iscoroutinefunction(Servo.scaled)
 
 
+def test_reading_a_method_of_a_base_class_leaves_its_subclasses_alone() -> None:
+    base: Any = Verbs.scaled
+    method: Any = AsyncServo.scaled
+    assert base.__qualname__ == "Verbs.scaled"
+    assert method.__qualname__ == "AsyncServo.scaled"
+    assert sys.version_info < (3, 12) or inspect.iscoroutinefunction(method)
+
+
+def test_method_may_be_replaced_in_a_base_class_after_its_use(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert Servo(BlockingBus()).scaled(3) == 21
+    monkeypatch.setattr(Verbs, "scaled", lambda self, by: -by)
+    assert Servo(BlockingBus()).scaled(3) == -3
+
+
+def test_method_may_be_added_to_a_class() -> None:
+    class Later(Verbs, BlockingDevice): ...
+
+    Later.added = device_method(scaled)  # type: ignore[attr-defined]
+    device: Any = Later(BlockingBus())
+    assert device.added(3) == 21
+
+
 def test_an_override_may_call_the_method_of_its_base_class() -> None:
     class Doubled(Servo):
         def scaled(self, by: int, *, plus: int = 0) -> int:
-            unbound: Any = Servo.scaled
-            value: int = unbound(self, by, plus=plus)
-            return 2 * value
+            return 2 * super().scaled(by, plus=plus)
 
-    assert Doubled(BlockingBus()).scaled(3) == 42
+    device = Doubled(BlockingBus())
+    assert [device.scaled(3), device.scaled(3)] == [42, 42]
 
 
 def test_a_copy_has_methods_of_its_own() -> None:

@@ -7,7 +7,8 @@ from typing import Final
 from motorbus.core.device import AsyncDevice, AsyncRunner, BlockingDevice, BlockingRunner, device_method
 from motorbus.core.family import DeviceTypes, Family, LinkSpec
 
-from . import driver, simulator
+from . import driver
+from .protocol import RATE
 from .registers import TABLE
 
 
@@ -42,9 +43,9 @@ class AsyncServo(_Methods, AsyncDevice):
 
 FAMILY: Final = Family(
     name="template",
-    link=LinkSpec("bytes", simulator.RATE, (simulator.RATE, 250_000)),
+    link=LinkSpec("bytes", RATE, (RATE, 250_000)),
     registers={TABLE.name: TABLE},
     devices=DeviceTypes(Servo, AsyncServo),
     driver=driver.MetronomeDriver,
-    simulator_module=simulator.__name__,
+    simulator_module=f"{__name__}.simulator",
 )

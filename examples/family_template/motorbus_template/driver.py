@@ -224,7 +224,8 @@ async def limits(node: Node) -> tuple[float, float]:
 
 async def enable_torque(node: Node) -> None:
     """Torque on without a jump: the goal becomes the present position first."""
-    await goal(node, await position(node), await limits(node))
+    bounds = await limits(node)
+    await goal(node, await position(node), bounds)
     await write_row(node, TABLE["torque_enable"], 1)
 
 

@@ -16,6 +16,7 @@ from motorbus.core.decode import Fields, counted
 from motorbus.core.family import Explanation
 from motorbus.core.framing import FrameParser
 
+RATE: Final = 500_000  # bit/s as shipped
 IDS: Final = range(1, 64)
 BROADCAST: Final = 0
 REQUEST: Final = b"\xaa\x55"

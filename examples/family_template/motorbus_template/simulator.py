@@ -13,7 +13,6 @@ from motorbus.errors import RequestError
 from . import protocol
 from .registers import COUNT, TABLE
 
-RATE: Final = 500_000
 REPLY_DELAY: Final = 0.0003  # s from the end of a request to the start of its reply # assumption
 SPEED: Final = 6.0 / COUNT  # counts/s # assumption
 ACCELERATION: Final = 40.0 / COUNT  # counts/s² # assumption
@@ -99,7 +98,7 @@ class Metronomes(SerialLine[Servo]):
         if not ids or not set(ids) <= set(protocol.IDS):
             raise RequestError(f"ids {ids} cannot be simulated", expected="one or more of 1 to 63")
         servos = {id: Servo(self, id) for id in ids}
-        super().__init__(servos, RATE, protocol.parser(protocol.REQUEST))
+        super().__init__(servos, protocol.RATE, protocol.parser(protocol.REQUEST))
 
     def carry_out(self, frame: bytes, at: float) -> None:
         for servo in self.nodes.values():

@@ -17,7 +17,7 @@ from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.target import device, id_shown, opened, target
 from motorbus.errors import RequestError
 
-OptionOfBus: Final = Annotated[str, Parameter(help="Any option of the bus, as --profile kst-ext.")]
+OptionOfBus: Final = Annotated[str, Parameter(help="Any option of the bus, as a flag.")]
 D = TypeVar("D")
 T = TypeVar("T")
 

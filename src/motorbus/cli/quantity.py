@@ -36,18 +36,19 @@ def typed(entry: Register, text: str, *, raw: bool = False) -> Typed:
         return Typed(named[text.casefold()], True, True)
     number = text.strip().removesuffix("raw")
     if raw or number != text.strip():
-        return Typed(_whole(entry, number), True)
+        return Typed(_whole(entry, number, text), True)
     if entry.unit in units.QUANTITIES:
         return Typed(units.parse(text, units.QUANTITIES[entry.unit]), False)
-    return Typed(_whole(entry, text), True)
+    return Typed(_whole(entry, text, text), True)
 
 
-def _whole(entry: Register, text: str) -> int:
+def _whole(entry: Register, number: str, text: str) -> int:
     try:
-        return units.whole(text)
+        return units.whole(number)
     except ValueError:
+        kind = "a whole number" if number == text else "a whole number and `raw`, as 2048raw"
         raise RequestError(
-            f"{entry.name}: {text!r} is not a whole number",
+            f"{entry.name}: {text!r} is not {kind}",
             expected=", ".join(entry.choices.values()) or f"{entry.low} to {entry.high}",
             advice="nothing was sent",
         ) from None

@@ -15,7 +15,7 @@ import inspect
 import re
 import sys
 from collections.abc import Callable, Coroutine
-from inspect import Parameter, getattr_static, signature
+from inspect import Parameter, signature
 from types import MethodType
 from typing import Any, ClassVar, Concatenate, Generic, ParamSpec, Protocol, Self, TypeVar, overload
 
@@ -82,6 +82,7 @@ class MethodDescriptor(Generic[P, T]):
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self.function = function
+        self.name = getattr(function, "__name__", "")
         self.__doc__ = function.__doc__
         self._methods: dict[type, Any] = {}
 
@@ -94,7 +95,8 @@ class MethodDescriptor(Generic[P, T]):
 
     def bind(self, one: Any, owner: type) -> Any:
         """The method of this object, or that of the class if `one` is None."""
-        if owner not in self._methods:
+        found = self._methods.get(owner)
+        if found is None:
             method: Any = self.make_method()
             shown = signature(self.function)
             first, *rest = shown.parameters.values()
@@ -110,8 +112,7 @@ class MethodDescriptor(Generic[P, T]):
             method.function = self.function
             if getattr(owner, "_is_async", False) and sys.version_info >= (3, 12):
                 inspect.markcoroutinefunction(method)
-            self._methods[owner] = method
-        found = self._methods[owner]
+            found = self._methods[owner] = method
         return found if one is None else MethodType(found, one)
 
 
@@ -129,10 +130,10 @@ class device_method(MethodDescriptor[P, T]):  # noqa: N801 - used like a functio
     def make_method(self) -> Callable[..., Any]:
         function: Callable[..., Any] = self.function
 
-        def method(device: Any, /, *args: Any, **kwargs: Any) -> Any:
+        def method(self: Any, /, *args: Any, **kwargs: Any) -> Any:
             # A call without arguments costs less than one with empty ones.
-            procedure = function(device, *args, **kwargs) if args or kwargs else function(device)
-            return device.bus.run(procedure)
+            procedure = function(self, *args, **kwargs) if args or kwargs else function(self)
+            return self.bus.run(procedure)
 
         return method
 
@@ -143,8 +144,4 @@ class device_method(MethodDescriptor[P, T]):  # noqa: N801 - used like a functio
     @overload
     def __get__(self, device: AsyncDevice, owner: type) -> Callable[P, Coroutine[Any, Any, T]]: ...
     def __get__(self, device: Any, owner: type) -> Any:
-        # The function replaces this descriptor in the class: the next call is a plain one. A subclass of this
-        # descriptor may check each access, and a class that overrides the method gets here by `super`.
-        if type(self) is device_method and getattr_static(owner, self.name, None) is self:
-            setattr(owner, self.name, self.bind(None, owner))
         return self.bind(device, owner)

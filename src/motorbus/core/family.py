@@ -7,6 +7,7 @@ module describes; `tests/conformance` tests it.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from enum import Enum
@@ -337,8 +338,10 @@ class BusDriver(Protocol):
     def echo_test(self) -> Request[Any] | None:
         """A request whose reply has another length than its echo, sent when a bus is opened; None: no echo."""
 
+    @abstractmethod
     def receiver(self) -> Receiver: ...
 
+    @abstractmethod
     def probe(self, node: int, attempt: int) -> Request[bool]:
         """A request without effect; its value is True for the expected content of the reply.
 
@@ -346,12 +349,14 @@ class BusDriver(Protocol):
         of its request.
         """
 
+    @abstractmethod
     def stop(self, nodes: Mapping[int, Response | None]) -> Stop:
         """Requests that stop these nodes.
 
         `nodes` maps each node to the last answer with its position, None if there is no valid one.
         """
 
+    @abstractmethod
     def identify(self, node: int) -> Runnable[Identity]: ...
 
     def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Procedure[list[Found]]:
@@ -360,9 +365,11 @@ class BusDriver(Protocol):
         Reports `Progress`, and `Found` when a device answers, possibly before its identity is read.
         """
 
+    @abstractmethod
     def axis(self, model: str) -> AxisDriver:
         """What devices of this model can do; an empty one for an unknown model."""
 
+    @abstractmethod
     def decode(self, data: bytes) -> list[Explanation]:
         """Explain all frames in these bytes, field by field; a CAN frame is serialized by `CanFrame.flat()`."""
 

@@ -6,7 +6,7 @@ A `Request` is a step: a procedure awaits it, see `core.steps`.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field
 from enum import Enum, IntEnum
 from typing import Any, ClassVar, Final, Generic, NamedTuple, TypeAlias, TypeVar
 
@@ -177,8 +177,9 @@ class Request(Step[T_co]):
 
     def with_decoder(self, decode: Callable[[Response], T]) -> Request[T]:
         """The same request with another `decode`, without `alternate` and `decode_exact`."""
-        same: Any = self
-        return replace(same, decode=decode, alternate=None, decode_exact=None)
+        own = ("wire", "expected", "decode", "alternate", "decode_exact", "prepared")
+        rest = [name for name in Request.__slots__ if name not in own]
+        return Request(self.wire, self.expected, decode, **{name: getattr(self, name) for name in rest})
 
     def convert(self, function: Callable[[T_co], T]) -> Request[T]:
         """The same request, whose value is `function` of the value of this one."""

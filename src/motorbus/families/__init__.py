@@ -35,6 +35,7 @@ def load(name: str) -> Family:
         if point.name == name:
             installed: Family = point.load()
             return installed
+    _outside.cache_clear()  # for a family that is installed meanwhile
     raise RequestError(
         f"there is no family {name!r}",
         expected=f"one of {', '.join(names())}",

@@ -12,9 +12,11 @@ import motorbus
 from motorbus import families
 from motorbus.cli import faces
 from motorbus.cli.simulated import Simulated
-from motorbus.errors import LinkError
+from motorbus.errors import LinkError, OutcomeUnknown
+from motorbus.families.kst.cli import move_together
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
+from tests.families.kst.bench import Bench
 
 MOVING = """import sys, motorbus
 servo = motorbus.kst.Servo(motorbus.open(sys.argv[1]), 37)
@@ -90,3 +92,12 @@ def test_budget_counts_every_position_in_the_form_of_the_bus() -> None:
     extended = families.load("kst").open(id_format="ext", sized="yes")
     goals, _ = faces.offer("kst", "budget_frames")(extended, 1)["write"]
     assert str(goals[0]) == "00000601#2B0360007CFC0000"
+
+
+def test_move_of_several_stops_all_when_the_first_does_not_answer() -> None:
+    with Bench(5, 6) as bench:
+        bench[6].raw_position = 100
+        bench[5].unplug()
+        with pytest.raises(OutcomeUnknown):
+            move_together(bench.bus, {5: 0.5, 6: -0.5})
+        assert bench[6].memory["goal_position"] == 100

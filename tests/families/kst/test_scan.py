@@ -34,8 +34,9 @@ def test_scan_sends_one_broadcast_and_reads_silent_ids_twice() -> None:
         assert bench.link.now() < 0.5
         assert run_scan(bench, (37, 38)) == [(37, 500_000)]
         assert ALL not in bench.sent()
-        with pytest.raises(RequestError):
-            run_scan(bench, (0,))
+        for ids, rates in (((0,), ()), ((5,), (9600,))):
+            with pytest.raises(RequestError):
+                run_scan(bench, ids, rates)
 
 
 @pytest.mark.parametrize("ids", [(), (5,)])
@@ -97,12 +98,20 @@ def test_silent_bus_is_sent_to_only_where_it_is_isolated() -> None:
         assert bench.bus.run(scan_bit_rates(bench.settings, rates=RATES[:2], isolated=True)).rate is None
 
 
+def test_isolated_search_sends_nothing_at_a_rate_with_errors() -> None:
+    with Bench(bit_rate=1_000_000, reports_ms=100, profile="kst-ext") as bench:
+        found = bench.bus.run(scan_bit_rates(bench.settings, rates=(500_000,), isolated=True))
+        assert (found.rate, bench.sent()) == (None, [])
+
+
 def test_adapter_that_cannot_listen_needs_an_isolated_bus() -> None:
     with Bench(bit_rate=125_000, link=NoListening) as bench:
         with pytest.raises(RequestError, match="cannot listen"):
             bench.bus.run(scan_bit_rates(bench.settings))
         assert bench.sent() == []
+        bench.events.clear()
         assert bench.bus.run(scan_bit_rates(bench.settings, isolated=True)).rate == 125_000
+        assert bench.of(Skipped) == []
 
 
 class Without800k(MemoryLink):

@@ -52,6 +52,15 @@ def test_duplicates_have_keys_of_their_own_and_follow_their_ids() -> None:
     assert [(key, servo.unit) for key, servo in host.bus.nodes.items()] == [(0x25, 1), (0x26, 2), (3, 3)]
 
 
+def test_reply_has_the_identifier_format_of_its_request() -> None:
+    host = Host()
+    short, long = frame(f"625#{READ_ID}"), frame(f"625#{READ_ID}")._replace(extended=True)
+    host.bus.receive(short, 1.0)
+    host.bus.receive(long, 1.00005)
+    replies = [reply for _, reply in host.bus.advance(1.01) if isinstance(reply, CanFrame)]
+    assert [reply.extended for reply in replies] == [False, True]
+
+
 def test_equal_replies_of_duplicates_are_one_frame_and_unequal_ones_break() -> None:
     host = Host(duplicate="0x25")
     assert host.send(READ_POSITION) == [POSITION]

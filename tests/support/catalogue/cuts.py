@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from math import tau
+from math import inf, tau
 from typing import Any
 
 from motorbus.core.family import Family
@@ -136,7 +136,12 @@ def kst(profile: str, method: str, *arguments: Any, name: str = "", **fields: An
         call=Call(method, arguments, fields.pop("options", {})),
         state=lambda device: (kst_address(device), device.raw_position, kept_rows(device)),
         address=kst_address,
-        contents=lambda device: (device.status(), device.memory),
+        contents=lambda device: (
+            device.status(),
+            device.memory,
+            dict(device.values),
+            device.flash.stored(inf),
+        ),
         guarded=False,
         atomic=True,
         **fields,

@@ -121,7 +121,10 @@ async def scan_bit_rates(
                 except LinkLost:
                     raise
                 except LinkError as error:
-                    await Emit(Skipped(rate, error.summary))  # the adapter cannot listen, or lacks this rate
+                    if not isolated:
+                        await Emit(
+                            Skipped(rate, error.summary)
+                        )  # the adapter cannot listen, or lacks this rate
                     continue
                 if activity[rate] is LineActivity.TRAFFIC:
                     return BitRates(rate, activity)

@@ -161,6 +161,8 @@ class KstBus:
     # -- frames of the servos ------------------------------------------------------------------------------------
 
     def _send(self, servo: Servo | None, when: float, frame: CanFrame | None) -> None:
+        if servo is not None and frame is not None:
+            frame = frame._replace(extended=servo.extended)
         heappush(self._events, Event(when, next(self._order), servo, frame, epoch_of(servo, frame)))
 
     def _begin(self, at: float) -> None:
@@ -211,7 +213,7 @@ class KstBus:
             if servo is None:
                 received.append(ERROR)
                 continue
-            frame = (event.frame or servo.report(moment))._replace(extended=servo.extended)
+            frame = event.frame or servo.report(moment)
             if not self._has_host_rate(servo):
                 received.append(ERROR)
                 continue

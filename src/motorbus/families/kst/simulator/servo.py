@@ -286,4 +286,4 @@ class Servo(PoweredDevice):
     def report(self, at: float) -> CanFrame:
         """The report that is due, under 0x580 + id; XQPOWER sends another one under 0x180 + id, which is left out."""
         self.send(self, at + self._interval, None)
-        return notifications.encode_report(self.node, self._reading(at))
+        return notifications.encode_report(self.node, self._reading(at))._replace(extended=self.extended)
