@@ -112,12 +112,12 @@ FEETECH = [
     identity("sts", "set_baud", SLOW, quirks=ERASED, pairs=50),
     identity("scs2", "set_baud", SLOW, quirks={"torn": "old", "baud_ack": "new"}, cuts=10),
     identity("smcl", "set_baud", SLOW, quirks={"eeprom_commit": "after_ack"}, cuts=10),
-    guarded("hls", "set_second_id", 20, options={"among": (OLD, OTHER)}, restart=1, cuts=8),
-    guarded("sts", "set_mode", "velocity", cuts=40, pairs=50),
-    guarded("sts", "set_many_turns", True, quirks={"torn": "new"}, cuts=40, pairs=50),
-    guarded("sts", "calibrate", 1.0, name="-to", cuts=40, pairs=50),
-    guarded("sts", "calibrate", name="-middle", cuts=40),
-    guarded("hls", "calibrate", cuts=40),
+    guarded("hls", "set_second_id", 20, options={"among": (OLD, OTHER)}, restart=1),
+    guarded("sts", "set_mode", "velocity", pairs=50),
+    guarded("sts", "set_many_turns", True, quirks={"torn": "new"}, pairs=50),
+    guarded("sts", "calibrate", 1.0, name="-to", pairs=50),
+    guarded("sts", "calibrate", name="-middle"),
+    guarded("hls", "calibrate"),
 ]
 
 # -- KST ---------------------------------------------------------------------------------------------------------------
@@ -242,13 +242,13 @@ HOMING = {"velocity": tau, "deadline": 5.0}
 AT_HOME = {"home_switch": "wired", "home_at": -30}
 
 STEPPER = [
-    borrow("jog", tau, 0.5, cuts=40, pairs=50),
+    borrow("jog", tau, 0.5, pairs=50),
     borrow("jog", tau, 0.5, name="-relabel", quirks=RELABELLED, cuts=20),
-    borrow("move_by", -tau, options={"velocity": tau}, cuts=30, pairs=50),
-    borrow("home", options=HOMING, quirks=AT_HOME, then=Call("jog", (tau, 0.5)), cuts=20, pairs=50),
+    borrow("move_by", -tau, options={"velocity": tau}, pairs=50),
+    borrow("home", options=HOMING, quirks=AT_HOME, then=Call("jog", (tau, 0.5)), cuts=40, pairs=50),
     borrow("run", 1, guarded=False, pairs=50),
     borrow("characterise", cuts=1),
-    edit("write_project", Program(project=WRITTEN), atomic=True, restart=1, cuts=30, pairs=50),
+    edit("write_project", Program(project=WRITTEN), atomic=True, restart=1, pairs=50),
     edit("write_project", Program(project=WRITTEN), name="-relabel", quirks=STORED_VIEW, cuts=20),
     edit("clear", 2, atomic=True, pairs=50),
 ]
