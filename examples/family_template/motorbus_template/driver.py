@@ -81,9 +81,8 @@ def request(
         return decode(reply[5:-2])
 
     frame = protocol.encode(protocol.REQUEST, node.node, command, operands)
-    return Request(
-        frame, (expected,), take, repeatable=True, **options
-    )  # goals are absolute: all may be repeated
+    # Goals are absolute, so every request may be repeated.
+    return Request(frame, (expected,), take, repeatable=True, **options)
 
 
 def read_row(node: Node, row: Register) -> Request[int]:

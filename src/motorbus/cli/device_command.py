@@ -118,10 +118,10 @@ def device_command(
     family, name = app.name[0], usage.split()[0]
 
     def register(function: Callable[..., Exit]) -> Callable[..., Exit]:
-        own = inspect.signature(function, eval_str=True)
+        inner = inspect.signature(function, eval_str=True)
         parameters = [
             one.replace(name="address", annotation=address) if one.name == "run" else one
-            for one in own.parameters.values()
+            for one in inner.parameters.values()
         ]
         option = partial(inspect.Parameter, kind=inspect.Parameter.KEYWORD_ONLY)
         if consent:
@@ -131,20 +131,20 @@ def device_command(
             parameters.append(option("dry_run", default=False, annotation=DryRun))
         parameters.append(option("output", annotation=Silent))
         parameters.append(inspect.Parameter("options", inspect.Parameter.VAR_KEYWORD, annotation=OptionOfBus))
-        whole = own.replace(parameters=parameters)
+        outer = inner.replace(parameters=parameters)
 
         @wraps(function)
-        def command(*words: Any, **options: Any) -> Exit:
-            bound = whole.bind(*words, **options)
+        def command(*args: Any, **kwargs: Any) -> Exit:
+            bound = outer.bind(*args, **kwargs)
             bound.apply_defaults()
-            given = bound.arguments
-            mine = {one: given.pop(one) for one in ("address", "output", "options")}
-            flags = {one: given.pop(one) for one in ("yes", "dry_run") if one in given}
-            given["run"] = DeviceCommand(family, kind, name, **mine, **flags)
-            call = inspect.BoundArguments(own, given)
+            arguments = bound.arguments
+            common = {one: arguments[one] for one in ("address", "output", "options")}
+            flags = {one: arguments[one] for one in ("yes", "dry_run") if one in arguments}
+            arguments["run"] = DeviceCommand(family, kind, name, **common, **flags)
+            call = inspect.BoundArguments(inner, arguments)
             return function(*call.args, **call.kwargs)
 
-        command.__signature__ = whole  # type: ignore[attr-defined]
+        command.__signature__ = outer  # type: ignore[attr-defined]
         command.__annotations__ = {one.name: one.annotation for one in parameters}
         return family_command(app, usage, text, *examples)(command)
 

@@ -21,10 +21,19 @@ _HEAD: Final = {False: 19, True: 39}  # start bit to length code
 _CRC: Final = 15
 _POLYNOMIAL: Final = 0x4599
 _TAIL: Final = 1 + 2 + 7 + INTERFRAME  # CRC delimiter, acknowledge slot and delimiter, end of frame
-_CRC_OF: Final = [byte << _CRC - 8 for byte in range(256)]
-for _ in range(8):
-    _CRC_OF[:] = [(crc << 1 ^ (_POLYNOMIAL if crc >> _CRC - 1 else 0)) & 0x7FFF for crc in _CRC_OF]
-# An inverted bit follows five equal bits. It starts the next run, so four bits equal to it are followed by another.
+
+
+def _crc_table() -> list[int]:
+    """The CRC of each byte."""
+    table = [byte << _CRC - 8 for byte in range(256)]
+    for _ in range(8):
+        table = [(crc << 1 ^ (_POLYNOMIAL if crc >> _CRC - 1 else 0)) & 0x7FFF for crc in table]
+    return table
+
+
+_CRC_OF: Final = _crc_table()
+# An inverted bit follows five equal bits. It starts the next run, so four bits equal to it are followed by another:
+# a match of 1 + 4 n bits has n stuff bits.
 _STUFFED: Final = re.compile("0{5}(?:1{4}0{4})*(?:1{4})?|1{5}(?:0{4}1{4})*(?:0{4})?")
 
 

@@ -8,9 +8,9 @@ from typing import Any, ClassVar, Final
 
 from motorbus.core.family import BusDriver, Family, Found
 from motorbus.core.request import ANY, Request, TimeoutClass
-from motorbus.core.scan import BitrateRestored, Skipped
+from motorbus.core.scan import BitrateRestored, set_or_skip
 from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate
-from motorbus.errors import DeviceError, LinkError, LinkLost, NoReply, WireError
+from motorbus.errors import DeviceError, NoReply, WireError
 
 PASSES: Final = 2  # of a scan: a device may miss the first frame after power-up
 BITS: Final = 10  # bits of a byte on the wire: start, eight of data, stop
@@ -71,14 +71,8 @@ class HalfDuplexSerial(BusDriver):
         found = []
         async with BitrateRestored():
             for rate in rates:
-                try:
-                    await SetBitrate(rate)
-                except LinkLost:
-                    raise
-                except LinkError as error:
-                    await Emit(Skipped(rate, error.summary))
-                    continue
-                found += await self._scan_ids(ids, rate)
+                if await set_or_skip(rate):
+                    found += await self._scan_ids(ids, rate)
         return found
 
     async def _scan_ids(self, ids: tuple[int, ...], rate: int) -> list[Found]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from motorbus.core.steps import Guard, SetBitrate
+from motorbus.core.steps import Emit, Guard, SetBitrate
+from motorbus.errors import LinkError, LinkLost
 
 
 class Skipped(NamedTuple):
@@ -24,3 +25,15 @@ class BitrateRestored(Guard):
 
     async def leave(self, error: BaseException | None) -> None:
         await SetBitrate(self.rate)
+
+
+async def set_or_skip(rate: int) -> bool:
+    """Set this bit rate. If the adapter lacks it, report it as `Skipped` and return False. Raises LinkLost."""
+    try:
+        await SetBitrate(rate)
+    except LinkLost:
+        raise
+    except LinkError as error:
+        await Emit(Skipped(rate, error.summary))
+        return False
+    return True

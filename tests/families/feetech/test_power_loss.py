@@ -136,7 +136,7 @@ def test_recover_overload_does_not_move_shaft_after_power_loss(name: str) -> Non
 
 
 class Shaft:
-    """A servo that notes where its shaft stood when its supply came back: it counts its turns anew then."""
+    """A servo that notes where its shaft stood when its supply came back: it counts its turns from there."""
 
     def __init__(self, made: World) -> None:
         self.servo, self.made = made.device, made

@@ -28,8 +28,8 @@ def jogged(device: Controller) -> object:
 def wrecked(cut: Cut, work: Callable[[Controller], object], options: dict[str, Any]) -> Line1:
     """The line after a host has died so, and the time has passed in which the motor comes to its end."""
     line = Line1(**options)
-    told = line.run(work, cut)
-    assert isinstance(told, LinkLost), told
+    result = line.run(work, cut)
+    assert isinstance(result, LinkLost), result
     line.later()
     assert line.at_rest, cut
     return line

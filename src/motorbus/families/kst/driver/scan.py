@@ -19,7 +19,7 @@ from typing import Final, NamedTuple
 
 from motorbus.core.family import Found, Identity
 from motorbus.core.request import ANY, EVERY_LANE, Priority, Request, Response, TimeoutClass
-from motorbus.core.scan import BitrateRestored, Skipped
+from motorbus.core.scan import BitrateRestored, Skipped, set_or_skip
 from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate, WaitFor, catch, gather
 from motorbus.errors import LinkError, LinkLost, NoReply, RequestError, WireError
 from motorbus.families.kst import sdo
@@ -201,14 +201,7 @@ async def _select_rate(settings: BusSettings, rate: int, *, listen_first: bool) 
     if listen_first and await _listen_if_possible(settings, rate) is LineActivity.ERRORS:
         await Emit(Skipped(rate, LineActivity.ERRORS.value))
         return False
-    try:
-        await SetBitrate(rate)
-    except LinkLost:
-        raise
-    except LinkError as error:
-        await Emit(Skipped(rate, error.summary))
-        return False
-    return True
+    return await set_or_skip(rate)
 
 
 # -- one rate --------------------------------------------------------------------------------------------------
