@@ -24,7 +24,7 @@ from statistics import median
 from typing import NamedTuple
 
 from bench.places import ROOT, surroundings
-from motorbus.cli.simulated import Simulated
+from tests.support.processes import Simulated
 
 STOPS = 1000
 MOST = 0.050

@@ -27,11 +27,11 @@ from select import select
 from typing import NamedTuple
 
 from bench.rounds import Failed
-from motorbus.cli.simulated import Simulated
 from motorbus.core.can_bits import bits
 from motorbus.core.can_frame import CanFrame
 from motorbus.families.feetech import wire as feetech
 from motorbus.families.kst import sdo as kst
+from tests.support.processes import Simulated
 
 RATE = 1_000_000
 BYTE = 10 / RATE

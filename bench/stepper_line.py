@@ -17,9 +17,9 @@ from typing import NamedTuple
 
 import motorbus
 from bench.figures import Spread, spread
-from motorbus.cli.simulated import Simulated
 from motorbus.families.stepper import Controller, Program
 from motorbus.families.stepper.table import Project, Step, with_steps
+from tests.support.processes import Simulated
 
 WITHIN = 0.15
 LATENCY = "1s"

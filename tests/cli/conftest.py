@@ -14,12 +14,12 @@ import pytest
 import motorbus
 from motorbus.cli import main
 from motorbus.cli.machine import VARIABLE
-from motorbus.cli.simulated import Simulated
 from motorbus.core.request import Data
 from motorbus.link import usb_adapters
 from motorbus.motion.machine import Machine
 from motorbus.simulation.named import Simulation
 from tests.support.machines import machine
+from tests.support.processes import Simulated
 
 
 class Ran(NamedTuple):

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from motorbus.cli.simulated import Simulated
 from motorbus.core.request import Data
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Bench, Run
 from tests.cli.test_estop import FOREIGN, WATCHING, program
+from tests.support.processes import Simulated
 
 pytestmark = pytest.mark.usefixtures("state_folder")
 

@@ -19,11 +19,11 @@ import pytest
 import motorbus
 from motorbus.bus import stop_socket
 from motorbus.cli import estop
-from motorbus.cli.simulated import Simulated
 from motorbus.core.request import Data
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Bench, Run
+from tests.support.processes import Simulated
 
 LOOPING = """
 import sys, motorbus

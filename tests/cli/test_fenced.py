@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from motorbus.cli.simulated import Simulated
 from tests.cli.conftest import Bench, Run
 from tests.support.machines import described
+from tests.support.processes import Simulated
 
 
 def bounded(bench: Bench, *lines: str) -> None:

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 import motorbus
-from motorbus.cli.simulated import Simulated
 from motorbus.core.request import Data
 from motorbus.motion.machine import Machine
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
+from tests.support.processes import Simulated
 
 
 @pytest.fixture(autouse=True)

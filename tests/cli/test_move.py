@@ -14,10 +14,10 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.cli.simulated import Simulated
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Bench, Run
+from tests.support.processes import Simulated
 
 
 def stands(run: Run, arm: Simulation, node: int) -> float:

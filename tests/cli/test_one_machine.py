@@ -18,9 +18,9 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from motorbus.cli.simulated import Simulated
 from tests.cli.conftest import Run
 from tests.support.machines import described
+from tests.support.processes import Simulated
 
 NAMES = "arm", "can", "stage"
 EXTRA = '[pose.ready]\na1 = "10 deg"\nc1 = "5 deg"\n'

@@ -13,12 +13,12 @@ import pytest
 
 import motorbus
 from motorbus import session
-from motorbus.cli.simulated import Simulated
 from motorbus.core.steps import INTENT, JournalEntry
 from motorbus.journal import BusJournal
 from motorbus.link.lock import journal_path
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
+from tests.support.processes import Simulated
 
 KILLED_AT = """
 import os, signal, sys

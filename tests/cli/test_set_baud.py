@@ -8,9 +8,9 @@ import pytest
 
 import motorbus
 from motorbus.cli import identity
-from motorbus.cli.simulated import Simulated
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
+from tests.support.processes import Simulated
 
 
 def rates(arm: Simulation) -> list[int]:

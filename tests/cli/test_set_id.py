@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 import motorbus
-from motorbus.cli.simulated import Simulated
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
+from tests.support.processes import Simulated
 
 
 def wear(arm: Simulation) -> int:

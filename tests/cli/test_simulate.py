@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 
 import motorbus
-from motorbus.cli.simulated import Simulated
 from tests.cli.conftest import Run
+from tests.support.processes import Simulated
 
 PING, PONG = bytes.fromhex("FFFF0102 01FB"), bytes.fromhex("FFFF0102 00FC")
 

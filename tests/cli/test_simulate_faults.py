@@ -19,10 +19,10 @@ import pytest
 
 import motorbus
 from motorbus.cli.exits import Exit
-from motorbus.cli.simulated import Simulated
 from motorbus.errors import LinkLost, MotorbusError, NoReply
 from tests.cli.conftest import Run
 from tests.interop.test_peers import SDK, Peer
+from tests.support.processes import Simulated
 
 PATIENCE = 30.0
 

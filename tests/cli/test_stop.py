@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 import motorbus
-from motorbus.cli.simulated import Simulated
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Bench, Run
+from tests.support.processes import Simulated
 
 
 def test_it_ends_a_motion_and_holds(run: Run, arm: Simulation) -> None:

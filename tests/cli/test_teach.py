@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from motorbus.cli.simulated import Simulated
 from motorbus.motion.trajectory import Trajectory
 from tests.cli.conftest import Bench, Run
 from tests.support.machines import described
+from tests.support.processes import Simulated
 
 HELD, LIMP = 1, 0
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from motorbus.cli.simulated import Simulated
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Bench, Run
+from tests.support.processes import Simulated
 
 
 def limp(run: Run, arm: Simulation, node: int) -> bool:

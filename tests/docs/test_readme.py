@@ -21,9 +21,9 @@ import pytest
 
 from motorbus.cli import main
 from motorbus.cli.exits import Exit
-from motorbus.cli.simulated import Simulated
 from motorbus.motion.machine import Machine
 from motorbus.session import prepare
+from tests.support.processes import Simulated
 
 ROOT = Path(__file__).resolve().parents[2]
 MACHINE_PAGE = ROOT / "docs" / "how-to" / "machine.md"

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-from motorbus.cli.simulated import Simulated
+from tests.support.processes import Simulated
 
 RATE = 500_000
 WAYS = ("slcan", "socketcand")

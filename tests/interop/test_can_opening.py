@@ -17,7 +17,7 @@ import pytest
 
 import motorbus
 from motorbus import kst
-from motorbus.cli.simulated import Simulated
+from tests.support.processes import Simulated
 
 ROUNDS = 50
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.cli.simulated import Simulated
+from tests.support.processes import Simulated
 from tests.support.world import Subscription, TraceRecord
 
 VERBS: list[tuple[str, tuple[Any, ...], dict[str, Any]]] = [

@@ -22,7 +22,7 @@ import pytest
 
 import motorbus
 from motorbus import feetech
-from motorbus.cli.simulated import Simulated
+from tests.support.processes import Simulated
 
 T = TypeVar("T")
 

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from motorbus.cli.simulated import Simulated
 from motorbus.errors import LinkLost, MotionError, MotorbusError, NoReply, RequestError
 from motorbus.motion.machine import Machine
 from motorbus.motion.trajectory import Trajectory
@@ -16,6 +15,7 @@ from motorbus.session.robot import AsyncRobot, Robot
 from tests.motion.loop.lines import Doubtful
 from tests.motion.test_follow import move
 from tests.support.machines import described, machine
+from tests.support.processes import Simulated
 
 LATE = 0.0005
 """s; a reading is there so long after the beginning of its cycle, at most."""

@@ -13,13 +13,13 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from motorbus.cli.simulated import Simulated
 from motorbus.errors import Faulted, Refused
 from motorbus.motion.safety.restarts import FaultNoted
 from motorbus.session.robot import Robot
 from tests.safety.decoders import READ
 from tests.safety.test_restarts import moving_or_giving_torque
 from tests.support.machines import described
+from tests.support.processes import Simulated
 
 
 class Served(NamedTuple):

@@ -20,10 +20,10 @@ import pytest
 import motorbus
 from motorbus import Robot
 from motorbus.bus.trace import Subscription, TraceRecord
-from motorbus.cli.simulated import Simulated
 from motorbus.core.steps import Emit
 from motorbus.errors import MotorbusError
 from tests.support.machines import machine
+from tests.support.processes import Simulated
 from tests.support.world import is_stopping
 
 ROOT = Path(__file__).parents[2]

@@ -22,10 +22,10 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from motorbus.cli.simulated import Simulated
 from motorbus.session.robot import Robot
 from tests.conftest import Rounds
 from tests.support.machines import described
+from tests.support.processes import Simulated
 
 PROGRAM = """
 import json, os, signal, sys

@@ -18,11 +18,11 @@ from random import Random
 import pytest
 
 from motorbus.cli import main
-from motorbus.cli.simulated import Simulated
 from motorbus.core.request import Data
 from motorbus.link.serial import SerialLink
 from motorbus.session.robot import Robot
 from tests.support.machines import described
+from tests.support.processes import Simulated
 
 PROGRAM = """
 import os, signal, sys

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from motorbus.cli.simulated import Simulated
 from tests.support.machines import described
+from tests.support.processes import Simulated
 
 PROGRAM = """
 import sys

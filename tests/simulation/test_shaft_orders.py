@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 import motorbus
-from motorbus.cli.simulated import Simulated
 from motorbus.simulation.control import obey
+from tests.support.processes import Simulated
 
 MIDDLE = radians(180)
 Order = Callable[[str], str]

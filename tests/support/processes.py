@@ -11,9 +11,10 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Self
 
 from motorbus import LinkLost, NoReply
+from motorbus.errors import MotorbusError
 
 ROOT: Final = Path(__file__).parents[2]
 LATENCY: Final = ",latency=0.1"
@@ -96,6 +97,66 @@ def simulator(port: Path, family: str, *arguments: str) -> Iterator[Simulator]:
         yield running
     finally:
         running.end()
+
+
+class Simulated:
+    """`motorbus simulate` as a child, for a `with`; flags are those of the command. `bus` is its first address.
+
+    Raises MotorbusError with the text of the command if it ends before it is ready.
+    """
+
+    def __init__(
+        self,
+        family: str,
+        *,
+        ids: str = "1",
+        link: Path | None = None,
+        tcp: str = "",
+        pace: bool = False,
+        **flags: str,
+    ) -> None:
+        words = ["-m", "motorbus", "simulate", family, "--ids", ids, "--quiet", "--json"]
+        words += ["--link", str(link)] if link else []
+        words += ["--tcp", tcp] if tcp else []
+        words += ["--pace"] if pace else []
+        words += [word for name, value in flags.items() for word in (f"--{name}", value)]
+        self._words = words
+        self._process: subprocess.Popen[str] | None = None
+        self.ready: dict[str, Any] = {}
+
+    @property
+    def bus(self) -> str:
+        """The first address."""
+        return str(self.ready["bus"])
+
+    @property
+    def buses(self) -> list[str]:
+        """Every address."""
+        return [str(bus) for bus in self.ready["buses"]]
+
+    @property
+    def process(self) -> subprocess.Popen[str]:
+        """The child."""
+        assert self._process is not None
+        return self._process
+
+    def __enter__(self) -> Self:
+        self._process = _started(self._words)
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        if not line:
+            raise MotorbusError(f"the simulated bus did not start: {self._process.communicate()[1].strip()}")
+        self.ready = json.loads(line)
+        return self
+
+    def end(self) -> int:
+        """Ask the child to end; return its exit code."""
+        self.process.terminate()
+        self.process.communicate(timeout=LIMIT)
+        return self.process.returncode
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
 
 
 def until_back(read: Callable[[], Any]) -> Any:

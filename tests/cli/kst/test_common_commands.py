@@ -11,12 +11,12 @@ import pytest
 import motorbus
 from motorbus import families
 from motorbus.cli import faces
-from motorbus.cli.simulated import Simulated
 from motorbus.errors import LinkError, OutcomeUnknown
 from motorbus.families.kst.cli import move_together
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
 from tests.families.kst.bench import Bench
+from tests.support.processes import Simulated
 
 MOVING = """import sys, motorbus
 servo = motorbus.kst.Servo(motorbus.open(sys.argv[1]), 37)

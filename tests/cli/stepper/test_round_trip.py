@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from motorbus.cli.simulated import Simulated
 from motorbus.families.stepper import Program
 from motorbus.families.stepper.program.backups import Backup
 from tests.cli.conftest import Run
 from tests.cli.stepper.conftest import EXAMPLE
+from tests.support.processes import Simulated
 
 
 @pytest.fixture

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 import motorbus
-from motorbus.cli.simulated import Simulated
 from tests.cli.conftest import Run
+from tests.support.processes import Simulated
 
 START = bytes.fromhex("FFAA4E01000000000000F8")
 SAVE_AS_4 = bytes.fromhex("FFAA2E04000000000000DB")

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from motorbus.cli.simulated import Simulated
 from tests.cli.conftest import Run
 from tests.cli.stepper.conftest import EXAMPLE
+from tests.support.processes import Simulated
 
 pytestmark = pytest.mark.usefixtures("state_folder")
 

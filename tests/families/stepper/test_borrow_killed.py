@@ -15,8 +15,8 @@ import pytest
 
 import motorbus
 from motorbus.cli import main
-from motorbus.cli.simulated import Simulated
 from motorbus.families.stepper import Controller
+from tests.support.processes import Simulated
 
 KILLED_AT = """
 import os, signal, sys

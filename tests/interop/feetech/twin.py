@@ -17,9 +17,9 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
 
-from motorbus.cli.simulated import Simulated
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.table import TABLES
+from tests.support.processes import Simulated
 
 IDS: Final = (1, 2, 253)
 ABSENT: Final = 7
