@@ -36,7 +36,6 @@ def python(*arguments: str) -> Iterator[subprocess.Popen[str]]:
 def _started(arguments: Sequence[str]) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [sys.executable, *arguments],
-        cwd=ROOT,
         env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "src")])},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
