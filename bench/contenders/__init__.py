@@ -1,1 +1,1 @@
-"""Who is measured: one file each, named like the library, each only ever run in a process of its own."""
+"""One module for each library; each runs in a process of its own."""

@@ -1,93 +1,49 @@
-"""The floor: what the same exchange costs in Python with nothing around it.
-
-It checks nothing, waits for exactly the bytes it expects, and would hang on a silent servo; no library can be
-that careless, so none can be that cheap.
-"""
+"""The floor: the same bytes by plain system calls, without any check."""
 
 from __future__ import annotations
 
 import os
 import select
 import struct
-import termios
 import tty
 from typing import Any
 
-from bench.loop import main
-from bench.workloads import SIZES, Workload
-
-GOAL, POSITION = 42, 56
-ONE = 8
-"""Length of a status packet with two bytes of data."""
+from bench.measure import Contender, main
+from bench.workloads import NODES, packet
 
 
-def packet(node: int, instruction: int, parameters: bytes) -> bytes:
-    """One instruction packet."""
-    body = bytes((node, len(parameters) + 2, instruction)) + parameters
-    return b"\xff\xff" + body + bytes((~sum(body) & 255,))
-
-
-class Bare:
+class Bare(Contender):
     """`os.write`, `poll`, `os.read`."""
 
-    def __init__(self, port: str, workload: Workload) -> None:
+    def __init__(self, port: str) -> None:
         self.descriptor = os.open(port, os.O_RDWR | os.O_NOCTTY)
-        tty.setraw(self.descriptor, termios.TCSANOW)
+        tty.setraw(self.descriptor)
         self.poll = select.poll()
         self.poll.register(self.descriptor, select.POLLIN)
-        self.nodes = workload.reads or workload.writes
-        size = SIZES[workload.what]
-        self.read_one = packet(1, 2, bytes((POSITION, 2)))
-        self.read_all = packet(254, 0x82, bytes((POSITION, size, *self.nodes)))
-        self.length = len(self.nodes) * (6 + size)
-        self.values = struct.Struct("<" + ("5xHx" if size == 2 else f"5x{size}sx") * len(self.nodes))
+        self.one = packet(1, 2, bytes((56, 2)))
+        self.all = packet(254, 0x82, bytes((56, 2, *NODES)))
+        self.values = struct.Struct("<" + "5xHx" * len(NODES))
 
-    def read(self, prepared: Any) -> bytes:
-        os.write(self.descriptor, self.read_one)
-        self.poll.poll(1000)
-        answer = os.read(self.descriptor, 4096)
-        while len(answer) < ONE:
+    def _ask(self, request: bytes, length: int) -> bytes:
+        os.write(self.descriptor, request)
+        answer = b""
+        while len(answer) < length:
+            if not self.poll.poll(100):
+                raise TimeoutError
             answer += os.read(self.descriptor, 4096)
-        return answer[5:7]
+        return answer
 
-    def sync_read(self, prepared: Any) -> tuple[Any, ...]:
-        os.write(self.descriptor, self.read_all)
-        self.poll.poll(1000)
-        answer = os.read(self.descriptor, 4096)
-        while len(answer) < self.length:
-            answer += os.read(self.descriptor, 4096)
-        return self.values.unpack(answer)
+    def read(self) -> int:
+        return int.from_bytes(self._ask(self.one, 8)[5:7], "little")
 
-    blocks = sync_read
+    def read_group(self) -> Any:
+        return self.values.unpack(self._ask(self.all, 8 * len(NODES)))
 
-    def sync_write(self, prepared: list[int]) -> None:
-        data = [
-            byte for node, goal in zip(self.nodes, prepared, strict=True) for byte in _six_bytes(node, goal)
-        ]
-        os.write(self.descriptor, packet(254, 0x83, bytes((GOAL, 6, *data))))
-
-    def cycle(self, prepared: list[int]) -> tuple[int, ...]:
-        data = [
-            byte
-            for node, goal in zip(self.nodes, prepared, strict=True)
-            for byte in (node, goal & 255, goal >> 8)
-        ]
-        os.write(self.descriptor, packet(254, 0x83, bytes((GOAL, 2, *data))))
-        return self.sync_read(None)
-
-    def prepare(self, counts: list[int]) -> list[int]:
-        return counts
-
-    def counts(self, values: bytes | tuple[Any, ...]) -> tuple[Any, ...]:
-        return (int.from_bytes(values, "little"),) if isinstance(values, bytes) else values
-
-    def close(self) -> None:
-        os.close(self.descriptor)
-
-
-def _six_bytes(node: int, goal: int) -> tuple[int, ...]:
-    """Goal position, no time, 1000 counts/s, as one servo's share of a SYNC WRITE."""
-    return node, goal & 255, goal >> 8, 0, 0, 0xE8, 0x03
+    def write_group(self, goals: list[int]) -> None:
+        rows = b"".join(
+            bytes((node,)) + struct.pack("<H", goal) for node, goal in zip(NODES, goals, strict=True)
+        )
+        os.write(self.descriptor, packet(254, 0x83, bytes((42, 2)) + rows))
 
 
 if __name__ == "__main__":

@@ -1,36 +1,26 @@
-"""The vendor's newer SDK from the package index, ftservo-python-sdk 2.0.1, used as its examples use it."""
+"""ftservo-python-sdk, the vendor's newer SDK, used as its examples use it."""
 
 from __future__ import annotations
 
-import scservo_sdk as sdk  # type: ignore[import-not-found]
-
-from bench import memory
-from bench.contenders.newer_sdk import NewerSdk
-from bench.contenders.sdk_port import MemoryPort
-from bench.loop import main
-from bench.workloads import Workload
+from bench.contenders.feetech_servo_sdk import FeetechServoSdk, check, open_port, sdk
+from bench.measure import main
+from bench.workloads import NODES
 
 
-class FtservoSdk(NewerSdk):
-    """Its handler for STS servos."""
+class FtservoSdk(FeetechServoSdk):
+    """Its handler for STS servos owns the port."""
 
-    def __init__(self, port: str, workload: Workload) -> None:
-        if port == memory.PORT:
-            opened = MemoryPort(workload)
-        else:
-            opened = sdk.PortHandler(port)
-            if not opened.openPort() or not opened.setBaudRate(1_000_000):
-                raise OSError(f"cannot open {port}")
-        super().__init__(sdk, sdk.sms_sts(opened), workload)
+    def __init__(self, port: str) -> None:
+        self.packets = sdk.sms_sts(open_port(port))
+        self.positions = sdk.GroupSyncRead(self.packets, 56, 2)
+        self.goals = sdk.GroupSyncWrite(self.packets, 42, 2)
+        for node in NODES:
+            self.positions.addParam(node)
 
-    def read(self, prepared: object) -> int:
-        position, result, _error = self.packets.ReadPos(1)
-        if result:
-            raise OSError(f"the SDK says {result}")
-        return int(position)
-
-    def _word(self, value: int) -> list[int]:
-        return [self.packets.scs_lobyte(value), self.packets.scs_hibyte(value)]
+    def read(self) -> int:
+        value, result, _ = self.packets.ReadPos(1)
+        check(result)
+        return int(value)
 
 
 if __name__ == "__main__":

@@ -1,49 +1,41 @@
-"""Ours on CAN, by its public calls; several nodes by one blocking bus that keeps as many in flight as it may."""
+"""motorbus on CAN by its public calls; a group is read with several requests in flight."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from typing import Any
 
 import motorbus
-from bench.can_loop import BITRATE, main
+from bench.measure import Contender, main
+from bench.workloads import BITRATE, NODES
 from motorbus import kst
 from motorbus.core.steps import gather
 
-COUNTS_PER_RADIAN = 10 * 57.29577951308232
+COUNTS = 10 * math.degrees(1)
+"""Raw counts of a radian."""
 
 
-class Motorbus:
-    """One open bus; servos made once."""
+class Motorbus(Contender):
+    """One blocking bus, servos made once."""
 
-    def __init__(self, port: str, nodes: tuple[int, ...]) -> None:
+    family = "kst"
+
+    def __init__(self, port: str) -> None:
         self.bus = motorbus.open(f"kst:can://slcan{port},bitrate={BITRATE}")
-        self.servos = [kst.Servo(self.bus, node) for node in nodes]
+        self.servos = [kst.Servo(self.bus, node) for node in NODES]
 
-    def read(self, count: int) -> list[list[int]]:
-        """So many positions of each node, raw."""
-        values: list[list[float]] = [[] for _ in self.servos]
-        if len(self.servos) == 1:
-            position = self.servos[0].position
-            values[0] += [position() for _ in range(count)]
-        else:
-            self._together(count, values)
-        return [[round(value * COUNTS_PER_RADIAN) for value in one] for one in values]
+    def read(self) -> float:
+        return self.servos[0].position()
 
-    def _together(self, count: int, values: list[list[float]]) -> None:
-        verb = kst.Servo.position.function
+    def read_group(self) -> Any:
+        return self.bus.run(_read_all(self.servos))
 
-        async def endless(servo: kst.Servo, keep: Callable[[float], None]) -> None:
-            for _ in range(count):
-                keep(await verb(servo))
+    def to_counts(self, values: Any) -> list[int]:
+        return [round(value * COUNTS) for value in ([values] if isinstance(values, float) else values)]
 
-        async def together() -> None:
-            pairs = zip(self.servos, values, strict=True)
-            await gather(*[endless(servo, found.append) for servo, found in pairs])
 
-        self.bus.run(together())
-
-    def close(self) -> None:
-        self.bus.close()
+async def _read_all(servos: list[kst.Servo]) -> Any:
+    return await gather(*[kst.Servo.position.function(servo) for servo in servos])
 
 
 if __name__ == "__main__":

@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from bench.truth import Truth, Went, watched
 from motorbus.motion.moving.moved import Moved
 from motorbus.session.robot import Robot
 from tests.support.machines import machine
 from tests.support.noisy_line import NoisyLine
+from tests.support.truth import Truth, Went, watched
 
 APART = 0.005
 """s between the first start and the last, at most."""
