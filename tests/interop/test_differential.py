@@ -6,15 +6,14 @@ from collections.abc import Callable
 
 import pytest
 
-from scripts import differential
-from tests.conftest import Figures
-from tests.interop.differential import judging, ours, outside, sdo_judging, streams, table
+from tests.interop.differential import judging, ours, streams, table
 from tests.interop.differential.cases import Case, Outcome, Request
-from tests.interop.differential.notes import GROUP, NOTES, READ, REQUEST_NOTES, SDO_NOTES
+from tests.interop.differential.notes import REQUESTS, SDO, STREAMS
 from tests.interop.differential.outside import CANOPEN, FEETECH, NEW, OLD, RUST, Decoder
 
 SEED = 20
-EXPLAINED = NOTES.keys() | SDO_NOTES.keys()
+READ = Request("read", 1, 56, 2)
+GROUP = Request("sync_read", 254, 56, 2, nodes=(1, 2, 3))
 BY = {OLD: "old", NEW: "new", RUST: "rust", CANOPEN: "canopen"}
 
 
@@ -25,24 +24,18 @@ def drawn(rounds: Callable[[int], int], full: int) -> int:
 
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("decoder", FEETECH, ids=BY.__getitem__)
-def test_no_difference_of_a_stream_is_without_a_name(
-    decoder: Decoder, rounds: Callable[[int], int], figures: Figures
-) -> None:
+def test_no_difference_of_a_stream_is_without_a_name(decoder: Decoder, rounds: Callable[[int], int]) -> None:
     """rustypot waits for real time, so it gets a fifth of the others' streams."""
     found = table.feetech(decoder, table.usual(SEED, drawn(rounds, 20_000 if decoder is RUST else 100_000)))
-    told(figures, decoder, found)
     assert found.unexplained == []
-    assert set(found.counts) == {name for name, note in NOTES.items() if decoder in note.decoders}
+    assert set(found.counts) == {name for name, those in STREAMS.items() if decoder in those}
 
 
 @pytest.mark.timeout(1800)
-def test_no_difference_of_an_sdo_stream_is_without_a_name(
-    rounds: Callable[[int], int], figures: Figures
-) -> None:
+def test_no_difference_of_an_sdo_stream_is_without_a_name(rounds: Callable[[int], int]) -> None:
     found = table.sdo(table.usual_sdo(SEED, drawn(rounds, 100_000)))
-    told(figures, CANOPEN, found)
     assert found.unexplained == []
-    assert set(found.counts) == set(SDO_NOTES)
+    assert set(found.counts) == SDO
 
 
 @pytest.mark.timeout(1800)
@@ -51,49 +44,7 @@ def test_the_same_request_is_the_same_bytes(decoder: Decoder, rounds: Callable[[
     found = table.requests(decoder, SEED, drawn(rounds, 20_000))
     assert found.cases > 500
     assert found.unexplained == []
-    assert set(found.counts) == {name for name, note in REQUEST_NOTES.items() if decoder in note.decoders}
-
-
-def told(figures: Figures, decoder: Decoder, found: table.Found) -> None:
-    figures(
-        f"same streams through {decoder.name}",
-        family="kst" if decoder is CANOPEN else "feetech",
-        seed=SEED,
-        streams=found.cases,
-        differences=sum(found.counts.values()),
-        unexplained=found.counts[judging.UNEXPLAINED],
-        **{
-            name.replace("-", " "): count for name, count in sorted(found.counts.items()) if name in EXPLAINED
-        },
-    )
-
-
-def test_the_page_is_current(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sys.argv", ["differential", "--check"])
-    assert differential.main() == 0, "python -m scripts.differential makes it"
-
-
-def test_what_is_not_current_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(differential, "page", lambda: "")
-    monkeypatch.setattr("sys.argv", ["differential", "--check"])
-    assert differential.main() == 1
-
-
-@pytest.mark.parametrize("name", NOTES)
-def test_an_example_shows_its_class_with_each_who_is_named(name: str) -> None:
-    note = NOTES[name]
-    made = ours.decoded(note.example)
-    for decoder in FEETECH:
-        (heard,) = outside.heard(decoder, [note.example], patience=outside.AT_EASE)
-        found = judging.classes(decoder, note.example, made, heard.outcome)
-        assert (name in found) == (decoder in note.decoders), decoder.name
-
-
-@pytest.mark.parametrize("name", SDO_NOTES)
-def test_an_example_of_sdo_shows_its_class(name: str) -> None:
-    example = SDO_NOTES[name].example
-    (heard,) = outside.heard(CANOPEN, [example])
-    assert sdo_judging.classes(example, ours.sdo_decoded(example), heard.outcome) == {name}
+    assert set(found.counts) == {name for name, those in REQUESTS.items() if decoder in those}
 
 
 @pytest.mark.timeout(1800)
