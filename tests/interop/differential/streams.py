@@ -1,7 +1,7 @@
 """FEETECH streams: what our simulators answer, of all six maps, and what may become of that on a line.
 
 What was recorded is taken by the trace of a bus. Mutations are made one by one at every place (`systematic`) and by lot
-with a seed (`drawn`); what they are called is what the page of differences calls them.
+with a seed (`drawn`).
 """
 
 from __future__ import annotations

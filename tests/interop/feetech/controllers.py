@@ -7,59 +7,20 @@ from typing import Any, Final
 
 from motorbus.families.feetech.table import CONTROL
 from tests.interop.feetech.peer import Peer, kept
-from tests.interop.feetech.registers import NODES, Unit, registers
-from tests.interop.feetech.steps import Anything, Call, Held, Memory, Raised, Step
+from tests.interop.feetech.steps import Anything, Call, Held, Raised, Step
 from tests.interop.feetech.twin import ABSENT, HLS, IDS, SCS, STS, Kind
 
 CONTROLLERS: Final = ("Sts3215", "Scs0009", "Scs0043")
-MODELS: Final = {
-    "Sts3215": [["SM8512BL", 11272], ["STS3036", 521], ["STS3215", 777], ["STS3250", 2825]],
-    "Scs0009": [["SCS0009", 1284]],
-    "Scs0043": [["SCS0043", 1290]],
-}
 TIMEOUT: Final = 0.05
-BAUD, LEVEL, GAIN, GOAL, POSITION, ID = 6, 8, 21, 42, 56, 5
+NODES: Final = [1, 2]
+GAIN, GOAL = 21, 42
 ALARMS: Final = {(1, 14): [30], (1, 13): [20]}
-BUS: Final = (STS, SCS, HLS, *[STS] * 5)
-"""Its servos; those behind the first three are for what no power cycle brings back."""
-RATES: Final = {
-    115_200: (4, ""),
-    57_600: (5, "baud-codes"),
-    38_400: (6, "baud-codes"),
-    19_200: (7, "baud-codes"),
-}
-"""What it takes for the rate of a code."""
-REAL: Final = {4: 115_200, 5: 76_800, 6: 57_600, 7: 38_400}
+BUS: Final = (STS, SCS, HLS)
 
 
 def prepare(peer: Peer, controller: str, port: str) -> None:
     """Open the port with this controller and keep its definition."""
     peer.new("controller", f"{controller}PyController", port, 1_000_000, TIMEOUT)
-
-
-def known(controller: str, kind: Kind) -> Iterator[Step]:
-    """What it says without a word to anybody; `capabilities` it must have right for a servo of its kind."""
-    statics = (
-        ("word_order", "little" if controller != "Scs0009" else "big"),
-        ("supports_sync_read", controller != "Scs0009"),
-        ("supports_broadcast_ping", controller == "Sts3215"),
-        ("resolution", {"Sts3215": 4096, "Scs0009": 1024, "Scs0043": None}[controller]),
-        ("definition", Anything("its definition")),
-        ("registers", Anything("its registers")),
-    )
-    yield Step(
-        (Call("controller", "models", (), MODELS[controller]),),
-        why="" if controller == "Scs0009" else "names",
-    )
-    right = {"word_order": kind.order, "supports_sync_read": CONTROL[kind.map].sync_read}
-    for name, gives in statics:
-        wrong = name in right and gives != right[name]
-        yield Step((Call("controller", name, (), gives),), why="other-capability" if wrong else "")
-    rates = [] if controller == "Scs0043" else [[19_200, 7], [38_400, 6], [57_600, 5], [115_200, 4]]
-    rates += [] if controller == "Scs0043" else [[128_000, 3], [250_000, 2], [500_000, 1], [1_000_000, 0]]
-    yield Step((Call("controller", "baudrates", (), rates),), why="baud-codes" if rates else "no-rates")
-    none = Call("controller", "register", ("none",))
-    yield Step((Call("controller", "register", ("id",), Anything("address 5")), none))
 
 
 def talks(controller: str, kind: Kind) -> Iterator[Step]:
@@ -70,7 +31,6 @@ def talks(controller: str, kind: Kind) -> Iterator[Step]:
     yield from _scans(controller, kind)
     yield from _raw(kind)
     yield from _named(controller, kind)
-    yield from _identity(controller, kind)
     yield Step((Call("controller", "reboot", (1,), False),), why="reboot-is-bootloader")
     yield Step((Call("controller", "factory_reset", (1,), Raised("not supported")),), why="reset-keeping")
     yield Step(
@@ -142,7 +102,7 @@ def _named(controller: str, kind: Kind) -> Iterator[Step]:
     goal = 300
 
     def data(value: int) -> list[int]:
-        return Unit(int, "little" if little else "big").bytes(value, 2)
+        return list(value.to_bytes(2, "little" if little else "big"))
 
     why = "" if little == (kind.order == "little") else "other-order"
     before = {(node, GOAL): data(goal) for node in NODES}
@@ -168,21 +128,6 @@ def _named(controller: str, kind: Kind) -> Iterator[Step]:
         yield Step((Call("controller", "write_register", (*one, -300)),), after=signed)
         yield Step((Call("controller", "read_register", one, -300),), before=signed)
     yield Step((Call("controller", "read_register", (1, "none"), Raised("none")),))
-
-
-def _identity(controller: str, kind: Kind) -> Iterator[Step]:
-    """Id, rate and status return level: their change is felt at once."""
-    renamed: Memory = {(9, ID): [9], (8, ID): [8]}
-    yield Step((Call("controller", "write_id", (1, 9)),), after={(9, ID): [9]}, why="id-unlocked")
-    yield Step((Call("controller", "sync_write_id", (NODES, [9, 8])),), after=renamed, why="id-unlocked")
-    for name in (register.name for register in registers(controller) if register.address == BAUD):
-        slow = {"baud_rate": 500_000}
-        yield Step((Call("controller", f"write_{name}", (1, 1)),), status=slow, why="rate-unlocked")
-        yield Step((Call("controller", f"sync_write_{name}", ([1], [1])),), status=slow, why="rate-unlocked")
-    name, level = "response_status_level", {(1, LEVEL): [0]}
-    silent = Raised("timed out")
-    yield Step((Call("controller", f"write_{name}", (1, 0), silent),), after={**level}, why="level-0")
-    yield Step((Call("controller", f"sync_write_{name}", (NODES, [0, 0])),), after={**level})
 
 
 def _port() -> Iterator[Step]:
@@ -219,11 +164,6 @@ def prepare_bus(peer: Peer, port: str) -> None:
     peer.new("bus", "Bus", port, 1_000_000, TIMEOUT, {"pairs": motors})
 
 
-def ids_of_bus() -> list[int]:
-    """Those of the bus of three kinds."""
-    return [*IDS, *range(11, 11 + len(BUS) - len(IDS))]
-
-
 def bus() -> Iterator[Step]:
     """Every call of its bus, on servos of three kinds at once."""
 
@@ -252,35 +192,10 @@ def bus() -> Iterator[Step]:
     yield call("set_torque", [1, ABSENT], True, gives=failed, after={(1, 40): [1]})
     yield call("scan", kept("Sts3215"), [1, ABSENT], gives=[[1, 777]])
     yield call("scan", kept("Scs0009"), [2], gives=[[2, 1284]])
-    alone = tuple(f"unplug {node}" for node in ids_of_bus() if node != 1)
+    alone = tuple(f"unplug {node}" for node in IDS if node != 1)
     yield call("broadcast_scan", kept("Sts3215"), [1], gives=[[1, 777]], orders=alone)
     yield Step((Call("bus", "set_baudrate", (1_000_000,)), Call("bus", "set_timeout", (TIMEOUT,))))
-    yield from _renamed()
     yield Step(
         (Call("bus", "__enter__", (), Anything("itself")), Call("bus", "__exit__", (None, None, None)))
     )
     yield call("close")
-
-
-def _renamed() -> Iterator[Step]:
-    """Id and rate, each of another servo: no power cycle brings back what was stored."""
-    patient = Call("bus", "set_timeout", (2.0,))
-    own = kept("Sts3215")
-    change = Call("bus", "change_id", (own, 11, 9))
-    after: Memory = {(9, ID): [9], (9, 55): [0]}
-    yield Step((patient, change), after=after, why="left-unlocked", lasting=True)
-    for node, (rate, (code, why)) in enumerate(RATES.items(), 12):
-        change = Call("bus", "change_baudrate", (own, node, rate))
-        status = {"baud_rate": REAL[code], "locked": False}
-        more = f"{why} left-unlocked".strip()
-        yield Step((patient, change), status=status, of=node, why=more, lasting=True)
-
-
-def definitions() -> Iterator[Step]:
-    """Definitions as values, and the search for a model by its name."""
-    one = "Sts3215"
-    yield Step((Call(one, "registers", (), Anything("its registers")), Call(one, "register", ("none",))))
-    yield Step((Call(one, "refuses", (0xFF,), False),))
-    yield Step((Call("", "find_model", ("sts-3215",), [777, Anything("its definition")]),))
-    yield Step((Call("", "find_model", ("hls3925",)),), why="knows-no-hls")
-    yield Step((Call("", "find_model", ("sts3032",)),), why="names")

@@ -1,9 +1,8 @@
-"""What else both FEETECH SDKs have: groups for SYNC READ and SYNC WRITE, the port, the functions of the module."""
+"""Groups of both FEETECH SDKs for SYNC READ and SYNC WRITE."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.table import CONTROL
@@ -17,7 +16,7 @@ from tests.interop.feetech.sdk import (
     UNAVAILABLE,
     Sdk,
 )
-from tests.interop.feetech.steps import Anything, Call, Held, Step, Through
+from tests.interop.feetech.steps import Call, Held, Step, Through
 from tests.interop.feetech.twin import ABSENT
 
 
@@ -135,78 +134,3 @@ def _listing() -> Iterator[Step]:
             Call("reader", "rxPacket", (), UNAVAILABLE),
         )
     )
-
-
-def port(sdk: Sdk, name: str) -> Iterator[Step]:
-    """The port handler; `name` is that of the terminal."""
-    ours, answer = Call("port", "writePort", ([0xFF, 0xFF, 1, 2, 1, 0xFB],), 6), Anything("bytes waiting")
-    yield Step((Call("port", "getPortName", (), name), Call("port", "setPortName", (name,))))
-    yield Step((ours, Call("port", "getBytesAvailable", (), answer), Call("port", "readPort", (6,), answer)))
-    yield Step((Call("port", "clearPort", ()),), why="clear-flushes-output")
-    yield Step(
-        (
-            Call("port", "closePort", ()),
-            Call("port", "openPort", (), True),
-            Call("port", "getBaudRate", (), 1_000_000),
-            Call("port", "setBaudRate", (500_000,), True),
-            Call("port", "getBaudRate", (), 500_000),
-            sdk.call("ping", 1, gives=[0, TIMEOUT, 0]),
-            Call("port", "setBaudRate", (1_000_000,), True),
-            sdk.call("ping", 1, gives=[sdk.kind.number, SUCCESS, 0]),
-        )
-    )
-    yield Step(
-        (
-            Call("port", "setupPort", (1_000_000,), True),
-            sdk.call("ping", 1, gives=[sdk.kind.number, SUCCESS, 0]),
-        )
-    )
-    yield Step(
-        (Call("port", "setBaudRate", (76_800,), False), Call("port", "getCFlagBaud", (76_800,), -1)),
-        why="no-76800",
-    )
-    yield Step((Call("port", "getCFlagBaud", (57_600,), 57_600),))
-    now = Anything("time in ms")
-    yield Step(
-        (
-            Call("port", "setPacketTimeout", (6,)),
-            Call("port", "isPacketTimeout", (), Anything("by the clock")),
-            Call("port", "setPacketTimeoutMillis", (0,)),
-            Call("port", "getCurrentTime", (), now),
-            Call("port", "getTimeSinceStart", (), now),
-        ),
-        why="wall-clock",
-    )
-
-
-def numbers(sdk: Sdk) -> Iterator[Step]:
-    """Bits and bytes: functions of the module, or of the handler in the newer SDK."""
-
-    def call(name: str, *arguments: int, gives: Any = None) -> Call:
-        return (
-            Call("", f"SCS_{name}".upper(), arguments, gives)
-            if sdk.old
-            else Call("handler", f"scs_{name}", arguments, gives)
-        )
-
-    little = sdk.end == 0
-    low, high = (0x34, 0x12) if little else (0x12, 0x34)
-    yield Step(
-        (call("getend", gives=sdk.end), call("setend", sdk.end)), why="global-order" if sdk.old else ""
-    )
-    yield Step(
-        (
-            call("tohost", 0x8005, 15, gives=-5),
-            call("tohost", 5, 15, gives=5),
-            call("toscs", -5, 15, gives=0x8005),
-        )
-    )
-    yield Step((call("toscs", -40_000, 15, gives=0x9C40),), why="spill")
-    yield Step((call("makeword", low, high, gives=0x1234), call("makedword", 1, 2, gives=0x20001)))
-    yield Step((call("loword", 0x20001, gives=1), call("hiword", 0x20001, gives=2)))
-    yield Step((call("lobyte", 0x1234, gives=low), call("hibyte", 0x1234, gives=high)))
-    if sdk.old:
-        other = Call("", "PacketHandler", (1 - sdk.end,), Anything("another handler"))
-        swapped = sdk.kind.number >> 8 | (sdk.kind.number & 0xFF) << 8
-        back = Call("", "PacketHandler", (sdk.end,), Anything("another handler"))
-        yield Step((other, sdk.call("ping", 1, gives=[swapped, SUCCESS, 0]), back), why="global-order")

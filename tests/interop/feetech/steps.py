@@ -1,7 +1,6 @@
 """What a session consists of: calls with what they must give, and what the servo must hold afterwards.
 
-Steps are plain data, so the page of the documentation is written from the very steps that the tests run. `why` names
-an entry of `notes.NOTES`: there we differ from what was called, or the device cannot do it. Without it both agree.
+`why` names the way in which the library differs from motorbus or the device; without it all agree.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple, TypeAlias
 
 from tests.interop.feetech.peer import Peer, PeerError
-from tests.interop.feetech.twin import IDS, Kind, Twin
+from tests.interop.feetech.twin import IDS, Twin
 
 
 class Held(NamedTuple):
@@ -158,26 +157,6 @@ def _shown(step: Step) -> str:
     return " ".join(f"{call.owner}.{call.name}{call.arguments}" for call in step.calls)
 
 
-def names(steps: Iterable[Step]) -> set[tuple[str, str]]:
-    """Owner and name of everything that is called."""
-    return {(call.owner, call.name) for step in steps for call in step.calls}
-
-
 def one(owner: str, name: str, *arguments: Any, gives: Any = None, **more: Any) -> Step:
     """A step of one call."""
     return Step((Call(owner, name, arguments, gives),), **more)
-
-
-__all__ = [
-    "Anything",
-    "Call",
-    "Held",
-    "Kind",
-    "Memory",
-    "Raised",
-    "Step",
-    "agrees",
-    "carry_out",
-    "names",
-    "one",
-]
