@@ -25,8 +25,8 @@ USUAL_ROUNDS = 3_000
 QUICK_ROUNDS = 100
 LONG_RUN = 3_600
 """s that a long run may last that does not say otherwise; it ends a hang, and a slow machine is none."""
-# Every command of every family passes through these on the other interpreters.
-QUICK_FOLDERS = ("core", "bus", "conformance", "golden")
+# The golden traces pass through every command of every family.
+QUICK_FOLDERS = ("core", "bus", "golden")
 
 settings.register_profile("test", deadline=None, derandomize=True, max_examples=50, print_blob=True)
 settings.register_profile("quick", settings.get_profile("test"), max_examples=10)
