@@ -137,7 +137,7 @@ def test_it_is_awaited_on_an_async_robot() -> None:
     async def main() -> Followed:
         with machine(arm="1-2") as (made, _):
             async with AsyncRobot.of(made) as robot:
-                return await robot.follow({"a1": "a2"}, seconds=0.3, jerk=None)
+                return await robot.follow({"a1": "a2"}, seconds=0.3)
 
     assert asyncio.run(main()).statistics.cycles == 31
 

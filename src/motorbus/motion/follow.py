@@ -53,13 +53,12 @@ def follow(
     seconds: float | None = None,
     rate: float = 100.0,
     until: Callable[[], bool] | None = None,
-    jerk: float | None = None,
     policy: Policy = "reject",
 ) -> Errand[Followed]:
     """Have axes follow others: `{leader: follower}`, on whatever buses, in a loop of `rate` (Hz).
 
     Leaders that have a switch for their torque are let go first. A follower goes to the position of its leader, rad for
-    rad or m for m, within its own limits, with a `jerk` (rad/s³, m/s³) also within that. While its leader is not heard,
+    rad or m for m, within its own limits. While its leader is not heard,
     or stands where the follower may not go, it gets no new goal and stays at the last one. With the policy `clamp` it
     goes as far as it may then, and that is told (`Clamped`).
 
@@ -77,7 +76,6 @@ def follow(
         rate,
         (*wanted, *wanted.values()),
         before=(lambda: group.disable_torque(body, limp)) if limp else None,
-        jerk=jerk,
         endless=seconds is None and until is None,
         policy=policy,
     )

@@ -27,9 +27,9 @@ def axis() -> Iterator[Any]:
         yield robot["a1"]
 
 
-def place(axis: Any, *, direct: bool = False, jerk: float | None = None) -> Place:
+def place(axis: Any, *, direct: bool = False) -> Place:
     axis.departs()
-    found = Place(axis, None, PERIOD, direct, jerk)
+    found = Place(axis, None, PERIOD, direct)
     found.begin(0.0)
     return found
 
@@ -69,7 +69,7 @@ def test_what_must_not_be_sent_is_refused_and_forgotten(axis: Any, goal: float, 
 
 
 def test_its_device_may_allow_less(axis: Any) -> None:
-    one = Place(axis, (pi - 0.5, pi + 0.5), PERIOD, False, None)
+    one = Place(axis, (pi - 0.5, pi + 0.5), PERIOD, False)
     one.asked = 0.6
     with pytest.raises(LimitExceeded, match="the device"):
         one.judge(1)
@@ -209,7 +209,7 @@ def test_a_direct_goal_is_never_braked(axis: Any) -> None:
     ("rate", "endures"), [(800.0, 2), (100.0, 2), (6.1, 2), (5.0, 1), (3.9, 0), (1.0, 0)]
 )
 def test_nobody_is_ordered_by_a_position_that_is_old(axis: Any, rate: float, endures: int) -> None:
-    one = Place(axis, None, 1 / rate, False, None)
+    one = Place(axis, None, 1 / rate, False)
     assert one.endures == endures
     assert (endures + 1) / rate <= FRESH or endures == 0
     one.silent = endures
@@ -241,7 +241,7 @@ def test_who_resumes_goes_on_at_rest_from_where_it_is(axis: Any) -> None:
 
 def test_with_clamp_a_goal_becomes_the_nearest_that_is_allowed(axis: Any) -> None:
     axis.departs()
-    one = Place(axis, (pi - 0.5, pi + 0.5), PERIOD, False, None, "clamp")
+    one = Place(axis, (pi - 0.5, pi + 0.5), PERIOD, False, "clamp")
     one.begin(0.0)
     one.asked = 9.0
     one.judge(1)
@@ -252,7 +252,7 @@ def test_with_clamp_a_goal_becomes_the_nearest_that_is_allowed(axis: Any) -> Non
 
 def test_a_direct_goal_that_no_place_is_near_to_is_refused_with_clamp_too(axis: Any) -> None:
     axis.departs()
-    one = Place(axis, None, PERIOD, True, None, "clamp")
+    one = Place(axis, None, PERIOD, True, "clamp")
     one.begin(1.0)
     one.position = 0.0  # somebody has turned it away, and max_step is 20 degrees
     one.asked = 1.0

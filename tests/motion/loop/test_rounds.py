@@ -261,8 +261,6 @@ def test_what_cannot_be_in_a_loop_is_named_or_refused() -> None:
         assert loop.goal["a1"] == 0.0
         with pytest.raises(RequestError, match="none of these axes"):
             robot.loop(RATE, "lift")
-        with pytest.raises(RequestError, match="jerk"):
-            robot.loop(RATE, direct=True, jerk=5.0)
 
 
 # -- stopped, and left -----------------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from motorbus.motion.loop.place import Place
 
 
-def check_loop(rate: float, direct: bool, jerk: float | None) -> None:
+def check_loop(rate: float) -> None:
     """Raise RequestError for what cannot be."""
     check_number("rate", rate)
     if not MIN_RATE <= rate <= MAX_RATE:
@@ -22,12 +22,6 @@ def check_loop(rate: float, direct: bool, jerk: float | None) -> None:
             f"rate is {shown(rate)}",
             expected=f"cycles per second: {MIN_RATE:g} to {MAX_RATE:g}",
             advice="choose such a rate; budget() tells the highest that the buses carry; nothing was sent",
-        )
-    if direct and jerk is not None:
-        raise RequestError(
-            "jerk is said of goals that are sent as they are",
-            expected="jerk, or direct=True",
-            advice="leave direct out; nothing was sent",
         )
 
 

@@ -93,14 +93,11 @@ class LoopFace:
         axes: Names = None,
         *,
         direct: bool = False,
-        jerk: float | None = None,
         exactly: bool = False,
         policy: Policy = "reject",
         watch: bool = True,
     ) -> None:
-        self._rounds = Rounds(
-            body, rate, axes, direct=direct, jerk=jerk, exactly=exactly, policy=policy, watch=watch
-        )
+        self._rounds = Rounds(body, rate, axes, direct=direct, exactly=exactly, policy=policy, watch=watch)
         self.goal = Goals(self._rounds)
 
     @property
@@ -212,14 +209,13 @@ def blocking_loop(
     axes: Names = None,
     *,
     direct: bool = False,
-    jerk: float | None = None,
     policy: Policy = "reject",
     watch: bool = True,
 ) -> Loop:
     """A control loop of `rate` (Hz) over these axes, for a `with` and a `for` in it; see `motorbus.motion.loop`.
 
     `direct` sends goals as they are: one that is farther from the last than the velocity of the axis allows is refused.
-    Else they are followed, with a `jerk` (rad/s³, m/s³) also within that, by ruckig, an extra.
+    Else they are followed.
 
     A goal that goes too far is refused; with the policy `clamp` it is brought to the nearest that is allowed, which is
     counted, and told as a `Clamped` event where it has not been lately. What is no finite number is refused always.
@@ -228,7 +224,7 @@ def blocking_loop(
 
     Raises RequestError for what cannot be; nothing is sent before the `with` is entered.
     """
-    how = {"direct": direct, "jerk": jerk, "policy": policy, "watch": watch}
+    how = {"direct": direct, "policy": policy, "watch": watch}
     return Loop(robot, robot.conductor, rate, axes, **how)
 
 
@@ -238,12 +234,11 @@ def awaiting_loop(
     axes: Names = None,
     *,
     direct: bool = False,
-    jerk: float | None = None,
     policy: Policy = "reject",
     watch: bool = True,
 ) -> AsyncLoop:
     """The same for an `async with` and an `async for` in it; see `blocking_loop`."""
-    how = {"direct": direct, "jerk": jerk, "policy": policy, "watch": watch}
+    how = {"direct": direct, "policy": policy, "watch": watch}
     return AsyncLoop(robot, robot.conductor, rate, axes, **how)
 
 
@@ -301,7 +296,7 @@ class Course(Protocol[T_co]):
 
 
 class Errand(NamedTuple, Generic[T]):
-    """A course and the loop that it needs: its rate (Hz), its axes, its `jerk`, its `policy`.
+    """A course and the loop that it needs: its rate (Hz), its axes, its `policy`.
 
     `before` is carried out once the loop has been entered, where there is something: what refuses the loop, as a rate
     that cannot be, refuses that too. One that is `endless` has no other end than an interruption of its caller, so then
@@ -313,7 +308,6 @@ class Errand(NamedTuple, Generic[T]):
     rate: float
     axes: tuple[str, ...]
     before: Callable[[], Parallel[Any]] | None = None
-    jerk: float | None = None
     endless: bool = False
     failed: Callable[[MotorbusError], None] | None = None
     policy: Policy = "reject"
@@ -357,7 +351,7 @@ def _telling(errand: Errand[Any]) -> Iterator[None]:
 
 
 def _blocking(machine: Any, errand: Errand[T]) -> T:
-    course, how = errand.course, {"jerk": errand.jerk, "policy": errand.policy}
+    course, how = errand.course, {"policy": errand.policy}
     with _telling(errand), Loop(machine, machine.conductor, errand.rate, errand.axes, **how) as loop:
         if errand.before is not None:
             machine.conductor.run(errand.before())
@@ -372,7 +366,7 @@ def _blocking(machine: Any, errand: Errand[T]) -> T:
 
 
 async def _awaiting(machine: Any, errand: Errand[T]) -> T:
-    course, how = errand.course, {"jerk": errand.jerk, "policy": errand.policy}
+    course, how = errand.course, {"policy": errand.policy}
     with _telling(errand):
         async with AsyncLoop(machine, machine.conductor, errand.rate, errand.axes, **how) as loop:
             if errand.before is not None:

@@ -18,7 +18,7 @@ from motorbus.motion import limits
 from motorbus.motion.clamping import Clamped, Policy, kept
 from motorbus.motion.limits import Device, shown_rate
 from motorbus.motion.machine.model import ROUNDING, VELOCITY
-from motorbus.motion.profile import Follower, Limits, follower
+from motorbus.motion.profile import Follower, Limits
 from motorbus.motion.safety.guard import LATE, NEAR
 from motorbus.motion.safety.track import FRESH
 
@@ -53,7 +53,6 @@ class Place:
         "_far",
         "_follower",
         "_high",
-        "_jerk",
         "_lead",
         "_low",
         "_passed",
@@ -86,7 +85,6 @@ class Place:
         device: Device,
         period: float,
         direct: bool,
-        jerk: float | None,
         policy: Policy = "reject",
     ) -> None:
         spec = axis.spec
@@ -105,7 +103,6 @@ class Place:
         self.period: Final = period
         self._way: Final = spec.max_velocity * period * (1 + ROUNDING) + ROUNDING
         self._direct: Final = direct
-        self._jerk: Final = jerk
         self._policy: Final = policy
         self.endures: Final = max(0, min(STALE, int(FRESH / period) - 1))
         self._follower: Follower | None = None
@@ -130,9 +127,7 @@ class Place:
     def begin(self, position: float) -> None:
         """It has got torque, and stands there (rad, m)."""
         self.position = self.sent = position
-        self._follower = (
-            None if self._direct else follower(position, Limits.of(self.axis.spec), jerk=self._jerk)
-        )
+        self._follower = None if self._direct else Follower(position, Limits.of(self.axis.spec))
         self._known()
         self.begun = True
 

@@ -54,12 +54,11 @@ class Rounds:
         axes: str | Iterable[str] | None,
         *,
         direct: bool,
-        jerk: float | None,
         exactly: bool,
         policy: Policy = "reject",
         watch: bool = True,
     ) -> None:
-        check_loop(rate, direct, jerk)
+        check_loop(rate)
         check_policy(policy)
         led, self.without = divided(body.chosen(axes))
         if not led:
@@ -77,7 +76,6 @@ class Rounds:
         self._body = body
         self._led = led
         self._direct = direct
-        self._jerk = jerk
         self._exactly = exactly
         self._policy = policy
         self._watch = watch
@@ -140,7 +138,7 @@ class Rounds:
         return train, devices, bus_budget(face, train, [axis.name for axis in there], angles)
 
     def _place(self, axis: AxisVerbs, device: Device) -> Place:
-        place = Place(axis, device, 1 / self.rate, self._direct, self._jerk, self._policy)
+        place = Place(axis, device, 1 / self.rate, self._direct, self._policy)
         place.clamps = self._clamps
         return place
 

@@ -3,7 +3,7 @@
     lift = trapezoid(0.0, 1.2, velocity=2.0, acceleration=8.0)
     lift.duration, lift.peak, lift.position(0.3)
     both = synchronised({"lift": Move(0.0, 1.2, limits), "grip": Move(0.0, 0.1, limits)})
-    chase = follower(0.0, limits)                # a goal that changes while the axis runs
+    chase = Follower(0.0, limits)                # a goal that changes while the axis runs
 
 Time is in s from the beginning of the profile, positions in rad (m on a linear axis) and everything else with them.
 Nothing here has a clock.
@@ -11,7 +11,7 @@ Nothing here has a clock.
 
 from __future__ import annotations
 
-from motorbus.motion.profile.following import Follower, TrapezoidFollower, follower
+from motorbus.motion.profile.following import Follower
 from motorbus.motion.profile.shapes import (
     Limits,
     Polynomial,
@@ -34,9 +34,7 @@ __all__ = [
     "Profile",
     "Synchronised",
     "Trapezoid",
-    "TrapezoidFollower",
     "cubic",
-    "follower",
     "line",
     "minimum_jerk",
     "synchronised",

@@ -7,7 +7,7 @@ goals all that is asked for lies on one curve: a step that comes late lands wher
 from __future__ import annotations
 
 from math import inf, isfinite, sqrt
-from typing import Protocol, TypeAlias
+from typing import TypeAlias
 
 from motorbus.errors import RequestError
 from motorbus.motion.profile.shapes import NOTHING, Limits, trapezoid
@@ -16,56 +16,10 @@ _Stretch: TypeAlias = "tuple[float, float, float, float, float]"
 """Of a way: when it ends and begins (s), where, how fast, and how much faster it gets."""
 
 
-class Follower(Protocol):
-    """One axis and its goal. Made by `follower`; all of it is in rad (m on a linear axis) and s.
+class Follower:
+    """One axis and its goal, in rad (m on a linear axis) and s. It follows by trapezoids: acceleration may jump.
 
     It never leaves the stretch between where it began and the goals it was given.
-    """
-
-    @property
-    def position(self) -> float:
-        """Where it is now."""
-
-    @property
-    def velocity(self) -> float:
-        """How fast it is now, with its sign."""
-
-    @property
-    def goal(self) -> float:
-        """Where it is going."""
-
-    @property
-    def arrived(self) -> bool:
-        """Whether it is at rest at its goal."""
-
-    def step(self, elapsed: float, goal: float | None = None) -> float:
-        """The position `elapsed` seconds later, on the way to `goal`, or to the one it has.
-
-        Raises RequestError, and stays as it is, for a goal that is not finite and for time that runs backwards.
-        """
-
-    def halt(self) -> None:
-        """Brake from now on as hard as is allowed: the goal becomes where that ends, on the way it is on."""
-
-    def reset(self, position: float) -> None:
-        """Be at rest at another position: after a stop, or when it was moved by hand. Raises RequestError."""
-
-
-def follower(position: float, limits: Limits, *, jerk: float | None = None) -> Follower:
-    """What keeps after a goal from `position` (rad, m) on, at rest, within `limits`.
-
-    With a `jerk` (rad/s³, m/s³, above 0) acceleration does not jump either; that is worked out by ruckig, an extra:
-    raises MotorbusError with its install line where it is missing. Raises RequestError for impossible figures.
-    """
-    if jerk is None:
-        return TrapezoidFollower(position, limits)
-    from motorbus.motion.profile.jerk import JerkFollower
-
-    return JerkFollower(position, limits, jerk)
-
-
-class TrapezoidFollower:
-    """Follows by trapezoids. Acceleration is within the limits and may jump; see `Follower`.
 
     A loop asks it thousands of times a second for one step on a way that is new each time. So a way is kept as bare
     numbers here; it is the one that `trapezoid` makes, which is asked for wherever the usual case is not enough.
@@ -101,7 +55,10 @@ class TrapezoidFollower:
         return not self._phases or self._since >= self._phases[-1][0]
 
     def step(self, elapsed: float, goal: float | None = None) -> float:
-        """The position `elapsed` seconds later, on the way to `goal`, or to the one it has; see `Follower`."""
+        """The position `elapsed` seconds later, on the way to `goal`, or to the one it has.
+
+        Raises RequestError, and stays as it is, for a goal that is not finite and for time that runs backwards.
+        """
         if not 0.0 <= elapsed < inf:
             check_elapsed(elapsed)
         if goal is not None and goal != self._goal:
@@ -118,14 +75,14 @@ class TrapezoidFollower:
         return self._goal
 
     def halt(self) -> None:
-        """Brake from now on; see `Follower`."""
+        """Brake from now on as hard as is allowed: the goal becomes where that ends, on the way it is on."""
         velocity = self._velocity
         goal = self._position + velocity * abs(velocity) / (2 * self._limits.braking)
         self._phases = self._any(goal)
         self._goal, self._since = goal, 0.0
 
     def reset(self, position: float) -> None:
-        """Be at rest at another position."""
+        """Be at rest at another position: after a stop, or when it was moved by hand. Raises RequestError."""
         way = trapezoid(
             position, position, velocity=self._limits.velocity, acceleration=self._limits.acceleration
         )
