@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motorbus.errors import RequestError
-from motorbus.motion.machine import Machine, edited, keys, renamed
+from motorbus.motion.machine import Machine, edited, keys
 from tests.motion.machine.files import GOOD, axes
 
 MACHINE = Machine.parse(GOOD)
@@ -169,7 +169,6 @@ def test_ends_of_lines_and_a_mark_at_the_start_stay() -> None:
     after = edited(text, {"axis.shoulder.zero": "1 deg", "pose.rest": {"elbow": "1 deg"}})
     assert after.startswith("\ufeff#")
     assert after.count("\r\n") == after.count("\n") == GOOD.count("\n") + 3
-    assert renamed(text, "axis.slide", "rail").count("\r\n") == GOOD.count("\n")
 
 
 @given(axes(), st.sampled_from(["shoulder", "elbow", "wrist"]))
@@ -218,54 +217,3 @@ def test_addresses_are_judged_in_edits_too() -> None:
 
     with pytest.raises(RequestError, match=r"bus\.arm\.address: not feetech"):
         edited(GOOD, {"name": "x"}, check_address=check)
-
-
-# -- names -----------------------------------------------------------------------------------------------------------
-
-
-def test_an_axis_gets_another_name_wherever_it_stands() -> None:
-    after = renamed(GOOD, "axis.shoulder", "upper-arm")
-    assert sorted(changed(after)) == sorted([
-        "-[axis.shoulder]", "+[axis.upper-arm]",
-        '-axes = ["shoulder", "elbow"]    # top to bottom', '+axes = ["upper-arm", "elbow"]    # top to bottom',
-        '-shoulder = "10 deg"             # up', '+upper-arm = "10 deg"             # up',
-    ])  # fmt: skip
-    assert list(Machine.parse(after).axes) == ["upper-arm", "elbow", "slide"]
-
-
-@pytest.mark.parametrize(
-    ("place", "name", "count"), [("bus.arm", "leg", 6), ("group.left", "right", 2), ("pose.ready", "go", 2)]
-)
-def test_others_get_another_name(place: str, name: str, count: int) -> None:
-    after = renamed(GOOD, place, name)
-    assert len(changed(after)) == count
-    assert renamed(after, f"{place.partition('.')[0]}.{name}", place.partition(".")[2]) == GOOD
-
-
-@pytest.mark.parametrize(
-    ("place", "name", "says"),
-    [
-        ("axis.sholder", "x", "axis.sholder: there is nothing of this name"),
-        ("shoulder", "x", "shoulder: there is nothing of this name"),
-        ("axis.shoulder", "elbow", "axis.shoulder: axis.elbow is there already"),
-        ("axis.shoulder", "Upper", "axis.shoulder: the new name has other characters"),
-        ("axis.shoulder", "arm", "axis.arm: this is the name of bus.arm too"),
-    ],
-)
-def test_a_name_that_cannot_be_is_refused(place: str, name: str, says: str) -> None:
-    with pytest.raises(RequestError) as caught:
-        renamed(GOOD, place, name)
-    assert caught.value.summary.startswith(says)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        'format = 1\nbus = {a = {address = "x:y"}}',
-        'format = 1\nname = """\n[bus.a]\n"""\n[bus.a]\naddress = "x:y"',
-    ],
-)
-def test_what_cannot_be_renamed_safely_is_left_to_the_person(text: str) -> None:
-    with pytest.raises(RequestError, match="cannot be edited without changing more") as caught:
-        renamed(text, "bus.a", "b")
-    assert "by hand" in caught.value.advice

@@ -4,7 +4,7 @@
     shoulder = machine.axes["shoulder"]
     shoulder.to_device(0.5)            # rad of the axis -> rad of its device, by zero, sign, gear and travel
 
-Nothing here opens a bus. `edited` and `renamed` change a file and leave its comments and its order to the person who
+Nothing here opens a bus. `edited` changes a file and leaves its comments and its order to the person who
 wrote them; `Machine.text` writes a fresh one.
 """
 
@@ -20,7 +20,7 @@ from msgspec import structs
 
 from motorbus.errors import RequestError
 from motorbus.motion.machine import reading, writing
-from motorbus.motion.machine.edits import edited, renamed
+from motorbus.motion.machine.edits import edited
 from motorbus.motion.machine.model import FORMAT, AxisSpec, BusSpec, Description, GroupSpec
 from motorbus.motion.machine.reading import CheckAddress
 from motorbus.motion.machine.refusal import listed, nearest, of_file
@@ -159,7 +159,6 @@ __all__ = [
     "Machine",
     "edited",
     "kind_of_no_file",
-    "renamed",
     "schema",
     "source",
 ]

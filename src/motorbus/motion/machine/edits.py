@@ -6,7 +6,6 @@ place that imports tomlkit, and only when a file is edited.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
 from math import isfinite
@@ -14,7 +13,6 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from motorbus.errors import RequestError
 from motorbus.motion.machine import reading
-from motorbus.motion.machine.model import NAME
 from motorbus.motion.machine.reading import CheckAddress
 from motorbus.motion.machine.refusal import listed, nearest, path, refused
 
@@ -24,9 +22,7 @@ if TYPE_CHECKING:
 Value: TypeAlias = str | int | float | Sequence[str] | Mapping[str, Any]
 """What stands at a place of the file: a quantity is text with its unit; a mapping is all of a table."""
 Data: TypeAlias = dict[str, Any]
-KINDS: Final = ("bus", "axis", "group", "pose")
 BY_HAND: Final = "make this change by hand"
-_HEADER: Final = re.compile(r"\s*\[\s*(\w+)\s*\.\s*([\"']?)([^\s\"'\].]+)\2\s*\]")
 _DEEPEST: Final = 3
 
 
@@ -52,39 +48,6 @@ def edited(
         for where, leaf in list(_leaves(wanted, keys, value)):
             _put_plain(wanted, where, leaf)
             _put(document, where, leaf)
-    return _proved(text, document, wanted, check_address)
-
-
-def renamed(text: str, place: str, name: str, *, check_address: CheckAddress | None = None) -> str:
-    """The text with another name for a bus, an axis, a group or a pose, also where others refer to it.
-
-    `renamed(text, "axis.shoulder", "upper")`. Raises RequestError when there is nothing of that name, the new one is
-    none or taken, or the table is not written as [axis.shoulder].
-    """
-    wanted = reading.toml(text)
-    kind, _, old = place.partition(".")
-    known = [f"{one}.{each}" for one in KINDS for each in wanted.get(one, {})]
-    if place not in known:
-        raise refused(
-            path(*place.split(".")[:_DEEPEST]),
-            "there is nothing of this name",
-            listed(known),
-            nearest(place, known, "name one"),
-        )
-    if name in wanted[kind] or not re.fullmatch(NAME, name):
-        why = (
-            f"{kind}.{name} is there already" if name in wanted[kind] else "the new name has other characters"
-        )
-        raise refused(
-            place, why, "a lower case letter, then lower case letters, digits, _ and -", "give another name"
-        )
-    document = _document("".join(_renamed_lines(text, kind, old, name)))
-    wanted[kind] = {name if one == old else one: table for one, table in wanted[kind].items()}
-    for data in (wanted, document):
-        _refer(data, kind, old, name)
-    for pose in wanted.get("pose", {}).values() if kind == "axis" else ():
-        if old in pose:
-            pose[name] = pose.pop(old)
     return _proved(text, document, wanted, check_address)
 
 
@@ -220,34 +183,3 @@ def _cut(table: Any) -> list[Any]:
     rest = body[end:]
     del body[end:]
     return list(rest)
-
-
-# -- names -----------------------------------------------------------------------------------------------------------
-
-
-def _renamed_lines(text: str, kind: str, old: str, name: str) -> Iterator[str]:
-    """The lines with the other name in the heads of tables, and before `=` in poses."""
-    key = re.compile(rf"(\s*)([\"']?){re.escape(old)}\2(\s*=)")
-    table = ""
-    for line in text.splitlines(keepends=True):
-        head = _HEADER.match(line)
-        if head:
-            table = head[1]
-            mine = (head[1], head[3]) == (kind, old)
-            yield line[: head.start(3)] + name + line[head.end(3) :] if mine else line
-        elif kind == "axis" and table == "pose":
-            yield key.sub(rf"\g<1>\g<2>{name}\g<2>\g<3>", line, count=1) if key.match(line) else line
-        else:
-            yield line
-
-
-def _refer(data: Any, kind: str, old: str, name: str) -> None:
-    """Say the other name where a value refers to it: axes of groups, devices of axes."""
-    for group in data.get("group", {}).values() if kind == "axis" else ():
-        for place, axis in enumerate(group.get("axes", ())):
-            if axis == old:
-                group["axes"][place] = name
-    for axis in data.get("axis", {}).values() if kind == "bus" else ():
-        bus, _, node = str(axis.get("device", "")).partition("#")
-        if bus == old:
-            axis["device"] = f"{name}#{node}"
