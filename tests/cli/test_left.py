@@ -87,10 +87,3 @@ def test_whom_nobody_can_ask_is_said_to_tell_nothing(ways: Bench) -> None:
         ways.simulations["can"][0x25].unplug()
     (told,) = [note for note in error.__notes__ if note.startswith("c1: ")]
     assert told == "c1: does not tell where it stands"
-
-
-def test_devices_may_be_as_late_as_they_are_said_to_be(bench: Bench) -> None:
-    with robot.robot(["a1"], {}, Output(), late=0.2) as hand:
-        assert hand.robot.buses["arm"].latency == 0.2
-    with robot.robot(["a1"], {}, Output()) as hand:
-        assert hand.robot.buses["arm"].latency < 0.01
