@@ -29,7 +29,10 @@ NEAR_LINEAR: Final = 0.001
 def opened(
     machine: Machine, axes: Sequence[str], output: Output, *, report: Callable[[object], None]
 ) -> Iterator[Robot]:
-    """A robot whose error says how it was left; what takes its time then is announced on `output`. Raises as `Robot.of`."""
+    """A robot whose error says how it was left; what takes its time then is announced on `output`.
+
+    Raises as `Robot.of`.
+    """
     ended: BaseException | None = None
     try:
         with Robot.of(machine, axes, report=report) as robot:
