@@ -96,8 +96,10 @@ def estop(
     broken = None if bus and is_address(bus) else _file_error()
     if broken is not None:
         bus = ""  # the file has no names then: every open bus is stopped
-    known = machine().buses if broken is None and machine_file().path is not None else ()
-    wanted = [] if broken is not None else _wanted((bus,) if bus else known)
+    words = (bus,) if bus else ()
+    if not bus and broken is None and machine_file().path is not None:
+        words = tuple(machine().buses)
+    wanted = _wanted(words)
     failures: list[MotorbusError] = []
     stops: list[dict[str, Any]] = []
     left: list[dict[str, Any]] = []
