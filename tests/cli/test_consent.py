@@ -7,8 +7,7 @@ import math
 import pytest
 
 import motorbus
-from motorbus.cli.consent import consent_to, consent_to_ways, goals_among
-from motorbus.cli.exits import NeedsConsent, Unforeseeable
+from motorbus.cli.consent import consent_to_ways
 from motorbus.cli.output import Output
 from motorbus.errors import LimitExceeded
 from motorbus.families.feetech import Servo
@@ -45,25 +44,6 @@ def test_a_long_way_needs_agreement(words: list[str], run: Run, aside: Simulatio
     assert run(*spoken, "--yes").code == 0
 
 
-def test_only_angles_that_move_are_ways(arm: Simulation) -> None:
-    with motorbus.open(arm.url) as bus:
-        one = Servo(bus, 1)
-        one.identify()
-        assert one.table is not None
-        values = {"goal_position": 1.0, "goal_velocity": 9.0, "min_position_limit": 0.0}
-        assert goals_among(one, [one.table[name] for name in values], values) == [(one, 1.0)]
-
-
-def test_the_border_is_half_a_turn(arm: Simulation) -> None:
-    with motorbus.open(arm.url) as bus:
-        one = Servo(bus, 1)
-        here = one.position()
-        consent_to_ways([(one, here + math.pi), (one, here - 3.0)], Output(), yes=False)
-        consent_to_ways([(one, here + 4.0)], Output(), yes=True)
-        with pytest.raises(NeedsConsent, match="#1 by 229 degrees"):
-            consent_to_ways([(one, here + 4.0)], Output(), yes=False)
-
-
 def test_what_would_be_refused_anyway_is_told_before_anybody_is_asked(arm: Simulation) -> None:
     def rehearse() -> None:
         raise LimitExceeded("too far")
@@ -92,12 +72,3 @@ def test_nobody_is_asked_about_what_is_refused_anyway(
     assert ran.code == (2 if "id=" in words else 8)
     assert says in ran.err
     assert "nobody agreed" not in ran.err
-
-
-def test_what_cannot_be_foreseen_is_no_refusal() -> None:
-    def rehearse() -> None:
-        raise Unforeseeable("an answer decides")
-
-    with pytest.raises(NeedsConsent, match="save it"):
-        consent_to("save it", Output(), yes=False, rehearse=rehearse)
-    consent_to("save it", Output(), yes=True, rehearse=rehearse)

@@ -6,8 +6,6 @@ import pytest
 
 import motorbus
 from motorbus.cli import scan
-from motorbus.errors import RequestError
-from motorbus.families.feetech import FAMILY
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
 
@@ -55,15 +53,6 @@ def test_nobody_ends_with_5_and_says_where_to_look(run: Run, arm: Simulation) ->
     assert "--baud all" in ran.err
 
 
-def test_rates() -> None:
-    assert scan.rates("", FAMILY) == ()
-    assert scan.rates("all", FAMILY) == FAMILY.link.rates
-    assert scan.rates("500000, 115200", FAMILY) == (500_000, 115_200)
-    assert scan.rates("500k+1M", FAMILY) == (500_000, 1_000_000)
-    with pytest.raises(RequestError, match="not a list of rates"):
-        scan.rates("fast", FAMILY)
-
-
 @pytest.mark.parametrize("ids", ["x", "5-1", "254"])
 def test_impossible_ids_end_with_2(ids: str, run: Run, arm: Simulation) -> None:
     assert run("scan", arm.url, "--ids", ids).code == 2
@@ -95,13 +84,6 @@ def test_a_can_bus_has_a_bit_rate(run: Run) -> None:
         assert run("scan", simulation.url, "--baud", "all").code == 2
         assert "--bitrate all" in run("scan", simulation.url, "--ids", "9").err
     assert run("scan", "feetech:sim", "--bitrate", "all").code == 2
-
-
-def test_what_a_scan_notices_is_told(run: Run) -> None:
-    with motorbus.simulate("kst", ids="37", duplicate="37", duplicate_delay="0.0005") as simulation:
-        ran = run("scan", simulation.url, "--json")
-        assert "note: #37 at 500000 bit/s: two answers" in run("scan", simulation.url).err
-    assert "two answers to one request" in ran.document["notes"][0]
 
 
 def test_a_scan_reports_a_duplicate_feetech_id(run: Run) -> None:
