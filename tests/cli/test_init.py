@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-import motorbus
 from motorbus.core.request import Data
 from motorbus.motion.machine import Machine
 from motorbus.simulation.named import Simulation
@@ -45,16 +44,6 @@ def test_the_file_says_what_each_device_is_and_what_is_missing(run: Run, here: P
     assert "# it is never led faster" in text
 
 
-def test_it_says_what_to_type_next(arm: Simulation, run: Run) -> None:
-    ran = run("init", f"arm={arm.url}")
-    assert ran.code == 0
-    steps = re.findall(r"^    motorbus (.*)$", ran.out, re.M)
-    assert steps == ["info arm_1", "torque on arm_1", "move arm_1+=5deg", "pose --save first arm_1"]
-    for step in steps:
-        again = run(*step.split())
-        assert again.code == 0, again.err
-
-
 def test_a_file_that_is_there_is_kept_unless_somebody_insists(run: Run, here: Path) -> None:
     (here / "motorbus.toml").write_text("mine", encoding="utf-8")
     ran = run("init", "feetech:sim", "-vv")
@@ -65,12 +54,6 @@ def test_a_file_that_is_there_is_kept_unless_somebody_insists(run: Run, here: Pa
     ran = run("init", "feetech:sim#1", "--force")
     assert (ran.code, "nothing of it is kept" in ran.err) == (0, True)
     assert list(Machine.load(here / "motorbus.toml").axes) == ["feetech_1"]
-
-
-def test_options_by_flags_stand_in_the_file(run: Run, here: Path) -> None:
-    assert run("init", "feetech:sim#4", "--ids", "4", "--model", "sts3250").code == 0
-    made = Machine.load(here / "motorbus.toml")
-    assert made.buses["feetech"].address == "feetech:sim,ids=4,model=sts3250"
 
 
 def test_nothing_is_written_to_any_device(arm: Simulation, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -92,15 +75,6 @@ def test_where_nobody_answers_there_is_no_file(run: Run, here: Path) -> None:
     ran = run("init", "feetech:sim,ids=1#1", "feetech:sim,ids=2#7")
     assert (ran.code, ran.out) == (5, "")
     assert list(here.iterdir()) == []
-
-
-def test_a_device_of_which_nothing_is_known_is_left_out(run: Run, here: Path) -> None:
-    with motorbus.simulate("feetech", ids="1-2", firmware="3.10+9.9") as sim:
-        ran = run("init", f"{sim.url}#1-2")
-        assert (ran.code, "it is left out" in ran.err) == (0, True)
-        assert list(Machine.load(here / "motorbus.toml").axes) == ["feetech_1"]
-        ran = run("init", f"{sim.url}#2", "--force")
-        assert (ran.code, "of none is known how it moves" in ran.err) == (7, True)
 
 
 def test_without_a_bus_it_shows_what_to_type(run: Run, monkeypatch: pytest.MonkeyPatch, here: Path) -> None:

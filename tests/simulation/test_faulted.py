@@ -14,10 +14,9 @@ from typing import Any
 import pytest
 
 from motorbus import families
-from motorbus.core.can_frame import CanFrame
 from motorbus.errors import RequestError
 from motorbus.simulation.clients import CanClient, Door
-from motorbus.simulation.faulted import IN_A_FILE, LONGEST, MOST, TOLD, Faulted, read_order
+from motorbus.simulation.faulted import Faulted, read_order
 from motorbus.simulation.faults import World
 from motorbus.simulation.listener import TcpListener, TcpPort
 from motorbus.simulation.mount import Mount, Place
@@ -97,24 +96,6 @@ def test_chance_gets_a_seed_that_is_told() -> None:
         assert hall.faulted.replay() == (
             "faults: 1 happened, by the seed 5; the same again: --faults 'seed 5; 100%: duplicate'"
         )
-
-
-def test_what_happens_is_remarked_and_not_too_much_of_it() -> None:
-    with closing(TcpListener()) as listener:
-        hall = Hall(listener)
-        hall.faulted.set("100%: duplicate")
-        assert hall.faulted.remarks(0.0) == []
-        count = TOLD + 5
-        with reached(hall, listener) as client:
-            for _ in range(count):
-                asked(client.fileno(), PING, 12)
-        first = hall.faulted.remarks(0.5)
-        assert len(first) == MOST
-        assert first[0].endswith(" s  fault: exchange 1: duplicate")
-        assert hall.faulted.remarks(0.6) == []
-        assert hall.faulted.remarks(1.6) == [f"… and {count - MOST} more faults"]
-        assert hall.faulted.rest() == []
-        assert len(hall.faulted.facts()["fired"]) == TOLD
 
 
 def test_a_pulled_terminal_hangs_up_and_is_another_one_behind_the_same_name(tmp_path: Path) -> None:
@@ -231,23 +212,6 @@ def test_a_terminal_without_a_name_cannot_be_pulled() -> None:
             Hall(terminal).faulted.set("exchange 1: unplug 1")
 
 
-def test_how_to_have_it_again_is_that_of_the_latest_script() -> None:
-    with closing(TcpListener()) as listener:
-        hall = Hall(listener)
-        hall.faulted.set("exchange 1: duplicate")
-        with reached(hall, listener) as client:
-            assert asked(client.fileno(), PING, 12) == f"{PONG} {PONG}"
-        hall.faulted.set("seed 5; 100%: duplicate")
-        assert hall.faulted.replay() == "faults: 1 happened"
-        assert hall.faulted.remarks(0.0) + hall.faulted.rest() == ["… and 1 more faults"]
-        with reached(hall, listener) as client:
-            assert asked(client.fileno(), PING, 12) == f"{PONG} {PONG}"
-        assert hall.faulted.replay() == (
-            "faults: 2 happened, 1 of them by the latest script, by the seed 5; the same again:"
-            " --faults 'seed 5; 100%: duplicate'"
-        )
-
-
 def test_what_has_not_happened_is_named_with_what_there_was_instead() -> None:
     with closing(TcpListener()) as listener:
         hall = Hall(listener)
@@ -275,25 +239,6 @@ def test_what_has_not_happened_is_named_with_what_there_was_instead() -> None:
     assert facts["never"] == ["1e-09%: drop", "100%: duplicate"]
 
 
-def test_a_script_that_is_too_long_for_a_flag_is_told_once() -> None:
-    many = [f"exchange {number}: drop" for number in range(10_000, 10_000 + LONGEST // 21)]
-    fits = "; ".join(["exchange 1: duplicate", *many])
-    fits = fits[: LONGEST + 1].rpartition(";")[0]
-    with closing(TcpListener()) as listener:
-        hall = Hall(listener)
-        hall.faulted.set("exchange 9: drop")
-        hall.faulted.set(fits)
-        assert LONGEST - 25 < len(hall.faulted.script.line) <= LONGEST
-        assert hall.faulted.facts()["again"] == f"--faults '{fits}'"
-        hall.faulted.set(fits + "; exchange 99999: drop")
-        with reached(hall, listener) as client:
-            asked(client.fileno(), PING, 12)
-        facts = hall.faulted.facts()
-        assert (facts["script"], facts["again"]) == (fits + "; exchange 99999: drop", IN_A_FILE)
-        assert len(hall.faulted.replay()) < 200
-        assert hall.faulted.replay().endswith(f"; the same again: {IN_A_FILE}")
-
-
 def test_faults_are_refused_on_a_bus_that_may_have_real_devices() -> None:
     link = QueueLink(no_wire=False, name="can://socketcan/can0")
     hall = Hall(LinkClient(link), "kst")
@@ -304,11 +249,3 @@ def test_faults_are_refused_on_a_bus_that_may_have_real_devices() -> None:
     assert hall.mount.line is line
     assert not hall.faulted.used
     assert read_order(hall.faulted, "off") is None
-
-
-def test_faults_are_taken_on_a_bus_of_programs() -> None:
-    hall = Hall(LinkClient(QueueLink()), "kst")
-    hall.faulted.set("exchange 1 to device: drop")
-    hall.mount.course.hear(CanFrame(0x602, bytes(8)), hall.clock())
-    hall.mount.course.hear(CanFrame(0x601, bytes(8)), hall.clock())
-    assert [one["fault"] for one in hall.faulted.facts()["fired"]] == ["exchange 1 to device: drop"]

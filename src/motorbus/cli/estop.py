@@ -96,7 +96,7 @@ def estop(
     broken = None if bus and is_address(bus) else _file_error()
     if broken is not None:
         bus = ""  # the file has no names then: every open bus is stopped
-    words = (bus,) if bus else ()
+    words: tuple[str, ...] = (bus,) if bus else ()
     if not bus and broken is None and machine_file().path is not None:
         words = tuple(machine().buses)
     wanted = _wanted(words)
