@@ -11,7 +11,7 @@ SOURCES := src tests bench examples scripts
 .PHONY: help demo test check soak bench docs lint types contracts interpreters lock clean
 
 help:
-	@echo "make demo    nine simulated axes of three families are found and moved together; picture in build/demo.png"
+	@echo "make demo    nine simulated axes of three families move together; picture in build/demo.png"
 	@echo "make test    every test but the long ones"
 	@echo "make check   lint, types, import contracts, strict docs, a few tests on every other Python found"
 	@echo "make soak    the long runs; their figures are printed"

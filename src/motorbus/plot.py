@@ -28,41 +28,6 @@ _ROOM: Final = 1.3
 _MISSING: Final = "matplotlib is not installed, so no picture can be drawn"
 
 
-def trajectory(
-    path: Path | str,
-    times: Sequence[float],
-    goals: Sequence[Sequence[float]],
-    presents: Sequence[Sequence[float | None]],
-    names: Sequence[str],
-    *,
-    title: str = "",
-    simulated: bool = False,
-) -> None:
-    """Draw goal (dashed) and present (solid) positions of some axes over time, and how far they are apart.
-
-    `times` in s; `goals` and `presents` in rad, one sequence for each name and one value for each time, None
-    where there was no reading. The suffix of `path` chooses the format (.png, .svg, .pdf). Raises RequestError
-    when the data do not fit together and MotorbusError when matplotlib is not installed.
-    """
-    if not len(goals) == len(presents) == len(names) or any(
-        len(row) != len(times) for row in (*goals, *presents)
-    ):
-        raise RequestError(
-            "the data do not fit together",
-            expected="one sequence of goals and of presents for each name, one value for each time",
-        )
-    figure, (position, error) = _sheet(title, simulated)
-    for index, name in enumerate(names):
-        colour = _COLOURS[index % len(_COLOURS)]
-        present = [float("nan") if value is None else value for value in presents[index]]
-        position.plot(times, goals[index], color=colour, linewidth=1.1, dashes=(3, 2), alpha=0.9)
-        position.plot(times, present, color=colour, linewidth=1.8, label=name)
-        apart = [was - goal for was, goal in zip(present, goals[index], strict=True)]
-        error.plot(times, apart, color=colour, linewidth=1.2)
-    _finish(position, error, times)
-    _saved(figure, path)
-
-
 def _saved(figure: Any, path: Path | str) -> None:
     """Write the picture. Raises RequestError for a name that does not say which kind of picture it shall be."""
     if not str(path).lower().endswith(KINDS):
@@ -264,10 +229,6 @@ def _name_spans(figure: Any, axes: Any, spans: Sequence[Span]) -> None:
             label.remove()
 
 
-def _sheet(title: str, simulated: bool) -> tuple[Any, Any]:
-    return _figure(title, "simulated" if simulated else "", [3, 1], height=5.2)
-
-
 def _figure(
     title: str, remark: str, heights: Sequence[float], height: float, pad: int = 12
 ) -> tuple[Any, Any]:
@@ -310,24 +271,3 @@ def _style(axes: Any) -> None:
     axes.tick_params(colors=_INK, labelsize=9, length=3)
     axes.grid(color=_GRID, linewidth=0.8)
     axes.set_axisbelow(True)
-
-
-def _finish(position: Any, error: Any, times: Sequence[float]) -> None:
-    position.set_ylabel("position (rad)", fontsize=10, color=_INK)
-    error.set_ylabel("present − goal\n(rad)", fontsize=10, color=_INK)
-    error.set_xlabel("time (s)", fontsize=10, color=_INK)
-    error.axhline(0, color=_FAINT, linewidth=0.8)
-    error.margins(y=0.15)
-    if len(times) > 1:
-        error.set_xlim(times[0], times[-1])
-    present = [line for line in position.lines if not line.get_label().startswith("_")]
-    goal = position.plot([], [], color=_INK, linewidth=1.1, dashes=(3, 2), label="goal")
-    solid = position.plot([], [], color=_INK, linewidth=1.8, label="present")
-    position.legend(
-        handles=[*goal, *solid, *present],
-        loc="upper left",
-        bbox_to_anchor=(1.0, 1.0),
-        frameon=False,
-        fontsize=9,
-        labelcolor=_INK,
-    )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import logging
-import os
 import re
 import shlex
 import signal
@@ -176,13 +175,6 @@ def test_common_flags_may_stand_anywhere(words: list[str], run: Run) -> None:
     assert run(*words).document["schema"] in {"motorbus.ports/1", "motorbus.ping/1"}
 
 
-@pytest.mark.parametrize("goal", ["-30deg", "-0.5", "-.5"])
-def test_a_negative_quantity_is_no_flag(goal: str) -> None:
-    _, bound, _ = parse(APP, ["kst", "position", "kst:sim#1", goal, "--wait"])
-    assert bound.arguments["value"] == goal
-    assert bound.arguments["wait"] is True
-
-
 def test_no_words_at_all_show_the_help(run: Run) -> None:
     ran = run()
     assert ran.code == 0
@@ -240,18 +232,6 @@ def test_completion_can_be_made_for(shell: str) -> None:
     script = build().generate_completion(shell=shell)  # type: ignore[arg-type]
     assert "motorbus" in script
     assert "monitor" in script
-
-
-def test_no_color_is_obeyed_by_the_help() -> None:
-    ended = subprocess.run(
-        [sys.executable, "-m", "motorbus", "--help"],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=True,
-        env={**os.environ, "NO_COLOR": "1"},
-    )
-    assert "\x1b[" not in ended.stdout
 
 
 def _as_in_a_terminal() -> None:

@@ -120,22 +120,3 @@ def test_words_of_any_kind_are_shown_without_control_characters_and_cut(
             assert all(len(line) < LONGEST * 4 + 20 for line in lines)
         if filling is SCRIPT:
             assert "\\x1b" in ran.err
-
-
-@pytest.mark.parametrize("family", ["feetech", "kst"])
-@pytest.mark.parametrize("ending", ["hex", "log", "txt"])
-def test_a_log_that_is_not_trusted_is_decoded_without_control_characters(
-    family: str, ending: str, run: Run, tmp_path: Path
-) -> None:
-    log = tmp_path / f"untrusted.{ending}"
-    log.write_text(f"(1.0) can0 \x1b]0;title\x07 \x1b[2J 123#\x9b00\n{SCRIPT}\n", encoding="utf-8")
-    ran = run("decode", "--family", family, "--file", str(log))
-    assert ran.code != 0
-    assert all(line.isprintable() for line in (ran.out + ran.err).splitlines())
-
-
-def test_an_option_that_is_given_twice_with_two_values_is_refused(run: Run) -> None:
-    ran = run("read", "feetech:sim,ids=1,baud=9600,baud=115200#1")
-    assert ran.code == 2
-    assert "the option baud is given twice, as 9600 and 115200" in ran.err
-    assert run("ping", "feetech:sim,ids=1,ids=1#1").code == 0

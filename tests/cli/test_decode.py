@@ -9,7 +9,6 @@ from pathlib import Path
 import can
 import pytest
 
-from motorbus.cli.exits import Exit
 from motorbus.recorder.can_log import parse_word
 from tests.cli.conftest import Run
 
@@ -85,12 +84,6 @@ def test_can_frames_are_written_as_candump_writes_them(run: Run) -> None:
     }
 
 
-def test_how_a_bus_is_spoken_to_may_be_said(run: Run) -> None:
-    assert "50°" in run("decode", "--family", "kst", "--profile", "xqpower", GOAL).out
-    ran = run("decode", "--family", "feetech", "--profile", "sts", READ)
-    assert (ran.code, ran.out) == (2, "")
-
-
 @pytest.mark.parametrize("bad", ["625##1AABB", "625#R", "625#22", "123#00"])
 def test_a_can_frame_that_is_none_of_theirs_is_bad(bad: str, run: Run) -> None:
     ran = run("decode", "--family", "kst", bad)
@@ -143,35 +136,6 @@ def test_a_recording_that_is_empty_or_not_there_is_told(run: Run, tmp_path: Path
         assert f"{name} cannot be read: no such file or directory" in ran.err
     assert run("decode", "--family", "kst", GOAL, "--file", str(tmp_path / "empty.log")).code == 2
     assert run("decode", "--family", "feetech", "--file", str(tmp_path / "empty.log")).code == 2
-
-
-@pytest.mark.parametrize(
-    ("name", "content"),
-    [
-        ("line.bin", bytes.fromhex(READ + ANSWER)),
-        ("line.RAW", bytes.fromhex(READ + ANSWER)),
-        ("line.hex", f"{READ}\n{ANSWER}\n".encode()),
-        ("line.txt", f"{READ.lower()} {ANSWER.replace(' ', '')}".encode()),
-    ],
-)
-def test_a_recording_of_a_serial_line_is_read(name: str, content: bytes, run: Run, tmp_path: Path) -> None:
-    file = tmp_path / name
-    file.write_bytes(content)
-    ran = run("decode", "--family", "feetech", "--file", str(file))
-    assert ran.code == 0, ran.err
-    assert "at byte 0\n" in ran.out
-    assert "at byte 8\n" in ran.out
-    assert "1304" in ran.out, "the answer is read by the question before it"
-    records = run("decode", "--family", "feetech", "--file", str(file), "--json").records
-    assert [(one["schema"], one["start"], one["data"]) for one in records] == [
-        ("motorbus.decode.frame/1", 0, READ),
-        ("motorbus.decode.frame/1", 8, ANSWER),
-    ]
-
-
-def test_frames_of_a_recording_are_numbered(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "stdin", io.StringIO(LOG))
-    assert [one["start"] for one in run("decode", "--family", "kst", "--json").records] == [0, 1]
 
 
 @pytest.mark.parametrize(
@@ -239,31 +203,3 @@ def test_summary_counts_packets_by_kind_node_and_code(run: Run, tmp_path: Path) 
     assert document["groups"] == [
         {"kind": "reply", "node": 1, "code": 2, "fault": "", "packets": 1, "bytes": 8}
     ]
-
-
-def test_summary_of_can_log_counts_damaged_lines(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "stdin", io.StringIO(LOG + "(1436509053.0) can0 5A5#6\n"))
-    ran = run("decode", "--family", "kst", "--summary", "--json")
-    assert ran.code == 1
-    assert ran.document["damaged_lines"] == 1
-    assert [(one["kind"], one["node"], one["code"], one["bytes"]) for one in ran.document["groups"]] == [
-        ("request", 0x25, 0x22_6003_00, 13),
-        ("reply", 0x25, 0x60_6003_00, 13),
-    ]
-
-
-def test_a_file_without_lines_is_refused(run: Run, tmp_path: Path) -> None:
-    (tmp_path / "zeros").write_bytes(bytes(100_000))
-    for more in ([], ["--summary"]):
-        ran = run("decode", "--family", "kst", "--file", str(tmp_path / "zeros"), *more)
-        assert (ran.code, ran.out) == (2, "")
-        assert "line 1 is longer than 8192 characters" in ran.err
-
-
-def test_stdin_without_end_is_refused(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("motorbus.cli.decode.MOST", 40)
-    monkeypatch.setattr(sys, "stdin", io.StringIO("FF " * 1000))
-    said = run("decode", "--family", "feetech")
-    assert said.code == Exit.USAGE
-    assert "more than 40 characters" in said.err
-    assert "--file" in said.err

@@ -51,14 +51,6 @@ def test_a_file_that_nobody_understands_says_nothing(
     assert with_estops(address, {"baud": "1"}) == {"baud": "1"}
 
 
-def test_what_can_be_seen_in_a_broken_file_is_enough_for_an_emergency_stop(run: Run, bench: Bench) -> None:
-    assert run("torque", "on", "arm#1-3").code == 0
-    bounded(bench, "speed = 3", HOLD)
-    for words in (["estop"], ["estop", "arm"]):
-        assert run(*words).code == 6
-        assert torque(bench) == [1, 0, 0]
-
-
 def test_it_is_the_same_port_by_every_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "ttyUSB0").touch()
     (tmp_path / "arm").symlink_to("ttyUSB0")

@@ -35,13 +35,6 @@ def test_axes_of_other_families_follow_too(bench: Bench, run: Run) -> None:
     assert abs(pair["apart"]) < 0.01
 
 
-def test_groups_follow_pairwise_in_their_order(bench: Bench, run: Run) -> None:
-    bench.describe('[group.left]\naxes = ["a1", "a2"]\n[group.right]\naxes = ["c1", "a3"]\n')
-    ran = run("follow", "left", "right", "--dry-run", "--json")
-    assert ran.code == 0, ran.err
-    assert [(one["leader"], one["follower"]) for one in ran.document["pairs"]] == [("a1", "c1"), ("a2", "a3")]
-
-
 def test_a_leader_where_its_follower_may_not_go_is_not_followed(bench: Bench, run: Run) -> None:
     assert run("move", "a1=100deg").code == 0
     ran = run("follow", "a1", "c1", "--seconds", "1", "--json")
@@ -60,15 +53,6 @@ def test_with_clamp_it_goes_as_far_as_it_may_and_that_is_told(bench: Bench, run:
     notes = [line for line in ran.err.splitlines() if "c1 goes to 50.0 deg instead of" in line]
     assert 2 <= len(notes) <= 5  # of 200
     assert notes[0].endswith("for its limits")
-
-
-def test_with_clamp_a_long_way_needs_somebody_who_agrees_too(bench: Bench, run: Run) -> None:
-    assert run("move", "a2=-140deg").code == 0
-    bench.simulations["arm"][1].raw_position = 2048 + round(170 / 360 * 4096)
-    ran = run("follow", "a1", "a2", "--seconds", "1", "--clamp")
-    assert (ran.code, ran.out) == (8, "")
-    assert "move a2 by 289.9 deg" in ran.err or "move a2 by 290.0 deg" in ran.err
-    assert run("follow", "a1", "a2", "--seconds", "1").code == 0  # without, it stays
 
 
 def test_a_long_way_to_the_leader_needs_somebody_who_agrees(bench: Bench, run: Run) -> None:
@@ -113,28 +97,3 @@ def test_what_cannot_follow_ends_with_2_and_nobody_is_let_go(
     assert (ran.code, ran.out) == (2, ""), ran.err
     assert "error: " in ran.err
     assert [bench.simulations["arm"][node].memory["torque_enable"] for node in (1, 2, 3)] == [1, 1, 1]
-
-
-def test_a_leader_that_cannot_be_let_go_is_told_of(bench: Bench, run: Run) -> None:
-    ran = run("follow", "c1", "a1", "--seconds", "1")
-    assert ran.code == 0, ran.err
-    assert "c1 cannot be let go: only what else moves it leads" in ran.err
-    assert "the torque goes off now" not in ran.err
-
-
-def test_it_is_judged_before_it_is_said_that_torque_goes_off(bench: Bench, run: Run) -> None:
-    for words in ("a1 lift", "a1 a2 --rate 5000"):
-        ran = run("follow", *words.split(), "--seconds", "1")
-        assert ran.code == 2
-        assert "the torque goes off now" not in ran.err
-
-
-@pytest.mark.parametrize("pair", ["a1 a1", "arm arm", "lift a1"])
-@pytest.mark.parametrize("dry", [(), ("--dry-run",)])
-def test_who_cannot_follow_is_refused_before_torque_is_spoken_of(
-    pair: str, dry: tuple[str, ...], bench: Bench, run: Run
-) -> None:
-    ran = run("follow", *pair.split(), "--seconds", "1", *dry)
-    assert (ran.code, ran.out) == (2, "")
-    assert ran.err.startswith("error: ")
-    assert "torque goes off" not in ran.err

@@ -61,29 +61,12 @@ def test_an_open_lock_is_seen_and_how_to_close_it(model: str, run: Run) -> None:
         assert run("info", device).err == ""
 
 
-def test_who_has_no_lock_tells_of_none(run: Run) -> None:
-    assert "lock" not in run("info", "kst:sim#1", "--json").document
-    with motorbus.simulate("feetech", ids="1", firmware="9.1") as simulation:
-        assert "lock" not in run("info", f"{simulation.url}#1", "--json").document
-
-
 def test_one_device_at_a_time(run: Run, arm: Simulation) -> None:
     assert run("info", arm.url).code == 2
 
 
 def test_nobody_there(run: Run, arm: Simulation) -> None:
     assert run("info", f"{arm.url}#9").code == 5
-
-
-def test_letters_and_packed_bytes_are_told_in_words(run: Run) -> None:
-    """A version or a status is no number that anybody can read."""
-    ran = run("info", "kst:sim,profile=kst-ext#1", "--registers")
-    lines = {line.split()[0]: line.split() for line in ran.out.splitlines() if "0x" in line and ":0" in line}
-    assert lines["firmware_version"][2:4] == ["808463921", "1.00"]  # raw, meaning; and no value
-    assert lines["status"][3:7] == ["0.000", "A,", "25", "°C"]
-    assert lines["node_id"][2:4] == ["1", "1"]
-    rows = run("read", "kst:sim,profile=xqpower#1", "status", "--json").document["registers"]
-    assert rows[0]["meaning"] == "0.000 A, 25 °C"
 
 
 def test_of_an_axis_it_says_that_the_angles_are_the_device_s(run: Run, bench: Bench) -> None:

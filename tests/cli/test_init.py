@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import re
-from math import radians
 from pathlib import Path
 
 import pytest
 
-import motorbus
 from motorbus.core.request import Data
 from motorbus.motion.machine import Machine
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
-from tests.support.processes import Simulated
 
 
 @pytest.fixture(autouse=True)
@@ -35,23 +32,6 @@ def test_each_device_becomes_an_axis(arm: Simulation, run: Run, here: Path) -> N
     assert made.axes["kst_37"].device == "kst#0x25"
 
 
-def test_its_limits_are_those_of_the_device_around_their_middle(run: Run, here: Path) -> None:
-    with motorbus.simulate("feetech", ids="1-2") as sim:
-        words = ("min_position_limit=30deg", "max_position_limit=100deg", "--yes")
-        assert run("write", f"{sim.url}#2", *words).code == 0
-        assert run("init", f"{sim.url}#1-2").code == 0
-    one, two = Machine.load(here / "motorbus.toml").axes.values()
-    assert one.zero == radians(180)
-    assert one.low == radians(-180)
-    assert one.high == pytest.approx(radians(179.9))
-    assert two.zero == pytest.approx(radians(65), abs=0.002)
-    assert two.device_limits is not None
-    for inside, limit in zip(two.device_limits, (radians(30), radians(100)), strict=True):
-        assert inside == pytest.approx(limit, abs=0.005)
-    assert one.max_velocity == pytest.approx(radians(45))
-    assert one.exit == "hold"
-
-
 def test_the_file_says_what_each_device_is_and_what_is_missing(run: Run, here: Path) -> None:
     assert run("init", "stepper:sim", "feetech:sim#1", "--name", "bench").code == 0
     text = (here / "motorbus.toml").read_text(encoding="utf-8")
@@ -64,29 +44,6 @@ def test_the_file_says_what_each_device_is_and_what_is_missing(run: Run, here: P
     assert "# it is never led faster" in text
 
 
-def test_it_says_what_to_type_next(arm: Simulation, run: Run) -> None:
-    ran = run("init", f"arm={arm.url}")
-    assert ran.code == 0
-    steps = re.findall(r"^    motorbus (.*)$", ran.out, re.M)
-    assert steps == ["info arm_1", "torque on arm_1", "move arm_1+=5deg", "pose --save first arm_1"]
-    for step in steps:
-        again = run(*step.split())
-        assert again.code == 0, again.err
-
-
-def test_of_a_file_that_does_not_count_the_next_commands_name_it(
-    run: Run, here: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    ran = run("init", "feetech:sim#1", "--output", "bench.toml", "--json")
-    assert ran.document["next"][0] == "motorbus info feetech_1 --machine bench.toml"
-    assert run("init", "kst:sim", "--machine", "other.toml").code == 0
-    assert sorted(path.name for path in here.glob("*.toml")) == ["bench.toml", "other.toml"]
-    monkeypatch.setenv("MOTORBUS_MACHINE", "bench.toml")
-    assert (
-        run("init", "kst:sim", "--json").document["next"][0] == "motorbus info kst_1 --machine motorbus.toml"
-    )
-
-
 def test_a_file_that_is_there_is_kept_unless_somebody_insists(run: Run, here: Path) -> None:
     (here / "motorbus.toml").write_text("mine", encoding="utf-8")
     ran = run("init", "feetech:sim", "-vv")
@@ -97,18 +54,6 @@ def test_a_file_that_is_there_is_kept_unless_somebody_insists(run: Run, here: Pa
     ran = run("init", "feetech:sim#1", "--force")
     assert (ran.code, "nothing of it is kept" in ran.err) == (0, True)
     assert list(Machine.load(here / "motorbus.toml").axes) == ["feetech_1"]
-
-
-def test_options_by_flags_stand_in_the_file(run: Run, here: Path) -> None:
-    assert run("init", "feetech:sim#4", "--ids", "4", "--model", "sts3250").code == 0
-    made = Machine.load(here / "motorbus.toml")
-    assert made.buses["feetech"].address == "feetech:sim,ids=4,model=sts3250"
-
-
-def test_two_buses_of_a_family_have_two_names(run: Run, here: Path) -> None:
-    assert run("init", "feetech:sim,ids=1#1", "feetech:sim,ids=2#2").code == 0
-    made = Machine.load(here / "motorbus.toml")
-    assert list(made.axes) == ["feetech_1", "feetech_bus2_2"]
 
 
 def test_nothing_is_written_to_any_device(arm: Simulation, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -130,15 +75,6 @@ def test_where_nobody_answers_there_is_no_file(run: Run, here: Path) -> None:
     ran = run("init", "feetech:sim,ids=1#1", "feetech:sim,ids=2#7")
     assert (ran.code, ran.out) == (5, "")
     assert list(here.iterdir()) == []
-
-
-def test_a_device_of_which_nothing_is_known_is_left_out(run: Run, here: Path) -> None:
-    with motorbus.simulate("feetech", ids="1-2", firmware="3.10+9.9") as sim:
-        ran = run("init", f"{sim.url}#1-2")
-        assert (ran.code, "it is left out" in ran.err) == (0, True)
-        assert list(Machine.load(here / "motorbus.toml").axes) == ["feetech_1"]
-        ran = run("init", f"{sim.url}#2", "--force")
-        assert (ran.code, "of none is known how it moves" in ran.err) == (7, True)
 
 
 def test_without_a_bus_it_shows_what_to_type(run: Run, monkeypatch: pytest.MonkeyPatch, here: Path) -> None:
@@ -181,9 +117,3 @@ def test_what_cannot_be_is_refused_and_no_file_is_written(
     assert (ran.code, ran.out) == (code, ""), ran.err
     assert ran.err.count("error: ") == 1
     assert list(here.iterdir()) == []
-
-
-@pytest.mark.usefixtures("state_folder")
-def test_it_asks_a_real_port(served: Simulated, run: Run, here: Path) -> None:
-    assert run("init", f"arm={served.bus}#1-3").code == 0
-    assert list(Machine.load(here / "motorbus.toml").axes) == ["arm_1", "arm_2", "arm_3"]

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 from pathlib import Path
 
 import pytest
 
 from motorbus.cli import machine
-from motorbus.errors import RequestError
 from tests.cli.conftest import Bench, Run
-from tests.motion.machine.files import BROKEN, NO_TEXT, UNOPENABLE, Broken, NoText
+from tests.motion.machine.files import BROKEN, Broken
 
 ARM = 'format = 1\n[bus.arm]\naddress = "feetech:sim,ids={}"\n[axis.shoulder]\ndevice = "arm#{}"\n'
 
@@ -90,13 +88,6 @@ def test_what_is_not_in_the_file_is_told_with_which_file_that_is_and_why(
     assert told("--machine", "motorbus.toml") == "./motorbus.toml, named by --machine"
 
 
-def test_a_file_that_is_an_argument_of_its_own_is_not_said_to_come_from_a_flag(
-    tmp_path: Path, run: Run
-) -> None:
-    ran = run("budget", str(write(tmp_path / "two.toml", 2)), "nobody")
-    assert (ran.code, "two.toml, named by the command itself" in ran.err) == (2, True)
-
-
 @pytest.mark.parametrize("words", [["--machine"], ["--machine="], ["--machine", "--json"]])
 def test_the_flag_needs_a_file(words: list[str], run: Run) -> None:
     ran = run("ping", "shoulder", *words)
@@ -116,12 +107,6 @@ def test_without_any_file_a_name_says_where_one_was_looked_for(
     assert "motorbus init" in ran.err
     assert run("hold").code == 2
     assert "there is no machine file" in run("hold").err
-
-
-def test_a_relative_folder_for_settings_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CONFIG_HOME", "here")
-    assert machine.of_user().is_absolute()
-    assert machine.of_user().parts[-3:] == (".config", "motorbus", "motorbus.toml")
 
 
 def test_an_address_needs_no_file(tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -261,28 +246,6 @@ def test_a_broken_file_ends_with_2_and_one_message(
     judge(broken, command, tmp_path / "bench.toml", run)
 
 
-@pytest.mark.parametrize("one", [pytest.param(one, id=name) for name, one in NO_TEXT.items()])
-def test_so_does_one_that_is_no_text(one: NoText, tmp_path: Path, run: Run) -> None:
-    says = f"it is no text: {one.says}"
-    judge_content(one.content, says, "save it as UTF-8", ["pose"], tmp_path / "bench.toml", run)
-
-
-@pytest.mark.parametrize("command", ["pose", "stop", "budget"])
-def test_a_pipe_that_nobody_writes_to_is_not_waited_for(command: str, tmp_path: Path, run: Run) -> None:
-    os.mkfifo(tmp_path / "pipe")
-    ran = run(command, "--machine", str(tmp_path / "pipe"))
-    assert (ran.code, ran.out) == (2, "")
-    assert "it cannot be read: it is a named pipe, and no file" in ran.err
-
-
-@pytest.mark.parametrize("broken", [pytest.param(one, id=one.says[:50]) for one in UNOPENABLE[::4]])
-@pytest.mark.parametrize("command", ["hold", "read shoulder", "pose", "budget", "safety"])
-def test_one_that_cannot_be_opened_does_so_too_whoever_reads_it(
-    broken: Broken, command: str, tmp_path: Path, run: Run
-) -> None:
-    judge(broken, command.split(), tmp_path / "bench.toml", run)
-
-
 ALL = ("budget", "hold", "stop", "loop-stats", "park", "pose --save here", "teach --output x.csv", "safety")
 
 
@@ -290,25 +253,3 @@ ALL = ("budget", "hold", "stop", "loop-stats", "park", "pose --save here", "teac
 def test_a_machine_without_an_axis_is_told_so(command: str, tmp_path: Path, run: Run) -> None:
     file = tmp_path / "bench.toml"
     judge_content(b"format = 1\n", "the machine has no axis", "[axis.NAME]", command.split(), file, run)
-
-
-ON_BUS = ("budget arm", "hold arm", "torque on arm", "jog arm=1 --seconds 1", "move arm=1", "follow arm arm")
-
-
-@pytest.mark.parametrize("command", ON_BUS)
-def test_so_is_a_bus_without_one(command: str, tmp_path: Path, run: Run) -> None:
-    file, content = tmp_path / "bench.toml", b'format = 1\n[bus.arm]\naddress = "feetech:sim"\n'
-    judge_content(content, "arm: no axis is on it", "[axis.NAME]", command.split(), file, run)
-    for safe in (["stop"], ["torque", "off", "arm"]):
-        assert run(*safe, "--machine", str(file)).code == 0
-
-
-def test_outside_of_a_command_the_usual_places_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(RequestError, match="no machine file"):
-        machine.machine()
-    write(tmp_path / "motorbus.toml", 2)
-    assert list(machine.machine().axes) == ["shoulder"]
-    with machine.using("elsewhere.toml") as file:
-        assert machine.machine_file() is file
-    assert machine.axes_named(("arm", "shoulder")) == ["shoulder"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-import motorbus
 from motorbus.cli import monitor
 from motorbus.core.steps import Sleep
 from motorbus.simulation.named import Simulation
@@ -54,16 +53,6 @@ def test_what_is_no_order_ends_with_2(words: list[str], run: Run) -> None:
     assert run("monitor", *words).code == 2
 
 
-def test_what_nobody_tells_has_no_column(run: Run) -> None:
-    with motorbus.simulate("kst", ids="1") as simulation:
-        head = run("monitor", f"{simulation.url}#1", "--count", "1").out.splitlines()[1]
-    assert head.split() == ["id", "position", "(rad)", "alarm"]
-    with motorbus.simulate("kst", ids="1", profile="kst-ext") as simulation:
-        out = run("monitor", f"{simulation.url}#1+9", "--count", "1").out
-    assert "current (A)" in out
-    assert "load" not in out
-
-
 def test_an_axis_has_its_own_position_in_its_own_unit(run: Run, bench: Bench) -> None:
     assert run("move", "a1=30deg").code == 0
     head, row = run("monitor", "a1", "--count", "1").out.splitlines()[1:3]
@@ -98,18 +87,6 @@ def test_l12_it_goes_on_when_a_port_that_was_gone_is_there_again(
     first, second = ran.err.splitlines()
     assert "is looked for until it is there again" in first
     assert second == f"note: {arm.url} is there again"
-
-
-def test_it_ends_where_a_port_is_not_looked_for(
-    run: Run, arm: Simulation, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    async def pulled(seconds: float) -> None:
-        arm.unplug(seconds=1.0)
-        await Sleep(seconds)
-
-    monkeypatch.setattr(monitor, "_pause", pulled)
-    ran = run("monitor", f"{arm.url}#1", "--reconnect", "no", "--count", "12", "--json")
-    assert ran.code == 3
 
 
 def test_a_bus_of_the_file_is_its_axes_without_a_scan_and_a_silent_one_has_its_row(

@@ -7,8 +7,6 @@ from math import radians
 
 import pytest
 
-from motorbus.cli import moving
-from motorbus.errors import RequestError
 from tests.cli.conftest import Bench, Run
 
 
@@ -42,11 +40,6 @@ def test_a_person_sees_a_table_in_the_units_of_the_axes(bench: Bench, run: Run) 
     assert "5.00 mm" in ran.out
     assert "estimated" in ran.out
     assert "orders left within" in ran.out
-
-
-def test_nothing_has_no_sign(bench: Bench, run: Run) -> None:
-    assert run("move", "a1=-10deg").code == 0
-    assert "-0.0 deg" not in run("move", "a1=0").out
 
 
 def test_a_way_begins_where_the_axis_stands(bench: Bench, run: Run) -> None:
@@ -85,16 +78,6 @@ def test_or_finds_out_itself(bench: Bench, run: Run) -> None:
     assert ran.document["axes"][0]["present"] == pytest.approx(0.005, abs=1e-4)
 
 
-def test_it_gets_off_its_switch_without_knowing(bench: Bench, run: Run) -> None:
-    ran = run("move", "lift+=3mm", "--json")
-    assert ran.document["by"] == pytest.approx(0.003, abs=1e-4)
-    assert "where it stands is not known" in run("move", "lift-=2mm").out
-    assert "would send" in run("move", "lift+=3mm", "--dry-run").out
-    ran = run("move", "lift+=110mm")
-    assert (ran.code, "--yes" in ran.err) == (8, True)
-    assert run("move", "lift+=300mm").code == 8
-
-
 def test_a_long_way_needs_agreement(bench: Bench, run: Run) -> None:
     assert run("move", "a1=-100deg").code == 0
     ran = run("move", "a1=100deg")
@@ -102,11 +85,6 @@ def test_a_long_way_needs_agreement(bench: Bench, run: Run) -> None:
     assert run("move", "a1=100deg", "--yes").code == 0
     ran = run("move", "lift=150mm", "--assume", "lift=0mm")
     assert (ran.code, "move lift by 150.00 mm" in ran.err) == (8, True)
-
-
-def test_nobody_is_asked_for_what_is_refused_anyway(bench: Bench, run: Run) -> None:
-    ran = run("move", "a1=200deg")
-    assert (ran.code, "--yes" in ran.err, "limits" in ran.err) == (8, False, True)
 
 
 def test_a_dry_run_tells_the_plan_and_moves_nothing(bench: Bench, run: Run) -> None:
@@ -166,21 +144,6 @@ def test_what_cannot_be_done_is_refused_and_nothing_moves(
     assert stand(run) == before
 
 
-def test_goals_are_read_in_the_unit_of_their_axis(bench: Bench) -> None:
-    found = moving.goals_of(["a1=90deg", "lift-=5mm"])
-    assert found == {"a1": moving.Goal(radians(90), False), "lift": moving.Goal(-0.005, True)}
-    assert moving.positions_of(["lift=5mm,a1=1"]) == {"lift": 0.005, "a1": 1.0}
-    with pytest.raises(RequestError, match="named twice"):
-        moving.goals_of(["a1=1", "a1+=1"])
-    assert [moving.names_axes(text) for text in ("a1=1", "a1+=1", "arm#1=1", "feetech:COM7=1", "a1")] == [
-        True,
-        True,
-        False,
-        False,
-        True,
-    ]
-
-
 @pytest.mark.parametrize(
     ("words", "says"),
     [
@@ -207,13 +170,3 @@ def test_what_is_no_figure_names_its_axis_or_flag_and_a_fix(
     assert told["expected"]
     assert told["advice"].endswith("nothing was sent")
     assert says.startswith("a1") or told["advice"] != "nothing was sent"
-
-
-@pytest.mark.parametrize(
-    "words", ["teach a1 --output w.csv", "follow a1 a2", "loop-stats a1", "jog a1=1deg/s"]
-)
-def test_a_time_that_is_empty_is_none(words: str, bench: Bench, run: Run) -> None:
-    """A script whose variable is not set must not let anybody follow without an end."""
-    ran = run(*words.split(), "--seconds", "")
-    assert ran.code == 2
-    assert ran.err.startswith("error: --seconds: time '' is empty")

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import get_args
 
 import pytest
 
-from motorbus.cli import replay
-from motorbus.core.request import Data
-from motorbus.motion.trajectory import Interpolation
 from tests.cli.conftest import Bench, Run
 from tests.cli.test_follow import at
 
@@ -43,29 +39,6 @@ def test_what_was_taught_is_replayed(bench: Bench, run: Run) -> None:
     assert at(run, "a1") == pytest.approx([25], abs=0.3)
 
 
-def test_half_as_fast_takes_twice_the_time(bench: Bench, run: Run, wave: Path) -> None:
-    ran = run("replay", "wave.csv", "--smooth", "1.5", "--speed", "50%", "--json")
-    assert ran.code == 0, ran.err
-    assert ran.document["duration"] == pytest.approx(4.0)
-
-
-def test_it_is_repeated(bench: Bench, run: Run, wave: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    arm = bench.simulations["arm"].simulator
-    receive, heard = arm.receive, []
-
-    def counted(data: Data, at: float) -> None:
-        heard.append(data)
-        receive(data, at)
-
-    monkeypatch.setattr(arm, "receive", counted)
-    counts = []
-    for times in ("1", "3"):
-        heard.clear()
-        assert run("replay", "wave.csv", "--smooth", "1.5", "--repeat", times).code == 0
-        counts.append(len(heard))
-    assert counts[1] > 2.5 * counts[0]
-
-
 def test_corners_are_too_hard_and_nothing_moves(bench: Bench, run: Run) -> None:
     Path("hard.csv").write_text("time (s),a1 (deg)\n0,5\n0.1,12\n0.2,5\n", encoding="utf-8")
     ran = run("replay", "hard.csv")
@@ -86,24 +59,6 @@ def test_what_is_beyond_a_limit_is_told_with_the_file_and_its_rows(bench: Bench,
     Path("far.csv").write_text(text, encoding="utf-8")
     ran = run("replay", "far.csv", "--interpolation", "linear")
     assert ran.err.startswith("error: far.csv, row")
-
-
-@pytest.mark.parametrize(
-    ("at", "rows"),
-    [(0.0, "row 1"), (0.1, "rows 1 to 2"), (0.5, "row 2"), (0.4999999999, "row 2"), (9, "row 3")],
-)
-def test_a_moment_is_on_a_row_or_between_two(at: float, rows: str) -> None:
-    assert replay._rows((0.0, 0.5, 1.0), at) == rows
-
-
-def test_rows_that_are_coarser_than_goals_are_joined_by_what_was_chosen(bench: Bench, run: Run) -> None:
-    Path("gentle.csv").write_text("time (s),a1 (deg)\n0,0\n1,20\n2,-20\n3,0\n", encoding="utf-8")
-    assert "within all limits" in run("replay", "gentle.csv", "--dry-run").out
-    for words in (("--dry-run",), ()):
-        ran = run("replay", "gentle.csv", "--interpolation", "linear", *words)
-        assert (ran.code, ran.out) == (8, "")
-        assert "its acceleration at 0 s is 4000 deg/s²" in ran.err
-        assert "--speed 50%" in ran.err
 
 
 def test_a_dry_run_says_how_it_would_go_and_nothing_moves(bench: Bench, run: Run, wave: Path) -> None:
@@ -161,18 +116,3 @@ def test_a_file_that_cannot_be_replayed(text: str, code: int, told: str, bench: 
 def test_what_cannot_be_said_ends_with_2(words: tuple[str, ...], bench: Bench, run: Run, wave: Path) -> None:
     ran = run("replay", *words)
     assert (ran.code, ran.out) == (2, "")
-
-
-@pytest.mark.parametrize("speed", ["1e9", "1e-9", "0", "-1", "100001%"])
-def test_a_speed_at_which_nothing_can_be_judged_is_refused_by_its_name(
-    speed: str, bench: Bench, run: Run
-) -> None:
-    Path("w.csv").write_text("time [s],a1 [deg]\n0,0\n1,1\n2,0\n", encoding="utf-8")
-    ran = run("replay", "w.csv", "--speed", speed)
-    assert (ran.code, ran.out) == (2, "")
-    assert ran.err.startswith(f"error: --speed {speed}: ")
-
-
-def test_the_shell_knows_each_kind_in_which_rows_are_joined() -> None:
-    """It says them itself, so that a page of help loads nothing that moves."""
-    assert get_args(replay.Interpolation) == get_args(Interpolation)

@@ -6,8 +6,6 @@ import pytest
 
 import motorbus
 from motorbus.cli import scan
-from motorbus.errors import RequestError
-from motorbus.families.feetech import FAMILY
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
 
@@ -43,25 +41,10 @@ def test_other_rates_are_tried_when_asked(run: Run, arm: Simulation) -> None:
     assert [one["baud"] for one in document["devices"]] == [1_000_000]
 
 
-def test_who_answers_is_told_at_once_where_it_takes_long(run: Run, arm: Simulation) -> None:
-    ran = run("scan", arm.url, "--ids", "1-2", "--baud", "500000,1000000")
-    assert ran.err.splitlines() == ["#1 answers at 1000000 bit/s", "#2 answers at 1000000 bit/s"]
-    assert run("scan", arm.url, "--ids", "1-2").err == ""
-
-
 def test_nobody_ends_with_5_and_says_where_to_look(run: Run, arm: Simulation) -> None:
     ran = run("scan", arm.url, "--ids", "9")
     assert ran.code == 5
     assert "--baud all" in ran.err
-
-
-def test_rates() -> None:
-    assert scan.rates("", FAMILY) == ()
-    assert scan.rates("all", FAMILY) == FAMILY.link.rates
-    assert scan.rates("500000, 115200", FAMILY) == (500_000, 115_200)
-    assert scan.rates("500k+1M", FAMILY) == (500_000, 1_000_000)
-    with pytest.raises(RequestError, match="not a list of rates"):
-        scan.rates("fast", FAMILY)
 
 
 @pytest.mark.parametrize("ids", ["x", "5-1", "254"])
@@ -84,26 +67,6 @@ def test_what_was_found_is_told_when_it_is_interrupted(
     assert [one["id"] for one in ran.document["devices"]] == [1, 2]
 
 
-def test_a_can_bus_has_a_bit_rate(run: Run) -> None:
-    with motorbus.simulate("kst", ids="1+0x25") as simulation:
-        ran = run("scan", simulation.url, "--bitrate", "250000,500000", "--json")
-        assert [(one["id"], one["bitrate"]) for one in ran.document["devices"]] == [
-            (1, 500_000),
-            (37, 500_000),
-        ]
-        assert "37 (0x25)" in run("scan", simulation.url).out
-        assert run("scan", simulation.url, "--baud", "all").code == 2
-        assert "--bitrate all" in run("scan", simulation.url, "--ids", "9").err
-    assert run("scan", "feetech:sim", "--bitrate", "all").code == 2
-
-
-def test_what_a_scan_notices_is_told(run: Run) -> None:
-    with motorbus.simulate("kst", ids="37", duplicate="37", duplicate_delay="0.0005") as simulation:
-        ran = run("scan", simulation.url, "--json")
-        assert "note: #37 at 500000 bit/s: two answers" in run("scan", simulation.url).err
-    assert "two answers to one request" in ran.document["notes"][0]
-
-
 def test_a_scan_reports_a_duplicate_feetech_id(run: Run) -> None:
     with motorbus.simulate("feetech", ids="1-3", duplicate="3") as simulation:
         ran = run("scan", simulation.url, "--ids", "1-4", "--json")
@@ -123,30 +86,11 @@ def test_a_rate_is_found_by_listening_alone(run: Run) -> None:
     assert " tx " not in ran.err
 
 
-def test_a_bus_on_which_nobody_speaks_tells_no_rate(run: Run) -> None:
-    with motorbus.simulate("kst", ids="0x25") as simulation:
-        ran = run("scan", simulation.url, "--listen", "-vv")
-    assert ran.code == 5
-    assert ran.out.count("silence") == 8
-    assert "--bitrate all" in ran.err
-    assert " tx " not in ran.err
-
-
 @pytest.mark.parametrize("words", ["feetech:sim", "kst:sim --ids 1", "kst:sim#1", "kst:sim --bitrate 1M"])
 def test_listening_asks_nobody(words: str, run: Run) -> None:
     ran = run("scan", *words.split(), "--listen")
     assert (ran.code, ran.out) == (2, "")
     assert "--listen" in ran.err
-
-
-def test_one_model_with_several_firmware_versions_is_a_note(run: Run, arm: Simulation) -> None:
-    """Servos of one robot with firmware 3.9 and 3.10 misbehave together (lerobot#1010): told, and never refused."""
-    arm[2].memory["firmware_minor"] = 9
-    ran = run("scan", arm.url, "--ids", "1-3", "--json")
-    said = "STS3215 with several firmware versions, which may behave differently: 3.10 (#1, #3), 3.9 (#2)"
-    assert ran.code == 0
-    assert ran.document["notes"] == [said]
-    assert f"note: {said}" in ran.err
 
 
 @pytest.mark.parametrize("said", ["7", "1000000,7", "2M"])

@@ -10,7 +10,6 @@ import motorbus
 from motorbus.cli import identity
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
-from tests.support.processes import Simulated
 
 
 def rates(arm: Simulation) -> list[int]:
@@ -31,12 +30,6 @@ def test_the_whole_bus(run: Run, arm: Simulation) -> None:
     assert document["address"] == f"{arm.url},baud=115200"
     assert rates(arm) == [115_200] * 3
     assert run("set-baud", f"{arm.url},baud=115200", "1M", "--yes").out.endswith(f"now: {arm.url}#1+2+3\n")
-
-
-def test_on_a_real_port(run: Run, served: Simulated) -> None:
-    ran = run("set-baud", f"{served.bus}#1+2", "500000", "--yes", "--among", "1-9")
-    assert ran.code == 0, ran.err
-    assert run("ping", f"{served.bus},baud=500000#1+2").code == 0
 
 
 def test_some_are_changed_and_the_rest_is_named(run: Run) -> None:

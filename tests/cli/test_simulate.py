@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import signal
@@ -106,60 +105,6 @@ def test_devices_that_ship_with_another_rate_are_opened_by_the_address_of_the_re
     with Simulated("feetech", ids="3", model="sm85blhv", tcp="0") as simulated:
         assert simulated.bus.endswith(",baud=115200")
         assert run("ping", f"{simulated.bus}#3", "--json").document["devices"][0]["answers"]
-
-
-def test_the_switches_are_listed(run: Run) -> None:
-    ran = run("simulate", "feetech", "--switches")
-    assert ran.code == 0
-    assert "broadcast_ping" in ran.out
-    (row,) = (line for line in ran.out.splitlines() if line.startswith("broadcast_ping "))
-    found = {
-        row["name"]: row for row in run("simulate", "feetech", "--switches", "--json").document["switches"]
-    }
-    switch = found["broadcast_ping"]
-    assert (switch["default"], switch["choices"]) == ("collide", ["collide", "in_turn"])
-    assert switch["source"].startswith("manual V1.01")
-    assert all(part in row for part in ("collide, in_turn", switch["help"], switch["source"]))
-    assert (found["echo"]["default"], found["echo"]["choices"]) == ("no", ["no", "yes"])
-    assert {"default": "0.005", "choices": []}.items() <= found["frame_gap"].items()
-
-
-@pytest.mark.parametrize("family", ["feetech", "kst"])
-def test_every_switch_that_nobody_has_settled_has_a_source_and_a_default_that_is_possible(
-    run: Run, family: str
-) -> None:
-    for row in run("simulate", family, "--switches", "--json").document["switches"]:
-        assert not row["choices"] or row["default"] in row["choices"]
-        assert row["source"] or row["name"] in (
-            "baud",
-            "estop_hold",
-            "ids",
-            "model",
-            "position",
-            "profile",
-            "sized",
-            "window",
-        )
-
-
-def test_the_switches_are_readable_on_a_terminal_of_80_columns() -> None:
-    """Two columns, so that what a switch does has room, and a blank line between two switches."""
-    ours, theirs = os.openpty()
-    command = [sys.executable, "-m", "motorbus", "simulate", "feetech", "--switches"]
-    with subprocess.Popen(command, stdout=theirs, env={**os.environ, "COLUMNS": "80", "TERM": "dumb"}):
-        os.close(theirs)
-        shown = ""
-        with contextlib.suppress(OSError):  # which is how a pseudo-terminal ends
-            while got := os.read(ours, 4096):
-                shown += got.decode()
-    os.close(ours)
-    lines = [line.rstrip() for line in shown.splitlines()]
-    assert max(map(len, lines)) <= 80
-    start = next(place for place, line in enumerate(lines) if line.startswith("broadcast_ping "))
-    assert lines[start - 1] == ""
-    assert lines[start + 1].split()[:2] == ["=", "collide"]
-    assert lines[start + 3].strip() == "one of collide, in_turn"
-    assert lines[start + 4].strip().startswith("source: manual V1.01")
 
 
 @pytest.mark.parametrize(
@@ -302,10 +247,3 @@ def test_an_unknown_flag_is_told_what_it_may_have_meant(run: Run) -> None:
     ran = run("simulate", "kst", "--profil", "kst-ext")
     assert (ran.code, ran.out) == (2, "")
     assert "profile" in ran.err
-
-
-def test_the_settings_of_a_bus_are_among_the_switches(run: Run) -> None:
-    rows = run("simulate", "kst", "--switches", "--json").document["switches"]
-    names = [row["name"] for row in rows]
-    assert {"profile", "sized", "out_of_range"} <= set(names)
-    assert len(names) == len(set(names))

@@ -21,7 +21,6 @@ import motorbus
 from motorbus.cli.exits import Exit
 from motorbus.errors import LinkLost, MotorbusError, NoReply
 from tests.cli.conftest import Run
-from tests.interop.test_peers import SDK, Peer
 from tests.support.processes import Simulated
 
 PATIENCE = 30.0
@@ -168,58 +167,6 @@ def test_what_happens_is_said_on_stderr_and_at_the_end_how_to_have_it_again(tmp_
     assert process.returncode == 0
 
 
-def test_what_has_not_happened_is_named_at_the_end_also_of_a_script_that_was_set_later(
-    tmp_path: Path,
-) -> None:
-    command = [sys.executable, "-m", "motorbus", "simulate", "feetech", "--link", str(tmp_path / "arm")]
-    with (
-        Control() as control,
-        subprocess.Popen(
-            [*command, "--faults", "exchange 17: drop", "--control", control.path, "--json"],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        ) as process,
-    ):
-        try:
-            assert process.stdout is not None
-            assert json.loads(process.stdout.readline())["schema"] == "motorbus.simulate/1"
-            assert control.facts()["again"] == "--faults 'exchange 17: drop'"
-            assert control.order("faults seed 5; 1%: drop; at 0 s: power-cycle 1") == "ok"
-            while control.facts()["count"] == 0:
-                pass
-        finally:
-            process.send_signal(signal.SIGTERM)
-            out, err = process.communicate(timeout=PATIENCE)
-    again = "--faults 'seed 5; 1%: drop; at 0 s: power-cycle 1'"
-    lines = err.splitlines()
-    assert [line for line in lines if line.startswith("faults: ")] == [
-        "faults: `exchange 17: drop` has not happened (0 exchanges were seen)",
-        "faults: seed 5",
-        f"faults: 1 happened, by the seed 5; the same again: {again}",
-        "faults: `1%: drop` has not happened (0 exchanges were seen)",
-    ]
-    facts = json.loads(out)
-    assert (facts["schema"], facts["count"], facts["never"]) == (
-        "motorbus.simulator-script/1",
-        1,
-        ["1%: drop"],
-    )
-    assert facts["again"] == again
-
-
-def test_the_vendors_own_library_on_a_line_that_does_harm(tmp_path: Path) -> None:
-    script = "exchange 1: drop; exchange 2 byte 4: corrupt 80; exchange 3: merge; exchange 5 to device: drop"
-    with (
-        Control() as control,
-        Simulated("feetech", link=tmp_path / "arm", faults=script, control=control.path),
-        Peer(SDK, str(tmp_path / "arm")) as sdk,
-    ):
-        assert sdk.read_word(1, 56) == 2048
-        assert sdk.read(1, 5, 1) == [1]
-        assert control.fired()[:3] == script.split("; ")[:3]
-
-
 # A CAN bus that others have.
 
 
@@ -235,11 +182,6 @@ def test_faults_are_refused_on_a_can_bus_that_may_have_real_devices(
         assert word in said.err
     assert said.out == ""
     assert list(tmp_path.iterdir()) == []  # nothing was opened or made
-
-
-def test_a_bus_of_programs_takes_faults() -> None:
-    with Simulated("kst", ids="0x25", can="virtual/here", faults="100%: echo") as simulated:
-        assert simulated.bus == "kst:can://virtual/here"
 
 
 def test_an_order_for_faults_is_refused_on_such_a_bus_and_it_goes_on(tmp_path: Path) -> None:
@@ -259,36 +201,3 @@ def test_an_order_for_faults_is_refused_on_such_a_bus_and_it_goes_on(tmp_path: P
 
 
 # A stepper, whose line has one device and no check sum.
-
-
-@pytest.mark.parametrize("way", ["link", "tcp"])
-def test_a_stepper_suffers_before_and_while_it_runs(way: str, tmp_path: Path) -> None:
-    with suffering("stepper", way, tmp_path) as (control, bus):
-        stepper = motorbus.stepper.Controller(bus)
-        assert stepper.read_input(1) is False
-        assert control.fired() == ["exchange 1: split 0.001"]
-        assert control.order("faults 100%: truncate") == "ok"
-        with pytest.raises(MotorbusError):
-            stepper.read_input(1)
-        assert control.facts()["count"] >= 1
-        assert control.order("faults 100% to device: drop") == "ok"
-        assert not stepper.ping()
-        assert control.order("faults exchange 1: duplicate-id 1").startswith("error: fault exchange 1")
-        assert not stepper.ping()  # what was set goes on
-        assert control.order("faults off") == "ok"
-        assert stepper.read_input(1) is False
-
-
-def test_a_stepper_that_loses_its_power_lets_go_of_its_outputs() -> None:
-    with (
-        Control() as control,
-        Simulated("stepper", tcp="0", control=control.path) as simulated,
-        motorbus.open(simulated.bus) as bus,
-    ):
-        stepper = motorbus.stepper.Controller(bus)
-        stepper.set_output(1, True)
-        assert json.loads(control.order("status"))["nodes"][0]["outputs"] == [True, False, False]
-        assert control.order("faults exchange 1: power-cycle 1") == "ok"
-        stepper.ping()
-        assert control.fired() == ["exchange 1: power-cycle 1"]
-        assert json.loads(control.order("status"))["nodes"][0]["outputs"] == [False, False, False]

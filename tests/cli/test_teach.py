@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from motorbus.motion.trajectory import Trajectory
 from tests.cli.conftest import Bench, Run
-from tests.support.machines import described
-from tests.support.processes import Simulated
 
 HELD, LIMP = 1, 0
 
@@ -50,27 +46,6 @@ def test_no_limp_switches_nothing(bench: Bench, run: Run) -> None:
     assert (ran.document["schema"], ran.document["samples"]) == ("motorbus.teach/1", 51)
 
 
-def test_without_names_it_is_all_who_can_be_taught(bench: Bench, run: Run) -> None:
-    ran = run("teach", "--output", "wave.csv", "--seconds", "1")
-    assert ran.code == 0
-    assert "note: not taught, for nobody can lead them by hand: c1, lift" in ran.err
-    assert list(Trajectory.load("wave.csv").axes) == ["a1", "a2", "a3"]
-
-
-@pytest.mark.parametrize("limp", [[], ["--no-limp"]])
-def test_where_nobody_can_be_taught_no_torque_is_said_to_go_off(
-    limp: list[str], tmp_path: Path, run: Run
-) -> None:
-    file, wave = tmp_path / "bench.toml", tmp_path / "wave.csv"
-    file.write_text(described({"stage": "stepper:sim"}, "", "", True, {}, {}), encoding="utf-8")
-    ran = run("teach", "--output", str(wave), "--seconds", "1", *limp, "--machine", str(file))
-    assert (ran.code, ran.out) == (2, "")
-    assert ran.err.startswith("error: none of these axes can be taught\n")
-    assert "lift: nobody can ask such a device in a loop" in ran.err
-    assert "limp" not in ran.err
-    assert not wave.exists()
-
-
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 10)])
 def test_a_signal_ends_it_and_what_was_taught_is_kept(
     number: signal.Signals, code: int, bench: Bench, run: Run, monkeypatch: pytest.MonkeyPatch
@@ -90,39 +65,6 @@ def test_what_was_recorded_until_an_axis_fell_silent_is_kept(
     taught = Trajectory.load("wave.csv", bench.machine.axes)
     assert len(taught.times) > 20
     assert f"kept {taught.duration:.2f} s, {len(taught.times)} samples until then, in wave.csv" in ran.err
-
-
-def test_what_cannot_be_kept_is_said_beside_the_error(
-    bench: Bench, run: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    silent = {59: Path("wave.csv").mkdir, 60: bench.simulations["arm"][2].unplug}
-    bench.at_request(monkeypatch, silent)
-    ran = run("teach", "a1", "a2", "--output", "wave.csv")
-    assert ran.code == 5, ran.err
-    assert "what was recorded is lost: wave.csv cannot be written" in ran.err
-
-
-def test_what_was_recorded_until_the_bus_died_is_kept(tmp_path: Path, state_folder: Path) -> None:
-    file, wave = tmp_path / "motorbus.toml", tmp_path / "wave.csv"
-    with Simulated("feetech", ids="1-2", link=tmp_path / "bus") as served:
-        file.write_text(
-            described({"arm": f"{served.bus},latency=1s"}, "1-2", "", False, {}, {}), encoding="utf-8"
-        )
-        words = ["--machine", str(file), "teach", "arm", "--output", str(wave), "-vv"]
-        command = [sys.executable, "-m", "motorbus", *words]
-        pipe = subprocess.PIPE
-        with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as teaching:
-            assert teaching.stderr is not None
-            assert any("torque goes off now" in line for line in teaching.stderr)
-            asked = (line for line in teaching.stderr if " tx " in line)
-            for _ in range(40):
-                next(asked)
-            served.process.kill()
-            _, told = teaching.communicate(timeout=60)
-    assert teaching.returncode == 3, told
-    samples = len(Trajectory.load(wave).times)
-    assert samples > 20
-    assert f"{samples} samples until then" in told
 
 
 def test_a_dry_run_lets_nobody_go_and_writes_nothing(bench: Bench, run: Run) -> None:
@@ -173,14 +115,3 @@ def test_what_cannot_be_taught_ends_with_2_and_lets_nobody_go(
     assert "has train" not in ran.err
     assert torques(bench) == [HELD, HELD, HELD]
     assert not Path("w.csv").exists()
-
-
-@pytest.mark.parametrize(
-    "figure", ["--smooth inf", "--smooth nan", "--smooth -1", "--smooth 1e-320", "--smooth 1e300"]
-)
-def test_a_figure_that_cannot_be_lets_nobody_go(figure: str, bench: Bench, run: Run) -> None:
-    assert run("hold", "arm").code == 0
-    ran = run("teach", "arm", "--output", "wave.csv", "--seconds", "1", *figure.split())
-    assert (ran.code, ran.out) == (2, "")
-    assert "--smooth" in ran.err
-    assert torques(bench) == [HELD, HELD, HELD]

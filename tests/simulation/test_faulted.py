@@ -14,10 +14,9 @@ from typing import Any
 import pytest
 
 from motorbus import families
-from motorbus.core.can_frame import CanFrame
 from motorbus.errors import RequestError
 from motorbus.simulation.clients import CanClient, Door
-from motorbus.simulation.faulted import IN_A_FILE, LONGEST, MOST, NEWS, TOLD, Faulted, read_order
+from motorbus.simulation.faulted import Faulted, read_order
 from motorbus.simulation.faults import World
 from motorbus.simulation.listener import TcpListener, TcpPort
 from motorbus.simulation.mount import Mount, Place
@@ -97,24 +96,6 @@ def test_chance_gets_a_seed_that_is_told() -> None:
         assert hall.faulted.replay() == (
             "faults: 1 happened, by the seed 5; the same again: --faults 'seed 5; 100%: duplicate'"
         )
-
-
-def test_what_happens_is_remarked_and_not_too_much_of_it() -> None:
-    with closing(TcpListener()) as listener:
-        hall = Hall(listener)
-        hall.faulted.set("100%: duplicate")
-        assert hall.faulted.remarks(0.0) == []
-        count = TOLD + 5
-        with reached(hall, listener) as client:
-            for _ in range(count):
-                asked(client.fileno(), PING, 12)
-        first = hall.faulted.remarks(0.5)
-        assert len(first) == MOST
-        assert first[0].endswith(" s  fault: exchange 1: duplicate")
-        assert hall.faulted.remarks(0.6) == []
-        assert hall.faulted.remarks(1.6) == [f"… and {count - MOST} more faults"]
-        assert hall.faulted.rest() == []
-        assert len(hall.faulted.facts()["fired"]) == TOLD
 
 
 def test_a_pulled_terminal_hangs_up_and_is_another_one_behind_the_same_name(tmp_path: Path) -> None:
@@ -231,23 +212,6 @@ def test_a_terminal_without_a_name_cannot_be_pulled() -> None:
             Hall(terminal).faulted.set("exchange 1: unplug 1")
 
 
-def test_how_to_have_it_again_is_that_of_the_latest_script() -> None:
-    with closing(TcpListener()) as listener:
-        hall = Hall(listener)
-        hall.faulted.set("exchange 1: duplicate")
-        with reached(hall, listener) as client:
-            assert asked(client.fileno(), PING, 12) == f"{PONG} {PONG}"
-        hall.faulted.set("seed 5; 100%: duplicate")
-        assert hall.faulted.replay() == "faults: 1 happened"
-        assert hall.faulted.remarks(0.0) + hall.faulted.rest() == ["… and 1 more faults"]
-        with reached(hall, listener) as client:
-            assert asked(client.fileno(), PING, 12) == f"{PONG} {PONG}"
-        assert hall.faulted.replay() == (
-            "faults: 2 happened, 1 of them by the latest script, by the seed 5; the same again:"
-            " --faults 'seed 5; 100%: duplicate'"
-        )
-
-
 def test_what_has_not_happened_is_named_with_what_there_was_instead() -> None:
     with closing(TcpListener()) as listener:
         hall = Hall(listener)
@@ -275,103 +239,6 @@ def test_what_has_not_happened_is_named_with_what_there_was_instead() -> None:
     assert facts["never"] == ["1e-09%: drop", "100%: duplicate"]
 
 
-def test_what_has_happened_once_is_no_longer_named() -> None:
-    with closing(TcpListener()) as listener:
-        hall = Hall(listener)
-        hall.faulted.set("seed 1; exchange 1: duplicate; 100%: split; 1e-9%: drop; exchange 2 byte 9: drop")
-        with reached(hall, listener) as client:
-            asked(client.fileno(), PING, 12)
-            assert "1 exchange was seen" in hall.faulted.unhappened()[0]
-            asked(client.fileno(), PING, 6)
-            asked(client.fileno(), PING, 6)
-        passed, seen = hall.faulted.unhappened()
-        assert passed.startswith(
-            "faults: `exchange 2 byte 9: drop` has not happened (exchange 2 has passed, and"
-        )
-        assert seen == "faults: `1e-09%: drop` has not happened (3 exchanges were seen)"
-        assert hall.faulted.facts()["never"] == ["1e-09%: drop"]
-
-
-def test_a_long_list_of_what_has_not_happened_is_cut_and_counted() -> None:
-    with closing(TcpListener()) as listener:
-        hall = Hall(listener)
-        hall.faulted.set("; ".join(f"exchange {number}: drop" for number in range(1, TOLD + 4)))
-        said = hall.faulted.unhappened()
-        assert len(said) == TOLD + 1
-        assert said[-1] == "faults: … and 3 more have not happened"
-        assert hall.faulted.facts()["pending_count"] == TOLD + 3
-
-
-def test_a_script_that_is_set_later_is_told_like_one_of_the_command_line() -> None:
-    with closing(TcpListener()) as listener:
-        hall = Hall(listener)
-        hall.faulted.set("")
-        assert (hall.faulted.news(), hall.faulted.used, hall.faulted.facts()["again"]) == ([], False, "")
-        assert read_order(hall.faulted, "100%: duplicate; exchange 7: drop") is None
-        seed = hall.faulted.script.seed
-        script = f"seed {seed}; 100%: duplicate; exchange 7: drop"
-        assert hall.faulted.news() == [f"faults: seed {seed}"]
-        assert hall.faulted.facts()["again"] == f"--faults '{script}'"
-        with reached(hall, listener) as client:
-            asked(client.fileno(), PING, 12)
-        replay = f"faults: 1 happened, by the seed {seed}; the same again: --faults '{script}'"
-        assert hall.faulted.replay() == replay
-        assert read_order(hall.faulted, "exchange 1: duplicate; at 0 s: torn-eeprom 1") is None
-        pending = "faults: `exchange 7: drop` has not happened (1 exchange was seen)"
-        assert hall.faulted.news() == [replay, pending]
-        with reached(hall, listener) as client:
-            asked(client.fileno(), PING, 12)
-        how = "faults: 2 happened, 1 of them by the latest script; the same again:"
-        again = "--faults 'exchange 1: duplicate; at 0 s: torn-eeprom 1'"
-        torn = (
-            "faults: `at 0 s: torn-eeprom 1` has not happened (nothing was stored since that could be torn)"
-        )
-        assert hall.faulted.replay() == f"{how} {again}"
-        assert read_order(hall.faulted, "off") is None
-        assert hall.faulted.news() == [f"{how} {again}", torn]
-        assert (hall.faulted.replay(), hall.faulted.unhappened()) == ("faults: 2 happened", [])
-        assert hall.faulted.used
-
-
-def test_news_that_nobody_reads_do_not_pile_up() -> None:
-    with closing(TcpListener()) as listener:
-        hall = Hall(listener)
-        for _ in range(3 * NEWS):
-            hall.faulted.set("exchange 9: drop")
-        assert len(hall.faulted.news()) == NEWS
-
-
-def test_a_script_that_is_too_long_for_a_flag_is_told_once() -> None:
-    many = [f"exchange {number}: drop" for number in range(10_000, 10_000 + LONGEST // 21)]
-    fits = "; ".join(["exchange 1: duplicate", *many])
-    fits = fits[: LONGEST + 1].rpartition(";")[0]
-    with closing(TcpListener()) as listener:
-        hall = Hall(listener)
-        hall.faulted.set("exchange 9: drop")
-        hall.faulted.set(fits)
-        assert LONGEST - 25 < len(hall.faulted.script.line) <= LONGEST
-        assert hall.faulted.facts()["again"] == f"--faults '{fits}'"
-        hall.faulted.set(fits + "; exchange 99999: drop")
-        with reached(hall, listener) as client:
-            asked(client.fileno(), PING, 12)
-        facts = hall.faulted.facts()
-        assert (facts["script"], facts["again"]) == (fits + "; exchange 99999: drop", IN_A_FILE)
-        assert len(hall.faulted.replay()) < 200
-        assert hall.faulted.replay().endswith(f"; the same again: {IN_A_FILE}")
-
-
-def test_what_happens_at_one_moment_is_told_in_the_order_in_which_it_happened() -> None:
-    with closing(TcpListener()) as listener:
-        hall = Hall(listener)
-        happened = [f"exchange 1 byte {byte} to device: drop" for byte in (2, 9, 10)]
-        hall.faulted.set("; ".join(happened))
-        hall.mount.course.hear(bytes(12), hall.clock())
-        fired = hall.faulted.facts()["fired"]
-        assert [one["fault"] for one in fired] == happened
-        assert len({one["at"] for one in fired}) == 1
-        assert [line.partition("fault: ")[2] for line in hall.faulted.remarks(0.0)] == happened
-
-
 def test_faults_are_refused_on_a_bus_that_may_have_real_devices() -> None:
     link = QueueLink(no_wire=False, name="can://socketcan/can0")
     hall = Hall(LinkClient(link), "kst")
@@ -382,11 +249,3 @@ def test_faults_are_refused_on_a_bus_that_may_have_real_devices() -> None:
     assert hall.mount.line is line
     assert not hall.faulted.used
     assert read_order(hall.faulted, "off") is None
-
-
-def test_faults_are_taken_on_a_bus_of_programs() -> None:
-    hall = Hall(LinkClient(QueueLink()), "kst")
-    hall.faulted.set("exchange 1 to device: drop")
-    hall.mount.course.hear(CanFrame(0x602, bytes(8)), hall.clock())
-    hall.mount.course.hear(CanFrame(0x601, bytes(8)), hall.clock())
-    assert [one["fault"] for one in hall.faulted.facts()["fired"]] == ["exchange 1 to device: drop"]

@@ -11,17 +11,13 @@ from contextlib import closing, contextmanager
 
 import pytest
 
-from motorbus.core.can_frame import CanFrame
-from motorbus.core.request import Data
-from motorbus.errors import RequestError
-from motorbus.families.feetech.simulator import FeetechBus, model, simulate
+from motorbus.families.feetech.simulator import FeetechBus, simulate
 from motorbus.link.base import Side
 from motorbus.simulation.faults import FaultyLine
 from motorbus.simulation.listener import TcpListener
 from motorbus.simulation.mount import HASTE, Mount
 from motorbus.simulation.pty import PtyMaster
 from tests.support.mounts import asked, received, served
-from tests.support.noisy_line import NoisyLine
 
 PING_1 = "FF FF 01 02 01 FB"
 PONG_1 = "FF FF 01 02 00 FC"
@@ -149,27 +145,6 @@ def test_a_mismatch_stays_silent_until_the_rate_is_right() -> None:
     assert bus.rate == 1_000_000
 
 
-def test_without_a_rate_every_device_hears_every_client() -> None:
-    with terminal(simulate((1,))) as port:
-        for code in (termios.B115200, termios.B9600):
-            set_rate(port, code)
-            assert asked(port, PING_1, 6) == PONG_1
-
-
-def test_a_terminal_begins_at_the_rate_it_is_given() -> None:
-    with closing(PtyMaster()) as master:
-        Mount(simulate((1,)), master, rate=115_200)
-        assert master.rate() == 115_200
-
-
-def test_a_rate_without_a_name_and_a_socket_are_left_alone() -> None:
-    with closing(PtyMaster()) as master, closing(TcpListener()) as listener:
-        before = master.rate()
-        Mount(simulate((1,)), master, rate=76_801)
-        Mount(simulate((1,)), listener, rate=115_200)
-        assert master.rate() == before
-
-
 # Time, by hand: the clock is the test's, the port is a list.
 
 
@@ -286,27 +261,4 @@ def test_a_scripted_fault_is_between_simulator_and_port(bench: Callable[..., Ben
     assert [fired.to for fired in line.fired] == [Side.HOST, Side.DEVICE, Side.HOST]
 
 
-def test_an_echo_comes_before_the_answer(bench: Callable[..., Bench]) -> None:
-    here = bench(simulate((1,)), line=NoisyLine(1, echo=True))
-    here.wire.say(PING_1)
-    assert here.until([0.0]) == [(0.0, f"{PING_1} {PONG_1}")]
-
-
 # What cannot be.
-
-
-def test_a_simulator_of_frames_is_found_out(bench: Callable[..., Bench]) -> None:
-    class Frames(FeetechBus):
-        def advance(self, to: float) -> list[tuple[float, Data]]:
-            return [(at, CanFrame(1, b"")) for at, _ in super().advance(to)]
-
-    here = bench(Frames((1,), model("")))
-    here.wire.say(PING_1)
-    with pytest.raises(RequestError, match="CAN"):
-        here.until([0.0])
-
-
-@pytest.mark.parametrize("pace", [0, -1])
-def test_an_impossible_pace(pace: int) -> None:
-    with closing(TcpListener()) as listener, pytest.raises(RequestError, match="pace"):
-        Mount(simulate((1,)), listener, pace=pace)

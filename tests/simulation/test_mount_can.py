@@ -5,15 +5,11 @@ from __future__ import annotations
 import os
 import select
 import socket
-import time
 import tty
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 
-import pytest
-
-from motorbus.core.can_frame import ERROR_FLAG, CanFrame
-from motorbus.errors import RequestError
+from motorbus.core.can_frame import CanFrame
 from motorbus.link.base import Line
 from motorbus.simulation.clients import CanClient, Door
 from motorbus.simulation.listener import TcpPort
@@ -116,16 +112,6 @@ def test_socketcand() -> None:
         assert bus.heard[0][1] == CanFrame(0x601, b"\1\2")
 
 
-def test_a_bus_that_cannot_be_opened_ends_the_connection() -> None:
-    door = Door(TcpPort(), SocketcandAdapter)
-    with closing(door), served(Mount(Parrots(), door)), caller(door) as program:
-        program.hears(b"< hi >")
-        program.say(b"< open >")
-        assert program.hears(b"< error could not open bus >")
-        assert select.select([program.descriptor], (), (), PATIENCE)[0]
-        assert os.read(program.descriptor, 1) == b""
-
-
 def test_everyone_on_the_bus_hears_everyone_but_himself() -> None:
     door = Door(TcpPort(), SocketcandAdapter)
     with closing(PtyMaster()) as master, closing(door):
@@ -154,16 +140,6 @@ def test_who_leaves_does_not_end_it_for_the_others() -> None:
         assert one.hears(b"z\r" + ANSWER)
 
 
-def test_a_client_begins_with_a_closed_adapter() -> None:
-    door = Door(TcpPort(), SlcanAdapter)
-    with closing(door), served(Mount(Parrots(), door)):
-        with caller(door) as one:
-            one.opens()
-        with caller(door) as other:
-            other.say(ASK)
-            assert other.hears(b"\a")
-
-
 # The bit rate.
 
 
@@ -188,27 +164,6 @@ def test_a_client_that_closes_leaves_the_bus_at_its_own_rate() -> None:
     assert bus.tuned == [250_000, 500_000, 250_000]
 
 
-def test_a_client_that_leaves_takes_its_rate_along() -> None:
-    bus, door = Parrots(500_000), Door(TcpPort(), SlcanAdapter)
-    with closing(door), served(Mount(bus, door, rate=500_000)), caller(door) as one:
-        with caller(door) as other:
-            other.opens(b"5")
-        one.say(b"O\r")
-        one.hears(b"\r")
-        while bus.tuned[-1] != 500_000:  # the other has left, sooner or later
-            time.sleep(0.001)
-        one.say(ASK)
-        assert one.hears(b"z\r" + ANSWER)
-
-
-def test_who_sets_no_rate_has_that_of_the_bus() -> None:
-    bus = Parrots(500_000)
-    with slcan(bus) as program:
-        program.say(b"O\r" + ASK)
-        assert program.hears(b"\rz\r" + ANSWER)
-    assert bus.tuned == []
-
-
 # What is between, and what cannot be.
 
 
@@ -218,24 +173,6 @@ def test_faults_strike_frames() -> None:
         program.opens()
         program.say(ASK)
         assert program.hears(b"z\r" + ANSWER * 2)
-
-
-def test_an_error_frame_is_told_as_the_protocol_can() -> None:
-    bus = Parrots()
-    door = Door(TcpPort(), SocketcandAdapter)
-    with closing(PtyMaster()) as master, closing(door):
-        mount = Mount(bus, CanClient(master, SlcanAdapter()), door)
-        with terminal(master) as one, caller(door) as other:
-            with served(mount):
-                one.opens()
-                other.enters()
-                other.say(b"< echo >")
-                other.hears(b"< echo >")
-            bus.say(CanFrame(ERROR_FLAG | 0x80, bytes(8)), 0.0)
-            with served(mount):
-                assert other.hears(b"< error 080 ")
-                one.say(b"F\r")
-                assert one.hears(b"F80\r")
 
 
 def test_nobody_reading_holds_nothing_up_and_frames_stay_whole() -> None:
@@ -264,12 +201,3 @@ def test_with_pace_a_flood_is_held_back() -> None:
             for _ in range(10):
                 mount.step(timeout=0.0)
             assert mount.course.crowded
-
-
-def test_an_adapter_needs_one_endpoint() -> None:
-    with (
-        closing(PtyMaster()) as master,
-        closing(PtyMaster()) as other,
-        pytest.raises(RequestError, match="adapter"),
-    ):
-        Mount(Parrots(), master, other, adapter=SlcanAdapter())

@@ -11,7 +11,6 @@ from motorbus.link.memory import MemoryLink
 from motorbus.simulation.faults import FaultyLine
 from motorbus.simulation.named import Simulation, find
 from tests.simulation.links import QueueLink
-from tests.support.noisy_line import NoisyLine
 
 PING_1 = bytes.fromhex("FF FF 01 02 01 FB")
 PONG_1 = bytes.fromhex("FF FF 01 02 00 FC")
@@ -50,12 +49,6 @@ def test_without_a_name_each_gets_its_own() -> None:
     with simulation() as one, simulation() as other:
         assert one.url != other.url
         assert find(other.name, "feetech") is other
-
-
-@pytest.mark.parametrize("name", ["", "a,b", "a:b", "a#b", " a"])
-def test_names_that_no_address_could_carry(name: str) -> None:
-    with pytest.raises(RequestError, match="cannot be the name"):
-        simulation(name=name)
 
 
 def test_a_name_that_is_taken() -> None:
@@ -207,27 +200,6 @@ def test_closing_the_simulation_ends_it(channel: QueueLink) -> None:
         sim.serve("can://virtual/here")
 
 
-def test_line_and_rate_hold_on_a_channel_too(channel: QueueLink) -> None:
-    with servos(37, bit_rate=250_000) as sim:
-        sim.line = NoisyLine(1, duplicate=1.0)
-        with sim.serve("can://virtual/here", 250_000) as served:
-            assert served.line is sim.line
-            channel.arrive(READ_37)
-            assert [channel.next_sent(), channel.next_sent()] == [POSITION_37, POSITION_37]
-
-
-def test_devices_on_a_serial_line_have_no_channel(channel: QueueLink) -> None:
-    with simulation() as sim, pytest.raises(RequestError, match="CAN"):
-        sim.serve("can://virtual/here")
-
-
-def test_the_address_tells_a_rate_that_is_not_the_usual_one() -> None:
-    with simulation(3, model="sm85blhv", name="arm") as sim:
-        assert sim.url == "feetech:sim:arm,baud=115200"
-        sim[3].memory["baud_rate"] = 0  # the address is that of the bus as it was made
-        assert sim.url == "feetech:sim:arm,baud=115200"
-
-
 def test_simulations_that_wait_for_the_same_moments_have_one_clock() -> None:
     with simulation() as one, simulation() as other:
         link = one.link()
@@ -237,14 +209,6 @@ def test_simulations_that_wait_for_the_same_moments_have_one_clock() -> None:
         assert asked(other.link()) == [PONG_1]
         other.wait(1.0)
         assert other.now >= 2.0
-
-
-def test_what_was_sent_happens_while_one_waits() -> None:
-    with simulation() as sim:
-        link = sim.link()
-        link.write(PING_1)
-        sim.wait(1.0)
-        assert link.read(sim.now) == [PONG_1]
 
 
 def test_a_real_clock_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,6 @@ import pytest
 
 import motorbus
 from motorbus import families
-from motorbus.core.can_frame import CanFrame
 from motorbus.errors import LinkLost, MotorbusError, NoReply, PortNotFound, RequestError
 from motorbus.link.base import PerfectLine
 from motorbus.simulation.faults import FaultyLine, parse
@@ -104,30 +103,6 @@ def test_a_pulled_port_is_away_and_comes_back() -> None:
         link.close()
 
 
-def test_a_bus_of_this_command_only_goes_wrong_too() -> None:
-    with motorbus.open("feetech:sim,ids=1", faults="100%: drop") as bus, pytest.raises(NoReply):
-        motorbus.feetech.Servo(bus, 1).position()
-    with pytest.raises(RequestError, match="not a fault"):
-        motorbus.open("feetech:sim,ids=1,faults=nonsense")
-
-
-def test_served_on_a_channel_it_suffers_and_cannot_be_pulled(monkeypatch: pytest.MonkeyPatch) -> None:
-    channel = QueueLink()
-    monkeypatch.setattr("motorbus.link.can.CanLink", lambda port, **options: channel)
-    with Simulation(families.load("kst"), (37,), faults="exchange 1: unplug 1") as sim:
-        with pytest.raises(RequestError, match="not ours to pull"):
-            sim.serve("can://virtual/here")
-        sim.faults = ""
-        with sim.serve("can://virtual/here") as served:
-            with pytest.raises(RequestError, match="no port"):
-                sim.faults = "exchange 1: unplug 1"
-            with pytest.raises(RequestError, match="cannot be pulled"):
-                sim.unplug(seconds=1.0)
-            sim.faults = "exchange 1: power-cycle 37"
-            assert served.line is sim.faults
-            assert served.simulator is not sim.simulator
-
-
 def test_a_bus_that_may_have_real_devices_suffers_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[str] = []
 
@@ -152,19 +127,3 @@ def test_a_bus_that_may_have_real_devices_suffers_nothing(monkeypatch: pytest.Mo
             assert str(sim.faults) == ""
             assert served.line is sim.line
             sim.faults = ""
-
-
-def test_a_bus_that_others_share_keeps_what_is_theirs(monkeypatch: pytest.MonkeyPatch) -> None:
-    channel = QueueLink()
-    monkeypatch.setattr("motorbus.link.can.CanLink", lambda port, **options: channel)
-    asks = bytes.fromhex("40 02 60 00 00 00 00 00")
-    with (
-        Simulation(families.load("kst"), (37,), faults="100%: echo; 100%: duplicate") as sim,
-        sim.serve("can://virtual/here"),
-    ):
-        for id in (0x626, 0x5A6, 0x125, 0x625):
-            channel.arrive(CanFrame(id, asks))
-        said = [channel.next_sent() for _ in range(3)]
-        assert [frame.id for frame in said if isinstance(frame, CanFrame)] == [0x625, 0x5A5, 0x5A5]
-        assert sim.faults.exchange == 1
-    assert channel.nothing_sent()

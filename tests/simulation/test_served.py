@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import threading
-import time
 from contextlib import closing
 
 import pytest
 
-from motorbus.core.can_frame import ERROR_FLAG, CanFrame
-from motorbus.errors import LinkLost, MotorbusError, RequestError
+from motorbus.core.can_frame import CanFrame
+from motorbus.errors import LinkLost, RequestError
 from motorbus.link.base import Line
-from motorbus.link.can import CanLink
 from motorbus.simulation.faults import FaultyLine
 from motorbus.simulation.served import LinkClient, Served, check_harmless, join
 from tests.simulation.links import QueueLink
@@ -30,30 +28,6 @@ def test_devices_answer_on_the_channel(descriptor: bool) -> None:
             link.arrive(FRAME)
             assert link.next_sent() == REPLY
     assert link.closed
-
-
-def test_what_nobody_asked_for_is_said_too() -> None:
-    bus, link = Parrots(), QueueLink()
-    bus.say(REPLY, time.monotonic())
-    with Served(bus, LinkClient(link)):
-        assert link.next_sent() == REPLY
-
-
-def test_an_adapter_finds_its_own_errors() -> None:
-    link = QueueLink()
-    client = LinkClient(link)
-    client.tell(CanFrame(ERROR_FLAG | 0x80, bytes(8)), 0.0)
-    assert link.nothing_sent()
-
-
-def test_what_has_no_room_is_counted() -> None:
-    link = QueueLink()
-    link.is_full = True
-    client = LinkClient(link)
-    client.tell(REPLY, 0.0)
-    client.tell(REPLY, 0.0)
-    assert client.lost == 1
-    assert link.next_sent() == REPLY
 
 
 def test_an_adapter_that_is_lost_is_told_when_the_bus_is_left() -> None:
@@ -126,30 +100,6 @@ def test_a_channel_is_opened_as_a_host_would(monkeypatch: pytest.MonkeyPatch) ->
     assert asked == [("can://virtual/here", expected)]
 
 
-@pytest.mark.parametrize(("shared", "locked"), [(True, False), (False, True)])
-def test_a_bus_of_the_system_is_not_locked_by_its_devices(
-    shared: bool, locked: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    taken: list[str] = []
-
-    class Lock:
-        def __init__(self, name: str) -> None:
-            self.name = name
-
-        def acquire(self) -> Lock:
-            taken.append(self.name)
-            return self
-
-        def release(self) -> None:
-            pass
-
-    for module in ("can", "lock"):
-        monkeypatch.setattr(f"motorbus.link.{module}.PortLock", Lock)
-    with pytest.raises(MotorbusError):  # there is no such interface
-        CanLink("can://socketcan/nocan7", rate=500_000, shared=shared)
-    assert bool(taken) is locked
-
-
 # On a bus that may have real devices.
 
 
@@ -175,14 +125,3 @@ def test_what_is_asked_before_a_channel_is_opened() -> None:
         with pytest.raises(RequestError, match="faults are refused"):
             check_harmless(there, {})
     check_harmless("/dev/nothing", {})  # no channel: to join it is refused
-
-
-def test_what_is_for_others_is_not_repeated_on_their_bus() -> None:
-    bus, link = Parrots(), QueueLink()
-    bus.others = {0x626}
-    with Served(bus, LinkClient(link), line=FaultyLine("100%: echo")):
-        link.arrive(CanFrame(0x626, b"\1\2"))
-        link.arrive(FRAME)
-        answers = [link.next_sent() for _ in range(3)]
-    assert sorted(answers) == sorted([CanFrame(0x626 ^ ANSWER, b"\1\2"), FRAME, REPLY])
-    assert link.nothing_sent()

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
 from motorbus.simulation.adapter import Adapter
-from motorbus.simulation.slcan import FIFO, LONGEST_LINE, RATES, Filter, SlcanAdapter, rate_of_timing
+from motorbus.simulation.slcan import LONGEST_LINE, RATES, SlcanAdapter
 
 FRAME = CanFrame(0x625, bytes.fromhex("2203600084030000"))
 LINE = b"t62582203600084030000\r"
@@ -43,12 +43,6 @@ def test_the_bit_rates(code: int) -> None:
     assert adapter.bitrate == RATES[code]
 
 
-def test_s7_is_800_kbit() -> None:
-    adapter = SlcanAdapter()
-    told(adapter, b"S7\r")
-    assert adapter.bitrate == 800_000
-
-
 @pytest.mark.parametrize("line", [b"S9", b"S", b"S66", b"S-", b"s031", b"s031CC", b"s03 1", b"s0x1"])
 def test_no_bit_rate(line: bytes) -> None:
     adapter = SlcanAdapter()
@@ -63,17 +57,6 @@ def test_no_bit_rate_while_open(line: bytes) -> None:
     assert adapter.bitrate == 500_000
 
 
-@pytest.mark.parametrize(
-    ("registers", "rate"),
-    # the settings that the CAN232 manual and the SJA1000 application notes print for 16 MHz
-    [(b"311C", 10_000), (b"031C", 125_000), (b"011C", 250_000), (b"001C", 500_000), (b"0014", 1_000_000)],
-)
-def test_bit_timing_registers(registers: bytes, rate: int) -> None:
-    adapter = SlcanAdapter()
-    assert told(adapter, b"s" + registers + b"\r") == b"\r"
-    assert adapter.bitrate == rate == rate_of_timing(int(registers[:2], 16), int(registers[2:], 16))
-
-
 # Opening and closing.
 
 
@@ -84,11 +67,6 @@ def test_what_python_can_says_when_it_opens_and_leaves() -> None:
     assert told(adapter, b"C\r") == b"\r"
     assert not adapter.open
     assert adapter.bitrate == 500_000
-
-
-def test_a_strict_one_refuses_what_a_can232_refuses() -> None:
-    adapter = SlcanAdapter(strict=True)
-    assert told(adapter, b"C\rO\rF\rS6\rO\rO\rL\rZ1\rX0\rC\rC\r") == b"\a\a\a\r\r\a\a\a\a\r\a"
 
 
 def test_without_a_bit_rate_it_opens_at_whatever_the_bus_has() -> None:
@@ -193,14 +171,6 @@ def test_a_closed_one_sends_and_hears_nothing() -> None:
     assert adapter.deliver(FRAME, 0.0) == b""
 
 
-def test_lines_cut_anywhere_and_line_feeds() -> None:
-    adapter = opened()
-    text = LINE + b"\n" + LINE + b"\r\n"
-    frames = [frame for place in range(len(text)) for frame in adapter.feed(text[place : place + 1])]
-    assert frames == [FRAME, FRAME]
-    assert adapter.take() == b"z\rz\r\r"
-
-
 def test_a_line_without_end_is_bounded_and_refused_at_its_end() -> None:
     adapter = opened()
     for _ in range(1000):
@@ -228,44 +198,10 @@ def test_settings(line: bytes) -> None:
     assert told(SlcanAdapter(), line + b"\r") == b"\r"
 
 
-def test_timestamps_are_milliseconds_of_a_minute() -> None:
-    adapter = opened()
-    told(adapter, b"Z1\r")
-    assert adapter.deliver(CanFrame(1, b""), 59.999) == b"t0010EA5F\r"
-    assert adapter.deliver(CanFrame(1, b""), 60.0015) == b"t00100001\r"
-    told(adapter, b"Z0\r")
-    assert adapter.deliver(CanFrame(1, b""), 1.0) == b"t0010\r"
-
-
 def test_an_error_of_the_bus_is_a_bit_of_the_status_which_reading_clears() -> None:
     adapter = opened()
     assert adapter.deliver(CanFrame(ERROR_FLAG | 0x80, bytes(8)), 0.0) == b""
     assert told(adapter, b"F\rF\r") == b"F80\rF00\r"
-
-
-def test_polling() -> None:
-    adapter = SlcanAdapter()
-    told(adapter, b"X0\rS6\rO\r")
-    for number in range(4):
-        assert adapter.deliver(CanFrame(number, b""), 0.0) == b""
-    assert told(adapter, b"P\r") == b"t0000\r"
-    assert told(adapter, b"A\r") == b"t0010\rt0020\rt0030\rA\r"
-    assert told(adapter, b"P\rA\r") == b"\rA\r"
-
-
-def test_polling_is_refused_while_frames_come_by_themselves_or_it_is_closed() -> None:
-    assert told(opened(), b"P\rA\r") == b"\a\a"
-    adapter = SlcanAdapter()
-    assert told(adapter, b"X0\rP\rA\r") == b"\r\a\a"
-
-
-def test_too_many_frames_that_nobody_polls() -> None:
-    adapter = SlcanAdapter()
-    told(adapter, b"X0\rS6\rO\r")
-    for number in range(FIFO + 1):
-        adapter.deliver(CanFrame(number, b""), 0.0)
-    assert told(adapter, b"F\r") == b"F09\r"
-    assert told(adapter, b"A\r").count(b"t") == FIFO
 
 
 # The acceptance filter, as the SJA1000 data sheet lays out its bits.
@@ -300,15 +236,6 @@ def test_the_filter(
     assert [frame for frame in stopped if adapter.deliver(frame, 0.0)] == []
 
 
-@given(st.integers(0, 0x7FF), st.booleans(), st.binary(max_size=8))
-def test_a_filter_made_for_a_frame_lets_it_in(id: int, single: bool, data: bytes) -> None:
-    chosen = Filter()
-    chosen.single, chosen.mask = single, 0x001F_FFFF if single else 0x001F_001F
-    chosen.code = id << 21 | id << 5
-    assert chosen.passes(CanFrame(id, data))
-    assert not chosen.passes(CanFrame(id ^ 0x400, data))
-
-
 # Anything at all.
 
 
@@ -321,15 +248,3 @@ def test_garbage_never_raises_and_is_never_kept(pieces: list[bytes]) -> None:
         adapter.take()
         assert len(adapter._line) <= LONGEST_LINE + 1
     assert told(adapter, b"\rC\r").endswith(b"\r")
-
-
-@given(st.integers(0, 0x1FFFFFFF), st.booleans(), st.booleans(), st.binary(max_size=8), st.integers(1, 30))
-def test_every_frame_comes_back_as_it_went(
-    id: int, extended: bool, remote: bool, data: bytes, cut: int
-) -> None:
-    frame = CanFrame(id if extended else id & 0x7FF, data, extended)
-    if remote:
-        frame = CanFrame(frame.id | REMOTE_FLAG, bytes(len(data)), extended)
-    host, other = opened(), opened()
-    line = host.deliver(frame, 0.0)
-    assert other.feed(line[:cut]) + other.feed(line[cut:]) == [frame]

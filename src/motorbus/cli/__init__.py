@@ -71,7 +71,7 @@ _COMMANDS: Final[Mapping[Group, Mapping[str, str]]] = {
     },
     Group("Without hardware", sort_key=4): {
         "simulate": "Serve simulated devices on a pseudo-terminal or a socket.",
-        "demo": "Find nine simulated axes of three families, move them together, and draw what they did.",
+        "demo": "Move nine simulated axes of three families together, and draw them.",
     },
 }
 UNWRITABLE: Final = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO, errno.EBADF)

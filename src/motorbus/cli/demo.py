@@ -1,46 +1,37 @@
-"""`motorbus demo`: the whole of it without hardware. A machine of nine axes is found, moved together and drawn.
-
-Its devices are those of three families on three buses, each in a process of its own, so that everything between here
-and them is as it would be with cables. With --family it is one bus, as fast as that can be; of a family whose devices
-no loop controls, its face shows what they do.
-"""
+"""`motorbus demo`: nine simulated axes of three families move together, and are drawn."""
 
 from __future__ import annotations
 
+from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
-from motorbus import families, plot
-from motorbus.cli import faces
+from motorbus import plot
 from motorbus.cli.exits import Exit
-from motorbus.cli.files import check_writable
-from motorbus.cli.nine import LEAST, nine
+from motorbus.cli.files import check_writable, usable
 from motorbus.cli.output import Output
-from motorbus.cli.target import opened
-from motorbus.cli.wave import served, waved
-from motorbus.errors import RequestError
+from motorbus.core import units
+from motorbus.motion.machine.model import POSITION
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from motorbus.motion.machine import Machine
+    from motorbus.motion.moving.moved import Moved
 
 app = App(
     name="demo",
-    help_epilogue="""No hardware is needed or touched: everything is simulated, and says so.
-
-Six FEETECH servos, two KST servos on CAN and the linear axis of a stepper
-controller are one machine: a file describes it, and all nine axes start and
-end together, there and back. What the stepper axis did is reckoned, for it
-tells no position: it is called estimated. Takes about 20 s, most of it for the
-stepper controller, which is told its movements at 9600 bit/s. --family shows
-the devices of one bus instead: servos in a loop as fast as the wire allows, a
-stepper controller with a program.
+    help_epilogue="""Six FEETECH servos, two KST servos and the linear axis of a stepper controller
+are one machine, on three simulated buses in virtual time. All nine axes start
+and end together, there and back. The position of the stepper axis is
+estimated: its controller tells none. No hardware is needed or touched.
 
 Examples:
 
     motorbus demo
-    motorbus demo --output demo.svg --duration 4
-    motorbus demo --family feetech --ids 1-3
-    motorbus demo --family kst
-    motorbus demo --family stepper --output run.png
+    motorbus demo --output demo.svg
     motorbus demo --json""",
 )
 
@@ -49,45 +40,56 @@ Examples:
 def demo(
     *,
     output_: Annotated[Path, Parameter(name="--output")] = Path("demo.png"),
-    ids: str = "",
-    duration: float = 6.0,
-    family: str = "",
     output: Annotated[Output, Parameter(parse=False)],
 ) -> Exit:
-    """Find nine simulated axes of three families, move them together, and draw what they did.
+    """Move nine simulated axes of three families together, and draw them.
 
     Parameters
     ----------
     output_
-        Where the picture goes; .png, .svg or .pdf.
-    ids
-        With --family: the ids of the simulated devices.
-    duration
-        Seconds of motion: 4 to 60; with --family, 1 to 60.
-    family
-        Only the devices of this one: servos in a loop; of a stepper controller a project is written and run.
+        Path of the picture: .png, .svg or .pdf.
     """
-    least = 1.0 if family else LEAST
-    if not least <= duration <= 60.0:
-        why = "" if family else ": the slide needs half of that for each of its ways"
-        raise RequestError(
-            f"--duration {duration:g}: too short or too long", expected=f"{least:g} to 60 seconds{why}"
-        )
-    if ids and not family:
-        raise RequestError("--ids: the machine of the demo has its own", expected="--family with --ids")
-    if family:
-        families.load(family)
+    from motorbus import Robot
+
     check_writable(output_, plot.KINDS)
     output.simulated = True
-    if not family:
-        nine(duration, output_, output)
-    elif (own := faces.offer(family, "demo")) is not None:
-        _shown_by_its_face(own, family, duration, output_, output)
-    else:
-        waved(family, ids or "1-6", duration, output_, output)
+    with as_file(files("motorbus.cli") / "demo.toml") as file, Robot.load(file) as robot:
+        robot["slide"].declare(0.0)
+        moves = [robot.pose(pose, duration=3.0) for pose in ("reach", "rest")]
+        machine = robot.machine
+    title = f"{len(machine.axes)} axes on {len(machine.buses)} buses"
+    with usable(output_, "written"):
+        plot.tracks(output_, (), _tracks(machine, moves), title=title, remark="simulated")
+    movements = [
+        {"duration": moved.duration, "axes": {name: one._asdict() for name, one in moved.axes.items()}}
+        for moved in moves
+    ]
+    output.document("motorbus.demo/3", {"movements": movements, "picture": str(output_)})
+    for moved in moves:
+        rows = [
+            (name, machine.axes[name].show(one.goal), machine.axes[name].show(one.present))
+            for name, one in moved.axes.items()
+        ]
+        output.table("", ["axis", ">goal", ">present"], rows)
+        output.text(str(moved))
+    output.text(f"picture: {output_} (simulated)")
     return Exit.OK
 
 
-def _shown_by_its_face(own: Any, family: str, duration: float, picture: Path, output: Output) -> None:
-    with served(family, "1", output) as bus, opened(bus, {}, output) as opening:
-        own(opening, duration, picture, output)
+def _tracks(machine: Machine, moves: Sequence[Moved]) -> dict[str, plot.Track]:
+    """Each axis over all moves in the unit of its display, one move 0.5 s after the other."""
+    tracks = {}
+    for name, spec in machine.axes.items():
+        scale = units.SCALES[POSITION.of(spec.linear)][spec.unit]
+        times: list[float] = []
+        goals: list[float] = []
+        presents: list[float | None] = []
+        begin = 0.0
+        for moved in moves:
+            track = moved.tracks[name]
+            times += [begin + time for time in (*track.times, track.times[-1])]
+            goals += [goal / scale for goal in (*track.goals, track.goals[-1])]
+            presents += [*(present / scale for present in track.presents), None]
+            begin += 0.5 + max(one.times[-1] for one in moved.tracks.values())
+        tracks[name] = plot.Track(goals, presents, spec.unit, moves[0].tracks[name].estimated, times)
+    return tracks

@@ -33,7 +33,6 @@ def each(
     output: Output,
     *,
     dry_run: bool = False,
-    unknown: Sequence[MotorbusError] = (),
     look: Look | None = None,
 ) -> Exit:
     """Carry out `verb` on every device. Raises the only error there was, or Partial when some did as asked.
@@ -41,7 +40,7 @@ def each(
     Where a family has no such verb nothing is opened: RequestError. A bus that fails keeps nobody on another waiting. A
     bus that is called by its name means its axes in the file, and its address every device that answers. Where one
     broadcast does it, a whole bus gets that first and is not scanned. A dry run shows what would be sent, and sends
-    none of it. `unknown` are errors of words that have no meaning here. `look` is asked when every device was visited:
+    none of it. `look` is asked when every device was visited:
     what it finds wrong with what was achieved is raised before anything else.
     """
     results: list[dict[str, Any]] = []
@@ -72,7 +71,7 @@ def each(
                     show(rehearsal, output)
         except MotorbusError as error:
             _advise(error, name)
-            if len(wanted) == 1 and not there and not unknown:
+            if len(wanted) == 1 and not there:
                 raise
             seen = {one["id"] for one in there}
             rest = tuple(node for node in expected if node not in seen)
@@ -84,8 +83,8 @@ def each(
         shown = [(_shown(one), _came_of(one) or what) for one in results]
         output.table("", ["device", "result"], shown)
     if doubts:
-        raise _with_notes(doubts[0], [*doubts[1:], *errors, *unknown])
-    return _verdict([*errors, *unknown], len(results) + len(unknown))
+        raise with_notes(doubts[0], [*doubts[1:], *errors])
+    return _verdict(errors, len(results))
 
 
 def _advise(error: MotorbusError, bus: str) -> None:
@@ -139,12 +138,13 @@ def _verdict(errors: Sequence[MotorbusError], visited: int) -> Exit:
         return Exit.OK
     summaries = list(dict.fromkeys(error.summary for error in errors))
     if len(errors) == visited:
-        raise _with_notes(errors[0], errors[1:])
+        raise with_notes(errors[0], errors[1:])
     advice = "; ".join(dict.fromkeys(error.advice for error in errors if error.advice))
     raise Partial("; ".join(summaries), advice=advice)
 
 
-def _with_notes(first: MotorbusError, others: Sequence[MotorbusError]) -> MotorbusError:
+def with_notes(first: MotorbusError, others: Sequence[MotorbusError]) -> MotorbusError:
+    """The first of several errors, with the others as its notes."""
     for other in dict.fromkeys(error.summary for error in others):
         if other != first.summary:
             first.add_note(f"also: {other}")

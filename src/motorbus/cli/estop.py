@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 from cyclopts import App, Parameter
 
 from motorbus.cli import faces
+from motorbus.cli.each import with_notes
 from motorbus.cli.exits import Exit, Partial
-from motorbus.cli.line import same_line
-from motorbus.cli.machine import is_name
+from motorbus.cli.machine import axes_at, is_address, machine, machine_file
 from motorbus.cli.output import Output
-from motorbus.cli.rough import beside_others, forgiving, readable, together, understood
-from motorbus.cli.target import Target, everyone, opened, said, target, targets
+from motorbus.cli.target import everyone, opened, said, targets
 from motorbus.core.request import Effect
 from motorbus.errors import LinkError, MotorbusError, NoReply, PortNotFound, RequestError
 
@@ -34,6 +33,7 @@ OPENING: Final = 1.0
 """s that a process which is opening a port may need until it offers a stop."""
 BY_HAND: Final = "cut the power by hand"
 NAME_THEM: Final = "name the devices, as BUS#1-6, and each is asked; or cut the power by hand"
+MEND: Final = "correct the machine file: its own buses are stopped only if they are open"
 ALL: Final = "acknowledged by all known"
 
 app = App(
@@ -58,8 +58,7 @@ asked are counted: they got the broadcast and confirmed nothing, exit code 6.
 Without BUS, every open bus on a real port is stopped, and every bus of the
 machine file, simulated or not. Other simulated buses that are open are named
 and not stopped; --all stops them too. By its names, a group or an axis stops
-its whole buses. A line of the file that cannot be understood keeps no other
-bus from being stopped: exit code 6.
+its whole buses. An error in the file prevents the stop of no open bus: exit code 6.
 
 From here KST servos must say where they are before they can be held there. On
 a bus without ids everyone is asked who is there first, and the answers are
@@ -94,25 +93,28 @@ def estop(
     options
         Any option of the bus string, as a flag.
     """
-    with forgiving((bus,) if bus else ()) as meant:
-        wanted, unclear = _wanted((*meant.known, *meant.unclear) if bus else tuple(readable().buses))
-        unclear = {**meant.unclear, **unclear}
-        if bus and not wanted:
-            raise together(list(unclear.values()))
-        failures: list[MotorbusError] = []
-        stops: list[dict[str, Any]] = []
-        left: list[dict[str, Any]] = []
-        if everything or not bus:
-            left = _stop_open(wanted, options, stops, failures, everything=everything)
-        stops += _stop_each(wanted, options, output, failures)
-        output.document("motorbus.estop/1", {"buses": stops, "not_stopped": left})
-        for one in stops:
-            output.text("\n  ".join(_lines(one)))
-        if not stops:
-            raise together([*unclear.values(), _nothing_to_stop(left)])
-        for one in left:
-            output.text(f"{one['bus']}: not stopped: simulated, held by {one['by']}; `--all` stops it too")
-        return _verdict(stops, unclear, failures)
+    broken = None if bus and is_address(bus) else _file_error()
+    if broken is not None:
+        bus = ""  # the file has no names then: every open bus is stopped
+    words: tuple[str, ...] = (bus,) if bus else ()
+    if not bus and broken is None and machine_file().path is not None:
+        words = tuple(machine().buses)
+    wanted = _wanted(words)
+    failures: list[MotorbusError] = []
+    stops: list[dict[str, Any]] = []
+    left: list[dict[str, Any]] = []
+    if everything or not bus:
+        left = _stop_open(wanted, options, stops, failures, everything=everything)
+    stops += _stop_each(wanted, options, output, failures)
+    output.document("motorbus.estop/1", {"buses": stops, "not_stopped": left})
+    for one in stops:
+        output.text("\n  ".join(_lines(one)))
+    if not stops:
+        nothing = _nothing_to_stop(left)
+        raise with_notes(broken, [nothing]) if broken is not None else nothing
+    for one in left:
+        output.text(f"{one['bus']}: not stopped: simulated, held by {one['by']}; `--all` stops it too")
+    return _verdict(stops, broken, failures)
 
 
 class Wanted(NamedTuple):
@@ -124,46 +126,26 @@ class Wanted(NamedTuple):
     others: bool
 
 
-def _wanted(words: Iterable[str]) -> tuple[list[Wanted], dict[str, RequestError]]:
-    """The buses that words mean, each once, and by name the errors of axes on them whose ids cannot be.
+def _wanted(words: Iterable[str]) -> list[Wanted]:
+    """The buses of these words, each once. Raises RequestError for a word or a machine file that is wrong.
 
-    By the name of a bus the devices of its axes are named, and whoever else is there is meant. Nobody is named by a
-    word that cannot be understood, and its bus is stopped all the same where that is known.
+    The name of a bus names the devices of its axes, and stops every other device too.
     """
     found: dict[str, Wanted] = {}
-    unclear: dict[str, RequestError] = {}
-    for word in words:
-        for one in _buses_of(word):
-            axes = understood(() if one.nodes else _axes_on(one.bus), {})
-            unclear |= axes.unclear
-            named = one.nodes or tuple(node for axis in axes.known for node in target(axis).nodes)
-            before = found.get(one.bus, Wanted(one.bus, one.family, (), False))
-            nodes = tuple(dict.fromkeys((*before.nodes, *named)))
-            found[one.bus] = before._replace(nodes=nodes, others=before.others or not one.nodes)
-    return list(found.values()), unclear
+    for one in (one for word in words for one in targets(word)):
+        before = found.get(one.bus, Wanted(one.bus, one.family, (), False))
+        nodes = tuple(dict.fromkeys((*before.nodes, *(one.nodes or axes_at(one.bus)))))
+        found[one.bus] = before._replace(nodes=nodes, others=before.others or not one.nodes)
+    return list(found.values())
 
 
-def _buses_of(word: str) -> list[Target]:
-    """What a word means; the bus of an axis whose id cannot be, and nothing where nobody can tell."""
-    with suppress(RequestError):
-        return targets(word)
-    machine = readable()
-    if not is_name(word) or word not in machine.axes or word in machine.buses:
-        return []
-    with suppress(RequestError):
-        return targets(machine.buses[machine.axes[word].bus].address)
-    return []
-
-
-def _axes_on(bus: str) -> tuple[str, ...]:
-    """The axes of the machine file on this bus, whatever its port is called."""
-    machine = readable()
-    found = []
-    for axis, spec in machine.axes.items():
-        with suppress(RequestError):  # an address that is none
-            if same_line(machine.buses[spec.bus].address, bus):
-                found.append(axis)
-    return tuple(found)
+def _file_error() -> RequestError | None:
+    """The error of the machine file, if there is one with an error."""
+    try:
+        _ = machine_file().path is not None and machine()
+    except RequestError as error:
+        return error
+    return None
 
 
 def _lines(one: dict[str, Any]) -> list[str]:
@@ -371,8 +353,7 @@ def _port(bus: str, options: dict[str, str]) -> str:
 def _count_others(facts: dict[str, Any], wanted: Wanted, *, all_known: bool) -> None:
     """Add which devices of the machine file were not asked, and what was sent to all that were not."""
     broadcast = any(not request.expected for request in wanted.family.open().stop({}).requests)
-    known = [node for axis in understood(_axes_on(wanted.bus), {}).known for node in target(axis).nodes]
-    facts["not_asked"] = sorted({*known} - {*facts["acknowledged"], *facts["silent"]})
+    facts["not_asked"] = sorted({*axes_at(wanted.bus)} - {*facts["acknowledged"], *facts["silent"]})
     facts["others"] = "not asked, broadcast sent" if broadcast else "not asked, no stop sent"
     if facts["acknowledged"] and (facts["not_asked"] or not all_known):
         facts["outcome"] = "acknowledged by some"
@@ -405,14 +386,11 @@ def _list(nodes: list[int], nothing: str = "none") -> str:
     return ", ".join(f"#{node}" for node in nodes) or nothing
 
 
-def _verdict(
-    stops: list[dict[str, Any]], unclear: Mapping[str, RequestError], failures: list[MotorbusError]
-) -> Exit:
-    lost = beside_others(list(unclear.values()))
+def _verdict(stops: list[dict[str, Any]], broken: RequestError | None, failures: list[MotorbusError]) -> Exit:
     failed = [f"{one['bus']}: {one['error']}" for one in stops if one["error"]]
     missing = [one for one in stops if not one["error"] and one["outcome"] != ALL]
     silent = [f"{one['bus']}: {_missing(one)}" for one in missing]
-    told = "; ".join([*failed, *silent, *(error.summary for error in lost)])
+    told = "; ".join([*failed, *silent, *([broken.summary] if broken is not None else [])])
     if failed and len(failed) == len(stops):
         raise _all_failed(failures, told)
     if not any(one["acknowledged"] for one in stops):
@@ -420,7 +398,8 @@ def _verdict(
     if told:
         unasked = not any(one["silent"] or not one["acknowledged"] for one in missing)
         by_hand = [NAME_THEM if unasked and not failed else BY_HAND] if failed or silent else []
-        raise Partial(told, advice="; ".join(dict.fromkeys([*by_hand, *(error.advice for error in lost)])))
+        of_file = [MEND] if broken is not None else []
+        raise Partial(told, advice="; ".join([*by_hand, *of_file]))
     return Exit.OK
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import stat
 from pathlib import Path
-from select import select
 from typing import TYPE_CHECKING, Final
 
 from motorbus.cli.exits import Exit
@@ -19,8 +18,6 @@ if TYPE_CHECKING:
 
 MOST: Final = 1 << 20
 """Bytes of a file with a script: some 40 000 faults, far more than a person or a run makes, and read in a second."""
-PATIENCE: Final = 10.0
-"""s for which a pipe may be silent."""
 PLACES = (
     (
         "exchange 17: …",
@@ -39,10 +36,9 @@ PLACES = (
 
 
 def from_option(said: str | None) -> Script:
-    """What the flag says: a script, or the name of a file or a pipe that is there; None is none.
+    """What the flag says: a script, or the name of a file; None is none.
 
-    Raises RequestError for neither, for one that is too long, for a pipe that stays silent, and for a script without a
-    fault: its user believes that one is at work.
+    Raises RequestError for neither, for one that is too long, and for a script without a fault.
     """
     if said is None:
         return Script()
@@ -83,39 +79,25 @@ def _of_file(file: Path) -> Script:
 
 
 def _is_file(said: str) -> bool:
-    """A file or a pipe, but no device: to open one may move something."""
+    """A regular file: to open a device may move something."""
     try:
         mode = os.stat(said).st_mode
     except (OSError, ValueError):  # longer than any name, or with what no name can have
         return False
-    return stat.S_ISREG(mode) or stat.S_ISFIFO(mode)
+    return stat.S_ISREG(mode)
 
 
 def _contents(file: Path) -> bytes:
-    """All of it. A pipe without a writer is opened at once, and then waited for."""
-    found = bytearray()
-    with usable(file, "read"), open(file, "rb", buffering=0, opener=_opened) as script:
-        patient = stat.S_ISFIFO(os.fstat(script.fileno()).st_mode)
-        while len(found) <= MOST:
-            if patient and not select([script], (), (), PATIENCE)[0]:
-                raise RequestError(
-                    f"--faults {file}: nothing has come out of this pipe for {PATIENCE:g} s",
-                    expected="a script and the end of it",
-                    advice="see that somebody writes to it and closes it",
-                )
-            piece = script.read(MOST + 1 - len(found))
-            if piece == b"":
-                return bytes(found)
-            found += piece or b""  # None: another reader was quicker
-    raise RequestError(
-        f"--faults {file}: a script has at most {MOST:,} bytes",
-        expected="one fault a line",
-        advice="faults without a place, as `1%: drop`, say more in fewer lines",
-    )
-
-
-def _opened(name: str, flags: int) -> int:
-    return os.open(name, flags | getattr(os, "O_NONBLOCK", 0))
+    """The contents of a file with a script."""
+    with usable(file, "read"), file.open("rb") as script:
+        found = script.read(MOST + 1)
+    if len(found) > MOST:
+        raise RequestError(
+            f"--faults {file}: a script has at most {MOST:,} bytes",
+            expected="one fault a line",
+            advice="faults without a place, as `1%: drop`, say more in fewer lines",
+        )
+    return found
 
 
 def listed(output: Output) -> Exit:

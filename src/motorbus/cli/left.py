@@ -12,9 +12,8 @@ from motorbus.errors import MotorbusError
 from motorbus.session.robot import Robot
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
-    from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Output
     from motorbus.motion.axis import Axis
     from motorbus.motion.leaving import Leaving
@@ -28,15 +27,15 @@ NEAR_LINEAR: Final = 0.001
 
 @contextmanager
 def opened(
-    machine: Machine, axes: Sequence[str], output: Output, *, late: float, report: Callable[[object], None]
+    machine: Machine, axes: Sequence[str], output: Output, *, report: Callable[[object], None]
 ) -> Iterator[Robot]:
     """A robot whose error says how it was left; what takes its time then is announced on `output`.
 
-    Its devices may be `late` (s) from the first question on. Raises as `Robot.of`.
+    Raises as `Robot.of`.
     """
     ended: BaseException | None = None
     try:
-        with (_patient(late) if late else Robot).of(machine, axes, report=report) as robot:
+        with Robot.of(machine, axes, report=report) as robot:
             try:
                 yield robot
             except BaseException as error:
@@ -50,16 +49,6 @@ def opened(
             for note in getattr(ended, "__notes__", ()):
                 again.add_note(note)
         raise
-
-
-def _patient(late: float) -> type[Robot]:
-    class Patient(Robot):
-        def __init__(self, machine: Machine, buses: Mapping[str, Bus], axes: Mapping[str, Axis]) -> None:
-            super().__init__(machine, buses, axes)
-            for bus in buses.values():
-                bus.latency = max(late, bus.latency)
-
-    return Patient
 
 
 class _Told:

@@ -85,12 +85,8 @@ def place(robot: Robot, name: str, at: float | None) -> str:
 
 
 @contextmanager
-def robot(
-    axes: Sequence[str], options: Mapping[str, str], output: Output, *, late: float = 0.0
-) -> Iterator[InHand]:
+def robot(axes: Sequence[str], options: Mapping[str, str], output: Output) -> Iterator[InHand]:
     """These axes of the machine file, open; their buses with `options` beside those in the file.
-
-    An answer may be `late` (s), where whoever answers is a process on a busy host.
 
     Raises RequestError for what is wrong with file or options, and what opening raises.
     """
@@ -99,7 +95,7 @@ def robot(
     wanted = with_options(machine(), axes, options)
     hand = InHand(output)
     try:
-        with ExitStack() as told, opened(wanted, axes, output, late=late, report=hand.heard) as hand.robot:
+        with ExitStack() as told, opened(wanted, axes, output, report=hand.heard) as hand.robot:
             output.simulated = output.simulated or hand.robot.simulated
             for warning in hand.robot.warnings:
                 output.note(f"note: {shell_words(warning, bus=warning.partition(':')[0])}")

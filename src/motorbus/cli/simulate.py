@@ -9,14 +9,13 @@ import signal
 import time
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from cyclopts import App, Parameter
 
 from motorbus import families, session
 from motorbus.cli import faulty
 from motorbus.cli.exits import Exit
-from motorbus.cli.files import usable
 from motorbus.cli.output import Output
 from motorbus.core import units
 from motorbus.errors import RequestError
@@ -28,7 +27,6 @@ from motorbus.simulation.faults import Script, World
 from motorbus.simulation.listener import TcpListener, TcpPort, parse_endpoint
 from motorbus.simulation.mount import Mount, Place
 from motorbus.simulation.pty import PtyMaster
-from motorbus.simulation.remarks import Remarks
 from motorbus.simulation.served import check_harmless, join
 from motorbus.simulation.slcan import SlcanAdapter
 from motorbus.simulation.socketcand import SocketcandAdapter
@@ -36,7 +34,7 @@ from motorbus.simulation.socketcand import SocketcandAdapter
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from motorbus.core.family import Family, Option
+    from motorbus.core.family import Family
 
 app = App(
     name="simulate",
@@ -45,28 +43,22 @@ removes its link and its control socket. Told no way to the bus, it says which
 pseudo-terminal it has made. --tcp and --socketcand without a host bind
 127.0.0.1; there is no login. The control socket takes one order a line:
 status, power-cycle [ID], unplug ID, plug ID, set-input ID INPUT on|off,
-fault ID [NAME=VALUE …], notice ID, log [ID], faults [SCRIPT|off], help,
-and for the shaft of a FEETECH servo block ID [LOW HIGH], push ID ANGLE,
-load ID PERCENT, release ID (of a KST servo load and release).
-
-What devices remark and tell no host, such as a number out of range, is said
-on stderr with its moment, in seconds from the start; --quiet leaves it out.
+faults [SCRIPT|off], help, and for the shaft of a FEETECH servo
+block ID [LOW HIGH], push ID ANGLE, load ID PERCENT, release ID (of a KST
+servo load and release).
 
 A CAN bus is served by the slcan protocol on --link and --tcp, and may be
 served in several ways at once: what one program sends, the others see.
 
-The file of --inputs has one change on each line, as "2.5 1 on": input 1
-turns on 2.5 s after power-on.
-
 --faults takes a script of what goes wrong, one fault a line or between
-semicolons, or a file or a pipe with one, of 1 MiB at most: `exchange 17
-byte 3: drop`, `1% of bytes: corrupt`, `at 2.5 s: unplug 0.5`. `--faults
-help` lists all of them. A pipe that is silent for 10 s is an error. What
-happened is said on stderr, and at the end how to have it again and which
-of them have not happened. With --can they are refused unless that bus is
-made of programs alone: virtual, udp_multicast, or socketcan with vcan0.
+semicolons, or a file with one: `exchange 17 byte 3: drop`, `1% of bytes:
+corrupt`, `at 2.5 s: unplug 0.5`. `--faults help` lists all of them. What
+happened is printed to stderr, and at the end how to have it again and which
+of them have not happened; --quiet leaves that out. With --can they are refused
+unless that bus is made of programs alone: virtual, udp_multicast, or socketcan
+with vcan0.
 
-Whatever --switches lists may be given as a flag: --profile kst-ext.
+A quirk of the family may be given as a flag: --profile kst-ext.
 
 Examples:
 
@@ -76,16 +68,11 @@ Examples:
     motorbus simulate feetech --link /tmp/arm --broadcast-ping in_turn
     motorbus simulate kst --ids 0x25,0x26 --profile kst-ext --link /tmp/can
     motorbus simulate kst --ids 0x25 --link /tmp/can --socketcand 29536
-    motorbus simulate stepper --link /tmp/stepper --inputs buttons.txt
-    motorbus simulate stepper --link /tmp/stepper --pace --reply-fault lost
     motorbus simulate feetech --link /tmp/arm --faults "seed 1; 1%: delay 0.1"
-    motorbus simulate feetech --switches""",
+    motorbus simulate stepper --link /tmp/stepper --pace --reply-fault lost""",
 )
 
 Flag = Annotated[bool, Parameter(negative="")]
-Inputs = Annotated[
-    Path | None, Parameter(help="What happens at their inputs: a file of SECONDS INPUT on|off.")
-]
 Faults = Annotated[str | None, Parameter(help="What goes wrong: a script, a file or pipe with one, or help.")]
 Switched = Annotated[
     tuple[str, ...], Parameter(help="NAME=VALUE, how they behave where real ones differ.", negative="")
@@ -101,7 +88,6 @@ _OWN = (
     "baud",
     "bitrate",
     "control",
-    "inputs",
     "faults",
     "quiet",
     "switch",
@@ -131,20 +117,18 @@ def simulate(
     pace: Annotated[Flag, Parameter(help="Bytes and frames take their time, as on a wire.")] = False,
     baud: Annotated[str, Parameter(help="The rate of a serial line until a client sets one.")] = "",
     bitrate: Annotated[str, Parameter(help="The rate of a CAN bus until a client sets one.")] = "",
-    inputs: Inputs = None,
     control: Annotated[Path | None, Parameter(help="A local socket to make, which takes orders.")] = None,
     faults: Faults = None,
-    quiet: Annotated[Flag, Parameter(help="Do not say on stderr what they remark.")] = False,
+    quiet: Annotated[Flag, Parameter(help="Do not print to stderr which faults happened.")] = False,
     switch: Switched = (),
-    switches: Annotated[Flag, Parameter(help="List the switches of the family and end.")] = False,
     output: Annotated[Output, Parameter(parse=False)],
     **flags: Annotated[str, Parameter(help="A switch of the family, as --NAME VALUE.")],
 ) -> Exit:
     """Serve simulated devices on a pseudo-terminal or a socket."""
     output.simulated = True
     found = families.load(family)
-    if switches or faults == "help":
-        return _list(found, output) if switches else faulty.listed(output)
+    if faults == "help":
+        return faulty.listed(output)
     script = _script(faults, can, found)
     options, settings = _sorted(found, {**_switched(switch), **flags})
     simulator = found.simulator(session.parse_ids(ids), model, **options)
@@ -152,7 +136,6 @@ def simulate(
     usual: int = getattr(simulator, "usual_rate", None) or found.link.rate
     rate = asked or usual
     simulator.tune(rate)
-    _scripted(simulator, inputs, family)
     if usual != found.link.rate and found.link.kind == "bytes":
         settings["baud"] = str(rate)  # these devices ship with another rate than most of their family
     with ExitStack() as stack:
@@ -198,20 +181,15 @@ def _ready(output: Output, buses: Sequence[str], family: str, nodes: Sequence[in
 
 
 def _serve(mount: Mount, stop: int, faulted: Faulted, output: Output | None) -> None:
-    """Serve until told to stop, and say what the devices remark, if there is anything to say it on."""
+    """Serve until `stop` turns readable; print to stderr which faults happened, unless there is no output."""
     if output is None:
         mount.serve(stop)
         return
-    remarks = Remarks(mount.simulator)
     _note(output, faulted.news())
     while not mount.step(stop):
-        now = time.monotonic()
-        _note(output, (*faulted.news(), *remarks.lines(now), *faulted.remarks(now)))
-    now = time.monotonic()
-    _note(output, (*faulted.news(), *remarks.lines(now), *faulted.remarks(now)))
-    _note(
-        output, (*remarks.rest(), *faulted.rest(), *filter(None, [faulted.replay()]), *faulted.unhappened())
-    )
+        _note(output, (*faulted.news(), *faulted.remarks(time.monotonic())))
+    _note(output, (*faulted.news(), *faulted.remarks(time.monotonic())))
+    _note(output, (*faulted.rest(), *filter(None, [faulted.replay()]), *faulted.unhappened()))
 
 
 def _ended(output: Output, faulted: Faulted) -> None:
@@ -223,17 +201,6 @@ def _ended(output: Output, faulted: Faulted) -> None:
 def _note(output: Output, lines: Iterable[str]) -> None:
     for line in lines:
         output.note(line, limit=None)  # it may hold a script to be used again
-
-
-def _scripted(simulator: object, path: Path | None, family: str) -> None:
-    """Let the inputs change as this file says. Raises RequestError for a bad one, or where there are no inputs."""
-    if path is None:
-        return
-    script = getattr(simulator, "script", None)
-    if script is None:
-        raise RequestError(f"--inputs {path}: simulated {family} devices have no inputs")
-    with usable(path, "read"):
-        script(path.read_bytes().decode(errors="replace"))
 
 
 def _served(stack: ExitStack, family: Family, ways: Ways, bitrate: int) -> list[tuple[Place, str]]:
@@ -307,7 +274,9 @@ def _appended(settings: Mapping[str, str], port: str, bitrate: int) -> str:
 def _switched(texts: Sequence[str]) -> dict[str, str]:
     pairs = [text.partition("=")[::2] for text in texts]
     if not all(name and value for name, value in pairs):
-        raise RequestError(f"--switch {' '.join(texts)}: not NAME=VALUE", advice="--switches lists them")
+        raise RequestError(
+            f"--switch {' '.join(texts)}: not NAME=VALUE", expected="as broadcast-ping=in_turn"
+        )
     return dict(pairs)
 
 
@@ -330,49 +299,8 @@ def _unknown(name: str, family: str, known: Iterable[str]) -> RequestError:
     return RequestError(
         f"{family} has no switch {name!r}",
         expected=f"perhaps {' or '.join(near)}" if near else "",
-        advice=f"`motorbus simulate {family} --switches` lists them",
+        advice=f"one of {', '.join(sorted(known))}",
     )
-
-
-def _list(family: Family, output: Output) -> Exit:
-    known = {option.name: option for option in family.simulator_options()}
-    known |= {option.name: option for option in family.link.settings if option.name not in known}
-    facts = [_facts(option) for option in known.values()]
-    output.document("motorbus.switches/1", {"switches": facts})
-    output.table(f"Switches of {family.name}", *_shown(facts, folded=output.live))
-    return Exit.OK
-
-
-def _facts(option: Option) -> dict[str, Any]:
-    """An option as it is said on a command line."""
-    truth = ("no", "yes")
-    choices = truth if option.kind is bool else tuple(map(str, option.choices))
-    default = truth[bool(option.default)] if option.kind is bool else str(option.default)
-    return {
-        "name": option.name,
-        "default": default,
-        "choices": list(choices),
-        "help": option.help,
-        "source": option.source,
-    }
-
-
-def _shown(facts: Sequence[Mapping[str, Any]], *, folded: bool) -> tuple[list[str], list[list[str]]]:
-    """Columns and rows. A row is one long line for programs that look for lines, and several short ones for eyes."""
-    rows = [
-        [one["name"], one["default"], one["help"], ", ".join(one["choices"]), one["source"]] for one in facts
-    ]
-    if not folded:
-        return ["switch", "default", "what it does", "choices", "source"], rows
-    return ["switch", "what it does"], [
-        [f"{name}\n= {default}\n ", "\n".join((text, *_lines(choices, source)))]
-        for name, default, text, choices, source in rows
-    ]
-
-
-def _lines(choices: str, source: str) -> list[str]:
-    said = [f"one of {choices}"] if choices else []
-    return [*said, *([f"source: {source}"] if source else []), " "]
 
 
 @contextmanager

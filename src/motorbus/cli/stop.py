@@ -9,9 +9,8 @@ from cyclopts import App, Parameter
 from motorbus.cli import resting
 from motorbus.cli.each import each
 from motorbus.cli.exits import Exit
-from motorbus.cli.machine import machine_file, without_axes
+from motorbus.cli.machine import machine, machine_file, without_axes
 from motorbus.cli.output import Output
-from motorbus.cli.rough import beside_others, forgiving, together
 
 app = App(
     name="stop",
@@ -23,8 +22,8 @@ all that is ever known of it.
 
 By the names of a machine file: an axis, a group, or a bus, which means its
 axes in the file; with no name at all, every axis of the machine. All are
-visited, whatever happens to another: a silent device, and a name that is not
-in the file, have their line and exit code 6.
+visited, whatever happens to another: a silent device has its line and exit
+code 6. A name that is not in the file, or an error in the file, is refused.
 
 A device that accepts a stop has heard it, and no more. With --verify each is
 looked at afterwards, and what was seen is told beside its promise. One that
@@ -66,12 +65,11 @@ def stop(
     options
         Any option of the bus string, as a flag.
     """
-    with forgiving(devices) as meant:
-        unknown = list(meant.unclear.values())
-        if unknown and not meant.known:
-            raise together(unknown)
-        if not (devices or meant.known) and machine_file().path is not None:
+    words: tuple[str, ...] = devices
+    if not words and machine_file().path is not None:
+        known = machine()
+        words = tuple(known.axes or known.buses)
+        if not words:
             raise without_axes()
-        others = beside_others(unknown)
-        look = resting.look if verify else None
-        return each("stop", "stop", meant.known, options, output, dry_run=dry_run, unknown=others, look=look)
+    look = resting.look if verify else None
+    return each("stop", "stop", words, options, output, dry_run=dry_run, look=look)

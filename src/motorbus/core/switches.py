@@ -47,8 +47,7 @@ def switched(kind: type[S], family: str, given: Mapping[str, object]) -> S:
         near = get_close_matches(name, known, n=3)
         raise RequestError(
             f"a simulated {family} bus has no option {name!r}",
-            expected=f"perhaps {', '.join(near)}" if near else "",
-            advice=f"`motorbus simulate {family} --switches` lists them",
+            expected=f"perhaps {', '.join(near)}" if near else f"one of {', '.join(known)}",
         )
     return kind(**{name: _value(known[name], value) for name, value in given.items()})
 

@@ -26,13 +26,9 @@ LONGEST_LINE = 1 << 16
 TOO_LONG = f"error: an order has at most {LONGEST_LINE} bytes; nothing has changed\n".encode()
 MOST_CLIENTS = 16
 SCHEMA = "motorbus.simulator/1"
-FAULTS = "motorbus.simulator-faults/1"
-LOG = "motorbus.simulator-log/1"
-LATEST = 20
-"""Remarks of each node that `log` gives."""
 HELP = (
-    "status | power-cycle [ID] | unplug ID | plug ID | set-input ID INPUT on|off | fault ID [NAME=VALUE …] | notice ID"
-    " | block ID [LOW HIGH] | push ID ANGLE | load ID PERCENT | release ID | log [ID] | faults [SCRIPT|off] | help"
+    "status | power-cycle [ID] | unplug ID | plug ID | set-input ID INPUT on|off"
+    " | block ID [LOW HIGH] | push ID ANGLE | load ID PERCENT | release ID | faults [SCRIPT|off] | help"
 )
 
 
@@ -207,27 +203,6 @@ def _set_input(simulator: Simulator, words: list[str]) -> str:
     return "ok"
 
 
-def _fault(simulator: Simulator, words: list[str]) -> str:
-    """Of a node that has switches which can be changed, and so the method `switch(**changes)`."""
-    form = "fault ID [NAME=VALUE …]"
-    _expect(words, at_least=1, at_most=100, order=form)
-    change: Callable[..., dict[str, object]] = _able(simulator, words[0], "switch", "no faults to switch")
-    pairs = [word.partition("=")[::2] for word in words[1:]]
-    names = [name.replace("-", "_") for name, _ in pairs]
-    if not all(name and value for name, value in pairs) or len(set(names)) < len(names):
-        raise RequestError(f"the order is: {form}, each name once")
-    now = change(**dict(zip(names, (value for _, value in pairs), strict=True)))
-    return "ok" if pairs else json.dumps({"schema": FAULTS, "simulated": True, "faults": now})
-
-
-def _notice(simulator: Simulator, words: list[str]) -> str:
-    """Of a node that says something unasked, and so has the method `notice()`."""
-    _expect(words, at_least=1, at_most=1, order="notice ID")
-    say: Callable[[], None] = _able(simulator, words[0], "notice", "nothing to say unasked")
-    say()
-    return "ok"
-
-
 def _block(simulator: Simulator, words: list[str]) -> str:
     form = "block ID [LOW HIGH]"
     _expect(words, at_least=1, at_most=3, order=form)
@@ -270,20 +245,6 @@ def _quantity(text: str, quantity: str) -> float:
     return value
 
 
-def _log(simulator: Simulator, words: list[str]) -> str:
-    """Of nodes that have a `log`."""
-    _expect(words, at_most=1, order="log [ID]")
-    if words:
-        _able(simulator, words[0], "log", "no log")
-    nodes = {units.whole(words[0]): _node(simulator, words[0])} if words else simulator.nodes
-    said = [
-        {"id": id, **remark._asdict(), "at": round(remark.at, 6)}
-        for id in sorted(nodes)
-        for remark in getattr(nodes[id], "log", [])[-LATEST:]
-    ]
-    return json.dumps({"schema": LOG, "simulated": True, "remarks": said})
-
-
 def _able(simulator: Simulator, id: str, name: str, lacks: str) -> Any:
     """What this node has under a name that only some have."""
     found = getattr(_node(simulator, id), name, None)
@@ -302,13 +263,10 @@ _ORDERS: dict[str, Callable[[Simulator, list[str]], str]] = {
     "unplug": _unplug,
     "plug": _plug,
     "set-input": _set_input,
-    "fault": _fault,
-    "notice": _notice,
     "block": _block,
     "push": _push,
     "load": _load,
     "release": _release,
-    "log": _log,
     "help": _help,
 }
 

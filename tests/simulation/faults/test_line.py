@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Data
-from motorbus.errors import RequestError
 from motorbus.link.base import Delivery, Side
 from motorbus.simulation.faults import WORDS, Fault, FaultyLine, Script
 from motorbus.simulation.faults.line import BROKEN
@@ -90,17 +89,6 @@ def test_each_harm_to_a_packet(
     assert str(line.record) == f"exchange 1: {action}"
 
 
-@pytest.mark.parametrize("action", ["corrupt", "flip", "insert", "truncate"])
-def test_a_packet_without_a_byte_suffers_at_one_that_chance_takes(action: str) -> None:
-    line = asked(f"exchange 1: {action}")
-    assert (hurt := carried(line)) != WHOLE
-    (fault,) = line.record
-    assert fault.byte is not None
-    again = FaultyLine(line.record)
-    again.carry(Side.HOST, b"\x01\x02\x03", 0.5)
-    assert carried(again) == hurt
-
-
 def test_an_echo_comes_to_the_host_and_does_not_count() -> None:
     line = FaultyLine("exchange 1: echo; exchange 2: echo 2; exchange 2 byte 5: drop")
     assert line.carry(Side.HOST, b"\x01\x02\x03", 0.0) == [
@@ -114,11 +102,6 @@ def test_an_echo_comes_to_the_host_and_does_not_count() -> None:
 def test_the_nth_packet_of_an_exchange() -> None:
     line = asked("exchange 1 packet 2: drop")
     assert [carried(line), carried(line), carried(line)] == [WHOLE, [], WHOLE]
-
-
-def test_what_devices_say_before_the_host_says_anything_is_exchange_0() -> None:
-    line = FaultyLine("exchange 0 packet 2: drop")
-    assert [carried(line), carried(line)] == [WHOLE, []]
 
 
 def test_only_its_own_exchange_suffers() -> None:
@@ -135,43 +118,12 @@ def test_toward_the_device() -> None:
     assert carried(line) == WHOLE
 
 
-def test_bytes_count_through_the_whole_exchange() -> None:
-    line = asked("exchange 1 byte 7: drop")
-    assert carried(line) == WHOLE
-    assert carried(line) == [(0.0, "FF 01 02 00 FC")]
-
-
-def test_truncating_and_delaying_last_to_the_end_of_the_exchange() -> None:
-    line = asked("exchange 1 byte 4: truncate")
-    assert carried(line) == [(0.0, "FF FF 01 02")]
-    assert carried(line) == []
-    line = asked("exchange 1 byte 0: delay 0.5")
-    assert carried(line) == carried(line) == [(0.5, "FF FF 01 02 00 FC")]
-    line.carry(Side.HOST, b"\x01", 0.0)
-    assert carried(line, at=1.2) == [(0.3, "FF FF 01 02 00 FC")]  # it does not overtake what is still to come
-    assert carried(line, at=1.6) == WHOLE
-
-
 def test_a_stall_holds_both_ways() -> None:
     line = asked("exchange 1: stall 0.5")
     carried(line)
     assert line.carry(Side.HOST, b"\x01", 1.1) == [Delivery(1.5, Side.DEVICE, b"\x01")]
     assert carried(line, at=1.2) == [(0.3, "FF FF 01 02 00 FC")]
     assert line.carry(Side.HOST, b"\x01", 1.6) == [Delivery(1.6, Side.DEVICE, b"\x01")]
-
-
-def test_insert_behind_the_last_byte_happens_once() -> None:
-    line = asked("exchange 1 byte 6: insert AA")
-    assert carried(line) == [(0.0, "FF FF 01 02 00 FC AA")]
-    assert carried(line) == WHOLE
-
-
-@pytest.mark.parametrize("script", ["exchange 1 byte 6: drop", "exchange 1 byte 5: reorder"])
-def test_other_harm_behind_the_last_byte_waits_for_a_byte(script: str) -> None:
-    line = asked(script)
-    assert carried(line) == WHOLE
-    assert len(line.pending) == 1
-    assert line.fired == []
 
 
 @pytest.mark.parametrize(
@@ -189,21 +141,6 @@ def test_several_at_once_in_the_order_of_the_bytes_and_of_the_script(script: str
     line = asked(script)
     assert carried(line) == [(0.0, got)]
     assert len(line.fired) == 2
-
-
-def test_the_same_fault_twice_happens_twice() -> None:
-    line = asked("exchange 1 byte 0: insert 00; exchange 1 byte 0: insert 00")
-    assert carried(line) == [(0.0, "00 00 FF FF 01 02 00 FC")]
-    assert len(line.fired) == 2
-
-
-def test_what_waits_in_the_adapter_stays_there_while_nothing_comes() -> None:
-    line = asked("exchange 1: merge; exchange 2: drop")
-    assert carried(line) == []
-    line.carry(Side.HOST, b"\x01", 2.0)
-    assert carried(line) == []
-    line.carry(Side.HOST, b"\x01", 3.0)
-    assert carried(line, at=3.0) == [(0.0, "FF FF 01 02 00 FC FF FF 01 02 00 FC")]
 
 
 @pytest.mark.parametrize(
@@ -266,34 +203,6 @@ def test_every_packet_at_a_hundred_percent() -> None:
     line = FaultyLine("100%: duplicate")
     line.carry(Side.HOST, b"\x01", 0.0)
     assert carried(line) == carried(line) == WHOLE * 2
-
-
-def test_a_fault_that_is_taken_out_leaves_the_chance_of_the_others() -> None:
-    def delays(script: str) -> list[str]:
-        line = FaultyLine(script)
-        for exchange in range(300):
-            line.carry(Side.HOST, b"\x01", float(exchange))
-            line.carry(Side.DEVICE, REPLY, float(exchange))
-        return [str(one) for one in line.record if one.action == "delay"]
-
-    assert delays("seed 5; 10%: drop; 10%: delay 0.1-0.9") == delays("seed 5; 10%: delay 0.1-0.9") != []
-
-
-def test_only_the_latest_are_kept_when_asked() -> None:
-    line = FaultyLine("100%: duplicate", most=10)
-    for exchange in range(100):
-        line.carry(Side.HOST, b"\x01", float(exchange))
-        line.carry(Side.DEVICE, REPLY, float(exchange))
-    assert line.count == 100
-    assert 10 <= len(line.fired) < 20
-    assert line.fired[-1].fault == "exchange 100: duplicate"
-
-
-def test_what_happens_to_a_bus_needs_one() -> None:
-    for name, word in WORDS.items():
-        if word.world:
-            with pytest.raises(RequestError, match="there is none"):
-                FaultyLine([Fault(1, None, name, seconds=1.0, node=1)])
 
 
 def test_what_is_for_the_text_of_an_adapter_is_for_another_line() -> None:

@@ -23,7 +23,6 @@ from motorbus.cli.stepper.events import say
 from motorbus.cli.stepper.files import app
 from motorbus.cli.stepper.offers import COMMANDS, KEPT, planned, sample, written
 from motorbus.cli.stepper.rehearsal import as_written
-from motorbus.cli.stepper.showing import demo
 
 __all__ = [
     "COMMANDS",
@@ -33,7 +32,6 @@ __all__ = [
     "characterise",
     "convert",
     "copies",
-    "demo",
     "inputs",
     "manual",
     "moves",

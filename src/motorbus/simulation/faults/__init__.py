@@ -2,13 +2,12 @@
 
 A script is text (`parse`); `FaultyLine` stands between the simulator and whatever serves it and does what the script
 says; what happens to the bus and its devices as a whole does so in a `World`. What has happened is a script by position
-again, which `shrink` makes small. There is no way to put any of this in front of a real device.
+again. There is no way to put any of this in front of a real device.
 """
 
 from motorbus.simulation.faults.fault import ANY, Fault
 from motorbus.simulation.faults.line import FaultyLine
 from motorbus.simulation.faults.script import Script, parse
-from motorbus.simulation.faults.shrink import shrink
 from motorbus.simulation.faults.struck import strike
 from motorbus.simulation.faults.words import WORDS, Word
 from motorbus.simulation.faults.world import Port, World
@@ -23,6 +22,5 @@ __all__ = [
     "Word",
     "World",
     "parse",
-    "shrink",
     "strike",
 ]
