@@ -37,7 +37,6 @@ def test_an_option_of_a_bus_is_one(bench: Bench, run: Run) -> None:
         "calibrate arm#1 -5",
         "set-id arm#1 2 -5",
         "recover arm -5",
-        "stepper home stage -5",
     ],
 )
 def test_a_word_too_many_is_one_clear_line(words: str, bench: Bench, run: Run) -> None:

@@ -40,7 +40,7 @@ Examples:
     motorbus demo --output demo.svg --duration 4
     motorbus demo --family feetech --ids 1-3
     motorbus demo --family kst
-    motorbus demo --family stepper --output run.png
+    motorbus demo --family stepper
     motorbus demo --json""",
 )
 
@@ -82,12 +82,12 @@ def demo(
     if not family:
         nine(duration, output_, output)
     elif (own := faces.offer(family, "demo")) is not None:
-        _shown_by_its_face(own, family, duration, output_, output)
+        _shown_by_its_face(own, family, duration, output)
     else:
         waved(family, ids or "1-6", duration, output_, output)
     return Exit.OK
 
 
-def _shown_by_its_face(own: Any, family: str, duration: float, picture: Path, output: Output) -> None:
+def _shown_by_its_face(own: Any, family: str, duration: float, output: Output) -> None:
     with served(family, "1", output) as bus, opened(bus, {}, output) as opening:
-        own(opening, duration, picture, output)
+        own(opening, duration, output)

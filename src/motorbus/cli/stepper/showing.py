@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from motorbus.cli.files import usable
 from motorbus.cli.plain import plain
 from motorbus.cli.stepper.runs import heard
 from motorbus.cli.target import face
 from motorbus.core.steps import Progress
-from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.stepper import Program
 from motorbus.families.stepper.driver import running, writing
 
@@ -53,8 +50,8 @@ def program(seconds: float) -> Program:
     return Program.parse(_PROGRAM.format(passes=max(1, int(seconds / once.estimate().seconds))))
 
 
-def demo(bus: Bus, seconds: float, picture: Path, output: Output) -> None:
-    """Write a program that takes so long, run it to its end, and draw what it was to do."""
+def demo(bus: Bus, seconds: float, output: Output) -> None:
+    """Write a program that takes so long, and run it to its end."""
     one, feed = face(bus, 1), program(seconds)
     identity = one.identify()
     output.text(f"found: {identity.model}, known by {identity.details['known_by']}")
@@ -66,39 +63,12 @@ def demo(bus: Bus, seconds: float, picture: Path, output: Output) -> None:
         ran = bus.run(running.run(one, PROJECT), report=partial(_heard, output, bar))
     took = "" if ran.seconds is None else f" in {ran.seconds:.2f} s"
     output.text(f"project {PROJECT} {ran.outcome.value}{took}: {ran.why}")
-    drawn = _drawn(picture, feed, took, output)
     facts = {"identity": plain(identity), "written": str(written), "outcome": ran.outcome.value}
-    facts |= {"seconds": ran.seconds, "predicted": plain(feed.estimate().data()), "picture": drawn}
+    facts |= {"seconds": ran.seconds, "predicted": plain(feed.estimate().data())}
     output.document("motorbus.stepper.demo/1", facts)
-    if drawn:
-        output.text(f"picture: {drawn} (simulated)")
 
 
 def _heard(output: Output, bar: Bar, event: object) -> None:
     if isinstance(event, Progress):
         bar.advance(event.done, event.total, event.what)
     heard(False, output, event, bar)
-
-
-def _drawn(path: Path, feed: Program, took: str, output: Output) -> str | None:
-    from motorbus import plot
-
-    shown = feed.picture()
-    spans = [plot.Span(*span) for span in shown.spans]
-    try:
-        with usable(path, "written"):
-            plot.sequence(
-                path,
-                shown.times,
-                shown.curves,
-                shown.lanes,
-                spans,
-                title=f"{feed.name}: as predicted, completed{took}",
-                remark="simulated",
-            )
-    except RequestError:
-        raise
-    except MotorbusError as missing:
-        output.note(str(missing))
-        return None
-    return str(path)
