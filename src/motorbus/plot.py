@@ -23,8 +23,6 @@ _GRID: Final = "#e6e9ec"
 _SHADE: Final = "#eceff2"
 # Told apart by readers with any colour vision, and on a dark or a light page.
 _COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-_ROOM: Final = 1.3
-"""Of the width of a label: so wide is the span that it stands above."""
 _MISSING: Final = "matplotlib is not installed, so no picture can be drawn"
 
 
@@ -146,87 +144,11 @@ def _draw_key(figure: Any, spans: Sequence[Span], *, estimated: bool) -> None:
 
 
 class Span(NamedTuple):
-    """A stretch of time with a name; a `waiting` one is nobody's doing and as long as somebody likes."""
+    """A stretch of time with a name."""
 
     begin: float
     end: float
     name: str
-    waiting: bool = False
-
-
-def sequence(
-    path: Path | str,
-    times: Sequence[float],
-    curves: Mapping[str, Sequence[float]],
-    lanes: Mapping[str, Sequence[bool]],
-    spans: Sequence[Span] = (),
-    *,
-    title: str = "",
-    remark: str = "",
-) -> None:
-    """Draw what a program does over time: a panel for each curve, what is on or off as lanes, its steps as spans.
-
-    `times` in s, and each curve (its name is the label of its axis, unit and all) and lane has one value for each. The
-    suffix of `path` chooses the format (.png, .svg, .pdf). Raises RequestError when the data do not fit together and
-    MotorbusError when matplotlib is not installed.
-    """
-    columns = [*curves.values(), *lanes.values()]
-    if not curves or any(len(column) != len(times) for column in columns):
-        raise RequestError(
-            "the data do not fit together",
-            expected="at least one curve, and one value in each curve and lane for each time",
-        )
-    heights = [*([3.0] * len(curves)), *([0.5 + 0.3 * len(lanes)] if lanes else [])]
-    figure, axes = _figure(title, remark, heights, height=2.0 + 0.65 * sum(heights), pad=16)
-    for axis, (name, values) in zip(axes, curves.items(), strict=False):
-        axis.plot(times, values, color=_COLOURS[0], linewidth=1.6)
-        axis.axhline(0, color=_FAINT, linewidth=0.8)
-        axis.set_ylabel(name, fontsize=10, color=_INK)
-        axis.margins(y=0.12)
-    if lanes:
-        _draw_lanes(axes[-1], times, lanes)
-    _draw_spans(axes, spans)
-    axes[-1].set_xlabel("time (s)", fontsize=10, color=_INK)
-    if len(times) > 1:
-        axes[-1].set_xlim(times[0], times[-1])
-    figure.align_ylabels()
-    _name_spans(figure, axes[0], spans)
-    _saved(figure, path)
-
-
-def _draw_lanes(axes: Any, times: Sequence[float], lanes: Mapping[str, Sequence[bool]]) -> None:
-    for row, values in enumerate(lanes.values()):
-        base, top = -row - 0.35, -row + 0.35
-        axes.hlines(base, times[0], times[-1], color=_GRID, linewidth=0.8)
-        levels = [top if value else base for value in values]
-        colour = _COLOURS[1 + row % (len(_COLOURS) - 1)]
-        axes.fill_between(times, base, levels, color=colour, alpha=0.75, linewidth=0)
-    axes.set_yticks([-row for row in range(len(lanes))], list(lanes))
-    axes.set_ylim(0.6 - len(lanes), 0.6)
-    axes.grid(visible=False, axis="y")
-    axes.tick_params(axis="y", length=0)
-
-
-def _draw_spans(axes: Sequence[Any], spans: Sequence[Span]) -> None:
-    for number, span in enumerate(spans):
-        for axis in axes:
-            if span.waiting:
-                axis.axvspan(span.begin, span.end, facecolor="#fff3d6", edgecolor="none", zorder=0)
-            elif number % 2:
-                axis.axvspan(span.begin, span.end, facecolor="#f3f5f7", edgecolor="none", zorder=0)
-
-
-def _name_spans(figure: Any, axes: Any, spans: Sequence[Span]) -> None:
-    """Write the name of each span above it where there is room, for else it would run into the next one."""
-    figure.draw_without_rendering()  # only then is it known how wide things are
-    for span in spans:
-        label = axes.text(
-            (span.begin + span.end) / 2, 1.0, span.name, transform=axes.get_xaxis_transform(),
-            ha="center", va="bottom", fontsize=7.5, color=_FAINT,
-        )  # fmt: skip
-        (begin, _), (end, _) = axes.transData.transform([(span.begin, 0.0), (span.end, 0.0)])
-        if end - begin < _ROOM * label.get_window_extent().width:
-            label.remove()
 
 
 def _figure(

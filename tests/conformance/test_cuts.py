@@ -1,8 +1,8 @@
 """A command that is cut off at any moment leaves its device in the old or the new state, and within reach.
 
 It is cut by loss of supply, process death, interrupt, cancellation and a lost link, at every frame and in every store,
-once and twice. `make test` takes every single cut of each command but two long ones (`home` and `characterise` of the
-stepper), and a choice for the other models, quirks and arguments of a command; `make soak` takes all, at most `MOST`.
+once and twice. `make test` takes every single cut of each command but a long one (`home` of the stepper), and a choice
+for the other models, quirks and arguments of a command; `make soak` takes all, at most `MOST`.
 """
 
 from __future__ import annotations

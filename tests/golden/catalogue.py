@@ -470,7 +470,6 @@ STEPPER: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("run_once"), "", ALIVE),
     (call("home", deadline=8.0), "", ALIVE),
     (call("home", deadline=8.0, velocity=12.0), "velocity", ALIVE),
-    (call("characterise"), "", ALIVE),
     (call("recover", "jog", NO_FACTS), "no_facts", ALIVE),
     (call("select_project", 2, 3), "", ALIVE),
     (call("select_project", 5, 1), "impossible", ALIVE),
@@ -510,8 +509,6 @@ def _stepper() -> list[Case]:
         case = Case("stepper", "", one, label, before, options=options, timed=("seconds", "measured"))
         if one.name == "watch_inputs":
             case = case._replace(polls=True)
-        if one.name == "characterise":
-            case = case._replace(keep="none")  # about 1,700 frames whose number depends on timing
         cases.append(case)
     return cases
 

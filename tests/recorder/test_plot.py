@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -16,36 +15,6 @@ from motorbus.errors import MotorbusError, RequestError
 TIMES = [0.0, 0.5, 1.0]
 GOALS: list[list[float]] = [[0.0, 0.5, 1.0], [1.0, 0.5, 0.0]]
 PRESENTS: list[list[float | None]] = [[0.0, 0.4, 0.9], [1.0, None, 0.1]]
-
-
-# --- a program over time -------------------------------------------------------------------------------------------
-
-CURVES = {"position (mm)": [0.0, 5.0, 5.0], "speed (rpm)": [0.0, 60.0, 0.0]}
-LANES = {"gripper": [False, True, True], "lamp": [True, True, False]}
-SPANS = [plot.Span(0.0, 0.5, "1"), plot.Span(0.5, 1.0, "wait", waiting=True)]
-
-
-def test_a_sequence_names_curves_lanes_and_spans(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import matplotlib as mpl
-
-    monkeypatch.setitem(mpl.rcParams, "svg.fonttype", "none")
-    plot.sequence(tmp_path / "p.svg", TIMES, CURVES, LANES, SPANS, title="Feed", remark="predicted")
-    text = (tmp_path / "p.svg").read_text(encoding="utf-8")
-    for word in (*CURVES, *LANES, "wait", "Feed", "predicted", "time (s)"):
-        assert word in text
-
-
-def test_a_sequence_is_a_png_of_its_height(tmp_path: Path) -> None:
-    for name, lanes in (("few", {}), ("many", {f"input {n}": [True] * 3 for n in range(5)})):
-        plot.sequence(tmp_path / f"{name}.png", TIMES, CURVES, lanes)
-    few, many = ((tmp_path / f"{name}.png").read_bytes() for name in ("few", "many"))
-    assert few.startswith(b"\x89PNG\r\n\x1a\n")
-    assert int.from_bytes(few[20:24], "big") < int.from_bytes(many[20:24], "big")
-
-
-def test_one_sample_of_a_sequence_is_enough(tmp_path: Path) -> None:
-    plot.sequence(tmp_path / "one.png", [0.0], {"x": [1.0]}, {"on": [True]})
-    assert (tmp_path / "one.png").stat().st_size > 1000
 
 
 def drawn(monkeypatch: pytest.MonkeyPatch, draw: Callable[[], None]) -> Any:
@@ -63,54 +32,6 @@ def drawn(monkeypatch: pytest.MonkeyPatch, draw: Callable[[], None]) -> Any:
     draw()
     return figures[0]
 
-
-@pytest.mark.parametrize(
-    "lengths", [(1.0, 1.0, 1.0, 1.0, 50.0), (50.0, 2.0, 0.1, 2.0, 3.0), (1.0,), (1.0,) * 90]
-)
-def test_names_of_spans_never_run_into_each_other(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lengths: tuple[float, ...]
-) -> None:
-    ends = list(accumulate(lengths))
-    names = ("9", "wait", "10", "a long name")
-    spans = [
-        plot.Span(end - long, end, names[n % 4], n % 4 == 1)
-        for n, (end, long) in enumerate(zip(ends, lengths, strict=True))
-    ]
-    figure = drawn(
-        monkeypatch,
-        lambda: plot.sequence(tmp_path / "p.png", [0.0, ends[-1]], {"x": [0.0, 1.0]}, {}, spans),
-    )
-    boxes = [label.get_window_extent() for label in figure.axes[0].texts]
-    assert all(one.x1 + 2 < other.x0 for one, other in pairwise(boxes))
-    assert all(figure.axes[0].bbox.x0 <= box.x0 and box.x1 <= figure.axes[0].bbox.x1 for box in boxes)
-    assert "9" in [label.get_text() for label in figure.axes[0].texts] or len(lengths) > 50
-
-
-@pytest.mark.parametrize(("curves", "lanes"), [({}, LANES), ({"x": [1.0]}, {}), (CURVES, {"on": [True]})])
-def test_a_sequence_that_does_not_fit_together_is_refused(
-    tmp_path: Path, curves: dict[str, list[float]], lanes: dict[str, list[bool]]
-) -> None:
-    with pytest.raises(RequestError, match="do not fit"):
-        plot.sequence(tmp_path / "x.png", TIMES, curves, lanes)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_program_is_drawn_as_its_file_names_things(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import matplotlib as mpl
-
-    from motorbus.families.stepper import Program
-
-    monkeypatch.setitem(mpl.rcParams, "svg.fonttype", "none")
-    program = Program.load(str(Path(__file__).parents[2] / "examples" / "pick_and_place.toml"))
-    picture = program.picture(wait=1.5)
-    spans = [plot.Span(*span) for span in picture.spans]
-    plot.sequence(tmp_path / "p.svg", picture.times, picture.curves, picture.lanes, spans, title=program.name)
-    text = (tmp_path / "p.svg").read_text(encoding="utf-8")
-    for word in ("position (mm)", "speed (rpm)", "gripper", "lamp", "tray", "part", "Pick and place"):
-        assert word in text
-
-
-# --- the axes of a machine --------------------------------------------------------------------------------------------
 
 NINE = {
     f"axis-{number}": plot.Track(GOALS[0], PRESENTS[number % 2], "mm" if number == 8 else "deg")

@@ -62,12 +62,6 @@ def test_readings_are_switches_by_their_names() -> None:
 @pytest.mark.parametrize(
     ("command", "flag", "says", "hides"),
     [
-        (
-            "show",
-            "o",
-            "perhaps --output or --output-zero or --outputs-on-stop; one of --output, --wait, --passes,",
-            "--busy",
-        ),
         ("check", "unatended", "perhaps --unattended; one of --highest, --longest,", "--zero-distance"),
         ("order", "colour", "one of --dump-order; or a switch: --seg-loop, --proj-loop", "--ramp"),
         (
@@ -102,7 +96,7 @@ def test_a_dump_with_the_highest_byte_first_is_read_as_such(tmp_path: Path) -> N
         loaded(path, "middle")
 
 
-@pytest.mark.parametrize("command", ["check", "estimate", "order", "show", "convert"])
+@pytest.mark.parametrize("command", ["check", "estimate", "order", "show"])
 def test_every_command_takes_the_order_of_a_dump(run: Run, tmp_path: Path, command: str) -> None:
     text, big, little = (tmp_path / name for name in ("same.toml", "same.bin", "same.img"))
     program = Program.from_dump(DUMP_B, name="same")
@@ -115,13 +109,3 @@ def test_every_command_takes_the_order_of_a_dump(run: Run, tmp_path: Path, comma
     ]
     assert [" ".join(one.split()) for one in told] == [" ".join(told[0].split())] * 3
     assert told[0]
-
-
-def test_a_dump_is_written_and_explained_in_that_order_too(run: Run, tmp_path: Path) -> None:
-    big = tmp_path / "big.bin"
-    words = ("stepper", "convert", EXAMPLE, "--to", "dump", "--dump-order", "big", "--output", str(big))
-    assert run(*words).code == 0
-    assert big.read_bytes() == Program.load(EXAMPLE).dump("big")
-    ran = run("decode", "--family", "stepper", "--dump-order", "big", "--json", big.read_bytes().hex())
-    parts = {part["name"]: part["meaning"] for part in ran.document["frames"][0]["parts"]}
-    assert (ran.code, parts["step_3_distance"]) == (0, "120000 units")

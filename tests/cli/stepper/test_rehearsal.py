@@ -52,11 +52,7 @@ def test_what_cannot_be_said_is_not() -> None:
         "jog BUS#1=60rpm --seconds 1 --yes",
         "stepper write EXAMPLE BUS --yes",
         "write BUS#1 step_1_delay=500ms step_1_speed=60rpm --yes",
-        "stepper clear-project BUS --project 1 --expert --yes",
-        "stepper select-project BUS --project 1",
-        "stepper run-once BUS --yes",
         "stepper run BUS --project 1 --stop-first --yes",
-        "stepper jog-forward BUS --seconds 1 --yes",
         "stop BUS#1",
     ],
 )

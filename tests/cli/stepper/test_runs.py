@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -10,7 +9,7 @@ import pytest
 import motorbus
 from motorbus.core.request import Data
 from tests.cli.conftest import Run
-from tests.cli.stepper.conftest import Line, line_of, press
+from tests.cli.stepper.conftest import Line, press
 
 pytestmark = pytest.mark.usefixtures("state_folder")
 
@@ -83,32 +82,11 @@ def test_far_ways_ask_and_what_is_refused_is_refused_before(run: Run, line: Line
     assert line.orders() == []
 
 
-def test_starting_does_not_wait(run: Run, line: Line) -> None:
-    assert run("stepper", "start-project", line.url, "--project", "1").code == 8
-    ran = run("stepper", "start-project", line.url, "--project", "1", "--yes", "--json")
-    assert (ran.code, ran.document["accepted"]) == (0, True)
-    assert line.simulation[1].status()["project"] == 1
-
-
 def test_a_dry_run_reads_and_starts_nothing(run: Run, line: Line) -> None:
     ran = run("stepper", "run", line.url, "--project", "1", "--stop-first", "--dry-run", "--json")
     sent = [one["data"][6:11] for one in ran.document["withheld"]]
     assert sent == ["5E 00", "03 0D", "4E 01"]
     assert line.orders() == []
-
-
-def test_a_profile_changes_what_is_predicted(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    profile = tmp_path / "ours.toml"
-    profile.write_text('format = 1\n[settled]\nramp = "pulse"\n', encoding="utf-8")
-    with motorbus.simulate("stepper", ramp="pulse") as simulation:
-        line = line_of(simulation, monkeypatch)
-        words = ("stepper", "run", line.url, "--project", "1", "--yes", "--json", "--profile", str(profile))
-        found = run(*words).document
-    assert found["predicted"]["seconds"] == pytest.approx(1.8212, abs=1e-3)
-    assert found["predicted"]["settled_by"] == "ours.toml"
-    assert found["seconds"] == pytest.approx(1.8212, rel=0.02)
 
 
 @pytest.mark.parametrize(
@@ -121,8 +99,6 @@ def test_a_profile_changes_what_is_predicted(
         "run BUS --project 1 --timeout soon",
         "run BUS --project 1 --watch 6",
         "run BUS --project 1 --endless",
-        "run BUS --project 1 --profile not-there.toml",
-        "start-project BUS --project 0",
     ],
 )
 def test_bad_input_sends_nothing(words: str, run: Run, line: Line) -> None:

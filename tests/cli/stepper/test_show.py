@@ -1,4 +1,4 @@
-"""A program step by step, and its picture."""
+"""A program step by step."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_every_step_is_a_row(run: Run) -> None:
 def test_the_plan_is_the_document(run: Run) -> None:
     document = run("stepper", "show", EXAMPLE, "--json").document
     assert document["schema"] == "motorbus.stepper.plan/1"
-    assert (document["name"], len(document["steps"]), document["picture"]) == ("Pick and place", 10, None)
+    assert (document["name"], len(document["steps"])) == ("Pick and place", 10)
     assert document["file"] == EXAMPLE
 
 
@@ -45,9 +45,6 @@ def test_several_are_shown_one_after_the_other(run: Run, tmp_path: Path) -> None
         ("motorbus.stepper.plan/1", "Pick and place"),
         ("motorbus.stepper.plan/1", "Other"),
     ]
-    ran = run("stepper", "show", EXAMPLE, str(other), "--output", str(tmp_path / "two.png"))
-    assert (ran.code, ran.out) == (2, "")
-    assert "one picture of 2 programs" in ran.err
 
 
 def test_pulses_that_are_carried_are_a_range(run: Run, tmp_path: Path) -> None:
@@ -58,50 +55,10 @@ def test_pulses_that_are_carried_are_a_range(run: Run, tmp_path: Path) -> None:
     assert "533 to" not in run("stepper", "show", str(path)).out
 
 
-@pytest.mark.parametrize("suffix", ["png", "svg"])
-def test_it_is_drawn(run: Run, tmp_path: Path, suffix: str) -> None:
-    picture = tmp_path / f"feed.{suffix}"
-    ran = run("stepper", "show", EXAMPLE, "--output", str(picture), "--wait", "2")
-    assert ran.code == 0, ran.err
-    assert ran.out.endswith(f"drawn: {picture}\n")
-    assert picture.stat().st_size > 10_000
-
-
 def test_where_a_pass_ends_is_said(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "walk.toml"
     path.write_text(file(top="repeat = 2"), encoding="utf-8")
     assert "a pass ends +10000 units from where it began" in run("stepper", "show", str(path)).out
-
-
-def test_of_an_endless_program_it_says_how_much_is_drawn(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    import matplotlib as mpl
-
-    monkeypatch.setitem(mpl.rcParams, "svg.fonttype", "none")
-    path, picture = tmp_path / "on.toml", tmp_path / "on.svg"
-    path.write_text(file(top='repeat = "endless"'), encoding="utf-8")
-    for passes, says in (("1", "1 pass of an endless program"), ("3", "3 passes of an endless program")):
-        ran = run("stepper", "show", str(path), "--output", str(picture), "--passes", passes)
-        assert ran.out.endswith(f"drawn: {picture}: {says}\n")
-        assert f"predicted: {says}" in picture.read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (("--wait", "-1"), "error: --wait -1 is not possible\n  expected: 0 to 1000000 s\n"),
-        (("--wait", "nan"), "error: --wait nan is not possible"),
-        (("--passes", "0"), "error: --passes 0 is not possible\n  expected: 1 or more\n"),
-        (("--passes", "-2"), "error: --passes -2 is not possible\n  expected: 1 or more\n"),
-        (("--output", "/nowhere/at/all.png"), "/nowhere/at/all.png cannot be written"),
-        (("--o", "p.png"), "show: there is no --o\n  expected: perhaps --output"),
-    ],
-)
-def test_what_cannot_be_ends_with_2(run: Run, words: tuple[str, ...], says: str) -> None:
-    ran = run("stepper", "show", EXAMPLE, *words)
-    assert (ran.code, ran.out) == (2, "")
-    assert says in ran.err
 
 
 @pytest.mark.parametrize("command", ["show", "estimate"])
@@ -116,10 +73,3 @@ def test_a_step_that_never_ends_is_a_document_too(run: Run, tmp_path: Path, comm
     told = ran.document["estimate"] if command == "show" else ran.document["estimates"][0]
     assert told["seconds"] is None
     assert "never ends: step 1" in run("stepper", command, str(endless), "--zero-distance", "endless").out
-
-
-def test_a_kind_of_picture_that_nobody_draws_is_refused(run: Run, tmp_path: Path) -> None:
-    ran = run("stepper", "show", EXAMPLE, "--output", str(tmp_path / "z.txt"))
-    assert ran.code == 2
-    assert "a name that ends in .png, .svg, .pdf" in ran.err
-    assert not list(tmp_path.iterdir())

@@ -221,7 +221,6 @@ def test_what_was_left_to_itself_is_not_forgotten() -> None:
         lambda device: device.jog_reverse(1.0),
         lambda device: device.run(1),
         lambda device: device.start_project(1),
-        lambda device: device.characterise(),
     )
     for other in others:
         line = Line1(LEFT)

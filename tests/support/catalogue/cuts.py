@@ -247,7 +247,6 @@ STEPPER = [
     borrow("move_by", -tau, options={"velocity": tau}, pairs=50),
     borrow("home", options=HOMING, quirks=AT_HOME, then=Call("jog", (tau, 0.5)), cuts=40, pairs=50),
     borrow("run", 1, guarded=False, pairs=50),
-    borrow("characterise", cuts=1),
     edit("write_project", Program(project=WRITTEN), atomic=True, restart=1, pairs=50),
     edit("write_project", Program(project=WRITTEN), name="-relabel", quirks=STORED_VIEW, cuts=20),
     edit("clear", 2, atomic=True, pairs=50),

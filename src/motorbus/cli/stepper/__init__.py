@@ -1,4 +1,4 @@
-"""What only the stepper controller can do: programs checked, timed and drawn, the commands of its manual, whole jobs.
+"""What only the stepper controller can do: programs checked and timed, projects, runs, inputs and outputs.
 
 The only face that knows this family. `app` has the commands, each file some of them; the rest is what common commands
 use, see `motorbus.cli.faces`.
@@ -7,12 +7,8 @@ use, see `motorbus.cli.faces`.
 from __future__ import annotations
 
 from motorbus.cli.stepper import (
-    characterise,
-    convert,
     copies,
     inputs,
-    manual,
-    moves,
     programs,
     projects,
     runs,
@@ -29,12 +25,8 @@ __all__ = [
     "KEPT",
     "app",
     "as_written",
-    "characterise",
-    "convert",
     "copies",
     "inputs",
-    "manual",
-    "moves",
     "planned",
     "programs",
     "projects",

@@ -16,11 +16,10 @@ from motorbus.cli.stepper.events import say
 from motorbus.cli.stepper.files import NAME
 from motorbus.cli.target import face, opened, target
 from motorbus.cli.wording import in_words_of_the_shell
-from motorbus.core.steps import Exclusive, Progress, discard
+from motorbus.core.steps import Progress, discard
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.stepper import FAMILY, Controller
 from motorbus.families.stepper.driver import Node
-from motorbus.families.stepper.driver.editing import refuse_while_lent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -55,22 +54,6 @@ def verb(name: str, *args: Any, **values: Any) -> Callable[[Controller], Runnabl
     """A verb of the controller with what it gets, to be carried out on one."""
     function = getattr(Controller, name).function
     return lambda one: function(one, *args, **values)
-
-
-async def unless_lent(one: Node, name: str, orders: Runnable[None]) -> None:
-    """Carry these out, with nobody else on the bus; RequestError while a motion that was cut off has borrowed anything.
-
-    For the commands that are one frame: their verbs do not ask, for a motion sends them itself.
-    """
-
-    async def both() -> None:
-        try:
-            await refuse_while_lent(one, name)
-            await orders
-        finally:
-            discard(orders)
-
-    return await Exclusive(both())
 
 
 def carried_out(

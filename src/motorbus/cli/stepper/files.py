@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 from cyclopts import App, Parameter
 
 from motorbus.cli.exits import Exit
 from motorbus.cli.files import usable
 from motorbus.cli.output import Output
-from motorbus.cli.stepper.profiles import how_of
 from motorbus.core.switches import options, switched
 from motorbus.errors import RequestError
 from motorbus.families.stepper import Behaviour, Program
@@ -49,7 +47,7 @@ Readings = Annotated[
     str,
     Parameter(
         help="How a question that the manual leaves open is taken: --ramp pulse, --rounding carry, --seg-loop extra "
-        "and the other switches of the simulator that concern a run. --profile FILE takes what `characterise` found."
+        "and the other switches of the simulator that concern a run."
     ),
 ]
 
@@ -109,24 +107,15 @@ def each(files: tuple[Path, ...], order: str, output: Output) -> tuple[list[tupl
 
 
 def reading(said: dict[str, str], command: str) -> Behaviour:
-    """How a controller is taken to be, by the switches given to this command, and for the rest by a profile.
+    """How a controller is taken to be, by the switches given to this command.
 
     Raises RequestError, with what the command has, for a flag that there is not, and for an impossible value.
     """
     known = {option.name for option in options(Behaviour)}
     given = {name.replace("-", "_"): value for name, value in said.items()}
-    profile = given.pop("profile", "")
     if unknown := sorted(given.keys() - known):
         raise _unknown(_flag(unknown[0]), command)
-    told = switched(Behaviour, NAME, given)
-    settled: dict[str, Any] = {name: getattr(told, name) for name in given}
-    return replace(how_of(Path(profile)), **settled) if profile else told
-
-
-def settler(said: dict[str, str]) -> Path | None:
-    """The profile that says how the acceleration is meant, unless a switch says it otherwise."""
-    own = {"ramp", "ramp-tick-ms", "ramp_tick_ms"} & said.keys()
-    return Path(said["profile"]) if said.get("profile") and not own else None
+    return switched(Behaviour, NAME, given)
 
 
 def _unknown(flag: str, command: str) -> RequestError:

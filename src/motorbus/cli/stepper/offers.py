@@ -11,19 +11,12 @@ if TYPE_CHECKING:
     from motorbus.families.stepper import Controller, Written
 
 COMMANDS: Final = {
-    "select()": "`motorbus stepper select-project`",
-    "save()": "`motorbus stepper save-project`",
-    "clear()": "`motorbus stepper clear-project`",
     "write_project()": "`motorbus stepper write`",
     "backup()": "`motorbus stepper backup`",
     "restore()": "`motorbus stepper restore`",
     "run()": "`motorbus stepper run`",
-    "start_project()": "`motorbus stepper start-project`",
     "jog()": "`motorbus jog`",
-    "jog_forward()": "`motorbus stepper jog-forward`",
-    "jog_reverse()": "`motorbus stepper jog-reverse`",
     "move_by()": "`motorbus move BUS#1+=ANGLE`",
-    "run_once()": "`motorbus stepper run-once`",
     "home()": "`motorbus home`",
     "set_output()": "`motorbus stepper set-output`",
     "read_input()": "`motorbus stepper read-input`",

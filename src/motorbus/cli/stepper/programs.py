@@ -8,8 +8,7 @@ from typing import Any
 from motorbus.cli.exits import Exit
 from motorbus.cli.output import Output
 from motorbus.cli.parameters import Flag, Silent
-from motorbus.cli.stepper.files import CLEARED, DumpOrder, File, Readings, app, each, loaded, reading, settler
-from motorbus.cli.stepper.profiles import settled
+from motorbus.cli.stepper.files import CLEARED, DumpOrder, File, Readings, app, each, loaded, reading
 from motorbus.errors import RequestError
 from motorbus.families.stepper import Conditions, Finding, Plan
 from motorbus.families.stepper.table import Project
@@ -118,7 +117,7 @@ def _before(path: Path | None, order: str) -> Project | None:
 @app.command(
     help_epilogue="""What an operator takes at an input nobody knows: waits are counted. The
 band is over the readings of the acceleration, of which the manual does not
-say per what it is; a profile that settles it leaves no band.
+say per what it is.
 
 Examples:
 
@@ -129,8 +128,7 @@ def estimate(*files: File, dump_order: DumpOrder = "little", output: Silent, **r
     """Say how long a program takes."""
     how = reading(readings, "estimate")
     programs, worst = each(files, dump_order, output)
-    by = settler(readings)
-    found = [(file, program, settled(program.estimate(how), by)) for file, program in programs]
+    found = [(file, program, program.estimate(how)) for file, program in programs]
     facts = [
         {"file": str(file), "name": program.name, **one.data(), "text": str(one)}
         for file, program, one in found

@@ -1,4 +1,4 @@
-"""`motorbus stepper run|start-project`: a stored project started, and its end waited for."""
+"""`motorbus stepper run`: a stored project started, and its end waited for."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.plain import plain
 from motorbus.cli.stepper.controller import BusName, BusOption, ProjectNumber, carried_out, numbers_in, verb
 from motorbus.cli.stepper.files import app
-from motorbus.cli.stepper.profiles import ProfileFile, how_of, settled
 from motorbus.cli.target import face
 from motorbus.core import units
 from motorbus.errors import Interrupted, MotorbusError, NoReply, OutcomeUnknown
@@ -22,11 +21,9 @@ from motorbus.families.stepper.driver.waiting import Outcome, Ran
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from pathlib import Path
 
     from motorbus.bus.blocking import Bus
     from motorbus.cli.output import Bar, Output
-    from motorbus.families.stepper import Behaviour, Plan
 
 _ENDS: Final[Mapping[Outcome, type[MotorbusError]]] = {
     Outcome.STOPPED: Interrupted,
@@ -63,7 +60,6 @@ def run(
     timeout: str = "",
     watch: str = "",
     progress: Flag = False,
-    profile: ProfileFile = None,
     endless: Flag = False,
     stop_first: Flag = False,
     expert: Flag = False,
@@ -92,77 +88,23 @@ def run(
         Do not ask before a way of more than 180 degrees.
     """
     chosen: dict[str, Any] = {
-        "how": how_of(profile),
         "endless": endless,
         "stop_first": stop_first,
         "expert": expert,
     }
     seconds, ports = units.parse(timeout, "time") if timeout else None, numbers_in(watch) if watch else ()
-    agreed = "" if yes else partial(_question, project, chosen["how"])
+    agreed = "" if yes else partial(_question, project)
     told: Ran | None = carried_out(
         bus, options, output, verb("run", project, **chosen, timeout=seconds, watch=ports),
         what=f"project {project}", consent=agreed, dry_run=dry_run,
         rehearse=verb("start_project", project, **chosen), hear=partial(heard, progress, output),
     )  # fmt: skip
-    return Exit.OK if told is None else _ended(project, told, profile, output)
+    return Exit.OK if told is None else _ended(project, told, output)
 
 
-@app.command(
-    usage="Usage: motorbus stepper start-project BUS --project PROJECT [OPTIONS]",
-    help_epilogue="""Does not wait; `run` does. The project is read first, and refused where it has
-no steps, errors, or no end (unless --endless). That the start is acknowledged
-is no proof that it runs. A way of more than 180 degrees needs --yes.
-
-Examples:
-
-    motorbus stepper start-project stepper:/dev/ttyUSB0 --project 2
-    motorbus stepper start-project stepper:sim --project 1 --yes
-    motorbus stepper start-project stepper:sim --project 1 --dry-run""",
-)
-def start_project(
-    bus: BusName,
-    /,
-    *,
-    project: ProjectNumber,
-    endless: Flag = False,
-    stop_first: Flag = False,
-    expert: Flag = False,
-    yes: Flag = False,
-    dry_run: DryRun = False,
-    output: Silent,
-    **options: BusOption,
-) -> Exit:
-    """Start a stored project, and go (item 13 of the manual).
-
-    Parameters
-    ----------
-    endless
-        Allow a project without an end.
-    stop_first
-        Stop what may still run.
-    expert
-        Start it although it has findings that are errors.
-    yes
-        Do not ask before a way of more than 180 degrees.
-    """
-    told: Plan | None = carried_out(
-        bus,
-        options,
-        output,
-        verb("start_project", project, endless=endless, stop_first=stop_first, expert=expert),
-        consent="" if yes else partial(_question, project, how_of(None)),
-        dry_run=dry_run,
-    )
-    if told is not None:
-        facts = {"project": project, "accepted": True, "predicted": told.estimate.data()}
-        output.document("motorbus.stepper.start-project/1", facts)
-        output.text(f"start of project {project} accepted; it takes {told.estimate}")
-    return Exit.OK
-
-
-def _question(project: int, how: Behaviour, bus: Bus) -> str:
+def _question(project: int, bus: Bus) -> str:
     one = face(bus, 1)
-    goals = of_project(one, one.read_project(project).project, how)
+    goals = of_project(one, one.read_project(project).project)
     if any(goal.quantity == "velocity" for goal in goals):
         return f"start project {project}, which goes on until it is stopped"
     far = max((goal.value for goal in goals if goal.quantity == "relative"), key=abs)
@@ -192,10 +134,10 @@ def _where(event: Estimated) -> str:
     return f"estimated:{through} pass {event.round}{passes}, {step}{waits}, {place} from the start"
 
 
-def _ended(project: int, told: Ran, profile: Path | None, output: Output) -> Exit:
+def _ended(project: int, told: Ran, output: Output) -> Exit:
     """Print what came of it. Raises Interrupted, NoReply or OutcomeUnknown for what is not `completed`."""
     facts = {"project": project, "outcome": told.outcome.value, "seconds": told.seconds, "why": told.why}
-    predicted = settled(told.predicted, profile)
+    predicted = told.predicted
     output.document("motorbus.stepper.run/1", {**facts, "predicted": plain(predicted.data())})
     took = "" if told.seconds is None else f" in {told.seconds:.3f} s"
     output.text(f"project {project} {told.outcome.value}{took}: {told.why}\npredicted: {predicted}")

@@ -8,7 +8,6 @@ before a motor turns, and `simulator` makes it a device.
     Program      a project as a file, an image or frames: read, checked, timed, planned
     Conditions   what a project is judged against
     Behaviour    how a controller carries a project out where nobody knows
-    Profile      how one controller was found to carry them out
     Controller   a real one: read, write, run, jog, home, switch, watch, stop
     Difference   what writing a program would change and `Cost`, `Written` what came of it and, as `Proof`, how far
                  that is known
@@ -47,7 +46,6 @@ from motorbus.families.stepper.driver import (
     Difference,
     EditsLost,
     Estimated,
-    Experiment,
     Homed,
     InputChanged,
     Moved,
@@ -67,7 +65,7 @@ from motorbus.families.stepper.driver import (
 )
 from motorbus.families.stepper.driver.assured import ASSURANCE
 from motorbus.families.stepper.execution import Behaviour
-from motorbus.families.stepper.program import Conditions, Estimate, Finding, Plan, Profile, Program
+from motorbus.families.stepper.program import Conditions, Estimate, Finding, Plan, Program
 from motorbus.families.stepper.program.backups import Backup
 from motorbus.families.stepper.table import RATE, TABLES, checked_order
 
@@ -83,7 +81,6 @@ __all__ = [
     "EditsLost",
     "Estimate",
     "Estimated",
-    "Experiment",
     "Finding",
     "Homed",
     "InputChanged",
@@ -91,7 +88,6 @@ __all__ = [
     "Outcome",
     "Plan",
     "Planned",
-    "Profile",
     "Program",
     "Promise",
     "Proof",

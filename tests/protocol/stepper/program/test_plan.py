@@ -38,13 +38,6 @@ def test_the_band_is_that_of_the_readings() -> None:
     assert fitted.seconds == fitted.high == pytest.approx(5.297, abs=1e-3)
 
 
-def test_what_is_settled_has_no_band() -> None:
-    found = estimate(A).settled("ours.toml")
-    assert (found.low, found.high, found.readings) == (found.seconds, found.seconds, {})
-    assert str(found) == "at least 1.7 s; the acceleration is meant as ours.toml says"
-    assert (found.data()["settled_by"], estimate(A).data()["settled_by"]) == ("ours.toml", None)
-
-
 def test_each_step_is_told() -> None:
     found = plan(B, name="B")
     assert found.order == (1, 2, 3, 2, 3)

@@ -6,8 +6,6 @@ returns a `Request`, or is a procedure that awaits steps; a bus carries it out.
 
 from __future__ import annotations
 
-from motorbus.families.stepper.driver.characterising import characterise, experiments
-from motorbus.families.stepper.driver.characterising.study import Experiment
 from motorbus.families.stepper.driver.controller import AsyncController, Controller
 from motorbus.families.stepper.driver.copying import backup, restore
 from motorbus.families.stepper.driver.costs import Cost
@@ -63,7 +61,6 @@ __all__ = [
     "Difference",
     "EditsLost",
     "Estimated",
-    "Experiment",
     "Homed",
     "InputChanged",
     "Memory",
@@ -80,13 +77,11 @@ __all__ = [
     "Watched",
     "Written",
     "backup",
-    "characterise",
     "checked_motor",
     "clear",
     "difference",
     "dump",
     "dump_once",
-    "experiments",
     "home",
     "identify",
     "jog",

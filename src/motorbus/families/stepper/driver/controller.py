@@ -10,7 +10,6 @@ from __future__ import annotations
 from motorbus.core.device import AsyncDevice, AsyncRunner, BlockingDevice, BlockingRunner, device_method
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.driver import (
-    characterising,
     commands,
     copying,
     homing,
@@ -63,7 +62,6 @@ class ControllerMethods(Node):
     jog_forward = device_method(jogging.jog_forward)
     jog_reverse = device_method(jogging.jog_reverse)
     home = device_method(homing.home)
-    characterise = device_method(characterising.characterise)
     recover = device_method(recovery.recover)
 
     # -- commands of the manual, one frame each: what they set goes to the selected project and is not read back

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from motorbus.core.steps import REACHED, Emit, Exclusive, JournalEntry
 from motorbus.errors import MotorbusError, RequestError
-from motorbus.families.stepper.driver import characterising, reading
+from motorbus.families.stepper.driver import reading
 from motorbus.families.stepper.driver.borrowing import GIVEN_BACK, NOTE, PROJECT, Loan, given_back, loan_of
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.owing import RUN, settled
@@ -27,8 +27,8 @@ async def recover(node: Node, change: str, facts: Mapping[str, Any], *, alone: b
     """Give project 1 back that was borrowed when the host was cut off: `change` its verb, `facts` as the journal says.
 
     Stops the motor first. Gives "old" when project 1 reads as it was. May be called again at any point. `alone` makes
-    no difference: there is one controller on a line. A `characterise` that was cut off is ended likewise, and a run of
-    which nobody knows whether it has ended is stopped: "stopped".
+    no difference: there is one controller on a line. A run of which nobody knows whether it
+    has ended is stopped: "stopped".
 
     Raises RequestError, with nothing sent, for facts of something else, or of a bus that was opened with another order
     of bytes or another motor; RequestError, with nothing but the stop sent, when somebody has written project 1 since;
@@ -39,8 +39,6 @@ async def recover(node: Node, change: str, facts: Mapping[str, Any], *, alone: b
         await ended(node)
         await settled(node, "stopped")
         return "stopped"
-    if change == characterising.VERB:
-        return await characterising.recovered(node, facts)
     loan = loan_of(change, facts)
     for name, then, now in (
         ("dump_order", loan.order, node.order),

@@ -19,11 +19,8 @@ from types import MappingProxyType
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.execution import USUAL, Behaviour
 from motorbus.families.stepper.program import dumps, text
-from motorbus.families.stepper.program.course import Course, Picture, Stretch, course, picture
-from motorbus.families.stepper.program.fit import Fit, Run, fit
 from motorbus.families.stepper.program.lint import RULES, USUALLY, Conditions, Finding, Rule, lint, net_units
 from motorbus.families.stepper.program.plan import Estimate, Plan, StepPlan, duration, estimate, plan
-from motorbus.families.stepper.program.profile import Profile
 from motorbus.families.stepper.program.schema import schema
 from motorbus.families.stepper.program.source import read
 from motorbus.families.stepper.table import BLANK, Order, Project, encode_image
@@ -118,38 +115,20 @@ class Program:
         """The steps of one pass, in order."""
         return list(self.plan(how).order)
 
-    def course(self, how: Behaviour = USUAL, *, wait: float = 1.0, passes: int = 1) -> Course:
-        """What it does over time, with an operator who takes `wait` s at each input."""
-        return course(self.project, how, wait=wait, passes=passes)
-
-    def picture(self, how: Behaviour = USUAL, *, wait: float = 1.0, passes: int = 1) -> Picture:
-        """What one draws of it, by the names of the file: `motorbus.plot.sequence` takes it."""
-        run = self.course(how, wait=wait, passes=passes)
-        return picture(run, self.project, inputs=self.inputs, outputs=self.outputs, lead=self.lead)
-
 
 __all__ = [
     "RULES",
     "Conditions",
-    "Course",
     "Estimate",
     "Finding",
-    "Fit",
-    "Picture",
     "Plan",
-    "Profile",
     "Program",
     "Rule",
-    "Run",
     "StepPlan",
-    "Stretch",
-    "course",
     "duration",
     "estimate",
-    "fit",
     "lint",
     "net_units",
-    "picture",
     "plan",
     "schema",
 ]

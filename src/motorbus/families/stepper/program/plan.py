@@ -69,7 +69,7 @@ class Estimate:
     `cuts`     how often a stop input may end a motion early, so that it takes less
     `low`, `high`  the same in the readings of the acceleration, `readings` says each
     `stuck`    the first step that never ends by itself, 0 when each does
-    `settled_by`  what says how the acceleration is meant, so that there are no other readings; "" when nothing does
+    `settled_by`  always ""; kept for those that read it
     """
 
     seconds: float
@@ -79,10 +79,6 @@ class Estimate:
     readings: Mapping[str, float]
     stuck: int = 0
     settled_by: str = ""
-
-    def settled(self, by: str) -> Estimate:
-        """The same where something, as a profile, says how the acceleration is meant: without a band."""
-        return replace(self, readings={}, settled_by=by)
 
     @property
     def low(self) -> float:
@@ -101,8 +97,6 @@ class Estimate:
         text = f"at least {duration(self.seconds)}{waits}" + (
             " for each pass, without an end" if self.endless else ""
         )
-        if self.settled_by:
-            text += f"; the acceleration is meant as {self.settled_by} says"
         if duration(self.low) != duration(self.high):
             text += f"; {duration(self.low)} to {duration(self.high)} if the acceleration is meant otherwise"
         if self.cuts:
@@ -121,7 +115,6 @@ class Estimate:
             "high": finite(self.high),
             "readings": {name: finite(seconds) for name, seconds in self.readings.items()},
             "never_ends_at_step": self.stuck or None,
-            "settled_by": self.settled_by or None,
         }
 
 
@@ -191,11 +184,6 @@ def plan(project: Project, how: Behaviour = USUAL, *, name: str = "") -> Plan:
 def estimate(project: Project, how: Behaviour = USUAL) -> Estimate:
     """How long a project takes, under the readings of `how`, with a band over the readings of the acceleration."""
     return _estimate(project, how, _steps(project, how))
-
-
-def seconds_of(project: Project, how: Behaviour = USUAL) -> float:
-    """What `estimate` says it takes (s), without the band: for whoever asks often."""
-    return _in_all(_steps(project, how)) * (execution.passes(project, how) or 1)
 
 
 def duration(seconds: float) -> str:
