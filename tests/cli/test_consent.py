@@ -19,8 +19,6 @@ FAR = [
     ["move", "BUS#1=300deg"],
     ["write", "BUS#1", "goal_position=300deg"],
     ["write", "BUS#1", "goal_position=3413raw", "--expert"],
-    ["feetech", "reg-write", "BUS#1", "goal_position=300deg"],
-    ["feetech", "sync-write", "BUS", "goal_position", "2=180deg", "1=300deg"],
 ]
 
 
@@ -81,8 +79,6 @@ def test_what_would_be_refused_anyway_is_told_before_anybody_is_asked(arm: Simul
     [
         ("write BUS#1 goal_position=400deg", "lies outside"),
         ("write BUS#1 id=4", "may lose it"),
-        ("feetech reg-write BUS#1 goal_position=400deg", "lies outside"),
-        ("feetech sync-write BUS goal_position 1=400deg", "lies outside"),
     ],
 )
 def test_nobody_is_asked_about_what_is_refused_anyway(

@@ -31,7 +31,6 @@ from tests.cli.conftest import Run
         ("kst", "say isolated=True; nothing", "say `motorbus scan BUS --bitrate all`; nothing"),
         ("feetech", "write(operating_mode=0) puts", "`motorbus write BUS#ID operating_mode=0` puts"),
         ("feetech", "set_mode('position') first", "`motorbus feetech mode BUS#ID position` first"),
-        ("feetech", "set_torque_limit(1.0); more", "`motorbus feetech torque-limit BUS#ID 1.0`; more"),
         ("feetech", "still under way: stop() ends", "still under way: `motorbus stop` ends"),
         ("template", "use disable_torque()", "use `motorbus torque off`"),
         ("feetech", "see to it, then robot.clear_fault('a1')", "see to it, then give the order again"),

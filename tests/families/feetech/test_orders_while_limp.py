@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from tests.families.feetech.test_driver_every_map import MODES, later, world
 
 from motorbus.families.feetech import Servo
 from motorbus.families.feetech.table import CONTROL, Mode
-from tests.families.feetech.test_driver_every_map import MODES, later, world
 
 LIMITS = (0.5, 4.0)
 ORDERS = {
