@@ -9,9 +9,8 @@ import json
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-from motorbus.cli.feetech.tables import database, meanings
 from motorbus.core.register import Register, RegisterMap
 from motorbus.families.feetech.table import (
     ALARM_BITS_OF,
@@ -35,12 +34,7 @@ FEETECH servos have six register maps, and the model does not tell which: firmwa
 every row of each map with its source. Where sources disagree, or none confirms it, the column "in doubt" says who says
 what, and what was chosen; in the database that is `conflict`, which is empty elsewhere. The page is made by
 `python -m scripts.feetech_registers` from the rows that the program itself uses; the same rows are there
-[as JSON](feetech-registers.json), and in the shell, with `--json` too:
-
-```console
-$ motorbus feetech registers --map hls
-$ motorbus feetech models
-```
+[as JSON](feetech-registers.json).
 
 What motorbus does with them: servos of all six maps are found, identified, read, written, moved and simulated. Which
 map it is matters, for the same address means another thing in each: 48 is the torque limit here and the lock there. A
@@ -59,10 +53,38 @@ def page() -> str:
     return "\n".join([HEAD, *(line for part in parts for line in part)])
 
 
+def _data(table: RegisterMap) -> dict[str, Any]:
+    """A map as plain data: everything that its rows say."""
+    (order,) = {row.order for row in table.values()}
+    rows = [_row_data(row) for row in table.values()]
+    return {"name": table.name, "title": table.title, "byte_order": order, "registers": rows}
+
+
+def _row_data(row: Register) -> dict[str, Any]:
+    plain = ("name", "address", "size", "sign_bit", "low", "high", "default", "unit", "scale")
+    return {
+        **{name: getattr(row, name) for name in plain[:3]},
+        **{name: getattr(row, name).value for name in ("storage", "access", "coding")},
+        **{name: getattr(row, name) for name in plain[3:]},
+        "choices": {str(value): meaning for value, meaning in row.choices.items()},
+        "bits": {str(bit): meaning for bit, meaning in row.bits.items()},
+        "effect": row.effect.name.lower(),
+        **{name: getattr(row, name) for name in ("protected", "source", "conflict", "note")},
+    }
+
+
+def _meanings(row: Register) -> Iterator[str]:
+    """The meaning of single values and bits of a row, and whether it must not be copied between servos."""
+    yield from (f"{value} {meaning}" for value, meaning in row.choices.items())
+    yield from (f"bit {bit} {meaning}" for bit, meaning in row.bits.items())
+    if row.protected and row.writable:
+        yield "never copied from another servo"
+
+
 def text_of_database() -> str:
     """All maps as JSON, one register on a line."""
     maps = []
-    for one in database(list(TABLES.values()))["maps"]:
+    for one in map(_data, TABLES.values()):
         rows = ",\n".join(f"   {json.dumps(row, ensure_ascii=False)}" for row in one.pop("registers"))
         maps.append(f'{json.dumps(one, ensure_ascii=False)[:-1]}, "registers": [\n{rows}\n  ]}}')
     return '{"schema": "motorbus.feetech.registers/1", "maps": [\n  ' + ",\n  ".join(maps) + "\n]}\n"
@@ -94,7 +116,7 @@ def _row(row: Register) -> list[object]:
         "" if row.default is None else row.default,
         f"{row.scale:.6g} {row.unit}" if row.unit else "",
         row.effect.name.lower() if row.writable else "",
-        *("<br>".join(meanings(row)), row.source, row.conflict, row.note),
+        *("<br>".join(_meanings(row)), row.source, row.conflict, row.note),
     ]
 
 

@@ -151,22 +151,6 @@ class Span(NamedTuple):
     name: str
 
 
-def _figure(
-    title: str, remark: str, heights: Sequence[float], height: float, pad: int = 12
-) -> tuple[Any, Any]:
-    figure = _canvas((9.0, height))
-    axes = figure.subplots(
-        len(heights), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights}
-    )
-    axes = axes[:, 0]
-    for one in axes:
-        _style(one)
-    axes[0].set_title(title, loc="left", fontsize=13, fontweight="bold", color=_INK, pad=pad)
-    if remark:
-        axes[0].set_title(remark, loc="right", fontsize=11, fontstyle="italic", color=_FAINT, pad=pad)
-    return figure, axes
-
-
 def _blank(title: str, remark: str, size: tuple[float, float]) -> Any:
     """A page for panels of their own, with the words above them all."""
     figure = _canvas(size)

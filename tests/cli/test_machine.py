@@ -192,7 +192,6 @@ def test_a_name_that_is_none_ends_with_one_error_and_sends_nothing(
         ("set-id a1 9 --dry-run", 0),
         ("recover arm", 0),
         ("feetech mode a1", 0),
-        ("feetech sync-read arm#1+2 present_position", 0),
         ("kst status c1", 0),
         ("kst version can#37", 0),
         ("stepper inputs lift", 0),

@@ -61,7 +61,6 @@ VELOCITY = (call("set_mode", "velocity"), call("enable_torque"))
 PWM = (call("set_mode", "pwm"), call("enable_torque"))
 STEP = (call("set_mode", "step"), call("enable_torque"))
 CURRENT = (call("set_mode", "current"), call("enable_torque"))
-FEW_POLLS = 10
 
 FEETECH: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("ping"), "", ()),
@@ -84,10 +83,6 @@ FEETECH: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("mode"), "", PREPARED),
     (call("zero"), "", PREPARED),
     (call("many_turns"), "", PREPARED),
-    (call("second_id"), "", PREPARED),
-    (call("torque_limit"), "", PREPARED),
-    (call("gains"), "", PREPARED),
-    (call("protection"), "", PREPARED),
     (call("write", acceleration=10.0), "ram", PREPARED),
     (call("write", max_temperature=60.0), "eeprom", PREPARED),
     (call("write", goal_position=2.5), "goal", TORQUE_ON),
@@ -111,20 +106,14 @@ FEETECH: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("set_duty", 0.2), "", PWM),
     (call("set_current", 0.1), "", CURRENT),
     (call("step", 0.2, wait=False), "", STEP),
-    (call("duplicates", FEW_POLLS), "", PREPARED),
     (call("set_id", 7, among=(1, 2, 3)), "", PREPARED),
     (call("set_baud", 500_000, among=(1, 2, 3)), "", PREPARED),
-    (call("set_second_id", 7, among=(1, 2, 3)), "", PREPARED),
     (call("recover", "set_id", NO_FACTS), "no_facts", PREPARED),
     (call("factory_restore"), "", PREPARED),
     (call("calibrate"), "", PREPARED),
     (call("calibrate", 1.0), "to", PREPARED),
     (call("clear_turns"), "", PREPARED),
     (call("set_many_turns", True), "on", PREPARED),
-    (call("set_torque_limit", 0.5), "", PREPARED),
-    (call("set_torque_limit", 0.5, persistent=True), "persistent", PREPARED),
-    (call("set_gains", p=20), "", PREPARED),
-    (call("set_protection", torque=0.3, max_temperature=60.0), "", PREPARED),
     (call("recover_overload"), "", TORQUE_ON),
     (shared("scan", (1, 2, 3)), "ids", ()),
     (shared("sync_read", ("present_position", "present_velocity"), DEVICES), "", ()),
@@ -159,12 +148,6 @@ SILENT = (call("write", status_return_level=0),)
 TURNED = (call("calibrate", 1.0),)
 
 FEETECH_STATES: list[tuple[Call, str, tuple[Call, ...]]] = [
-    (call("set_torque_limit", 0.5), "after_zero", (*TORQUE_ON, call("set_torque_limit", 0.0))),
-    (
-        call("set_torque_limit", 0.5),
-        "after_zero_in_velocity_mode",
-        (*VELOCITY, call("set_torque_limit", 0.0)),
-    ),
     (call("set_mode", "position"), "after_current", (*CURRENT, call("set_current", 0.1))),
     (call("move", 2.5, current=0.5, wait=False), "current", TORQUE_ON),
     (call("action"), "unprepared", ()),
@@ -216,13 +199,7 @@ FEETECH_REFUSED: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("set_current", 1e9), "huge", CURRENT),
     (call("step", 1e6), "huge", STEP),
     (call("step", 0.2), "wrong_mode", TORQUE_ON),
-    (call("set_torque_limit", 1.5), "above_1", PREPARED),
-    (call("set_torque_limit", 0.0), "zero", PREPARED),
     (call("write", goal_torque=0), "zero_torque", TORQUE_ON),
-    (call("set_gains"), "none", PREPARED),
-    (call("set_gains", p=999), "huge", PREPARED),
-    (call("set_protection", min_voltage=9.0, max_voltage=5.0), "crossed", PREPARED),
-    (call("set_protection", torque=2.0), "above_1", PREPARED),
     (call("set_mode", "nonsense"), "unknown", PREPARED),
     (call("set_mode", "position"), "back", (call("set_mode", "pwm"),)),
     (call("set_mode", "position", limits=(1.0, 4.0)), "back_with_limits", (call("set_mode", "pwm"),)),
@@ -233,7 +210,6 @@ FEETECH_REFUSED: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("write", goal_position=2.5, max_position_limit=3.0), "goal_and_limit", TORQUE_ON),
     (call("read", "nonsense"), "unknown", PREPARED),
     (call("reg_write", max_temperature=60.0), "eeprom", PREPARED),
-    (call("duplicates", 0), "none", PREPARED),
     (call("set_id", 254), "everyone", PREPARED),
     (call("set_baud", 1234), "unknown", PREPARED),
 ]

@@ -28,29 +28,15 @@ set-baud BUS#1 500k
 recover BUS
 calibrate BUS#1
 calibrate BUS#1 --to 90deg
-feetech reg-write BUS#1 goal_position=HERE
-feetech action BUS
-feetech action BUS#1-2
-feetech sync-write BUS goal_position 1=HERE 2=HERE
 feetech factory-restore BUS#1
 feetech mode BUS#1 position
 feetech mode BUS#1 velocity
 feetech mode BUS#1 pwm
 feetech mode BUS#1 step
 feetech mode BUS#1 current
-feetech drive BUS#1 velocity=1
-feetech drive BUS#1 duty=20%
-feetech drive BUS#1 step=45deg
-feetech drive BUS#1 current=0.5
-feetech torque-limit BUS#1 50% --keep
-feetech gains BUS#1 p=16
-feetech protection BUS#1 max_temperature=60
 feetech recover-overload BUS#1
-feetech clear-turns BUS#1
-feetech many-turns BUS#1 on
-feetech second-id BUS#1 9
 """.strip().splitlines()
-ALWAYS = ("torque on", "stop", "feetech action", "calibrate", "set-id", "feetech gains", "feetech mode")
+ALWAYS = ("torque on", "stop", "calibrate", "set-id", "feetech mode")
 NOBODY = {"firmware": "9.9"}
 
 
@@ -77,5 +63,3 @@ def test_what_was_withheld_from_one_device_hides_nothing_of_the_next(run: Run) -
         for command in ("torque on", "stop"):
             frames = run(*command.split(), servos.url, "--dry-run", "--json").document["withheld"]
             assert [one["data"][6:8] for one in frames] == ["01", "02"]
-        frames = run("feetech", "action", f"{servos.url}#1-2", "--dry-run", "--json").document["withheld"]
-        assert [one["data"][6:8] for one in frames] == ["01", "02"]

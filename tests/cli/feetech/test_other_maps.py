@@ -60,10 +60,6 @@ def test_it_is_written_and_moved(other: tuple[str, Simulation], say: Say) -> Non
     assert say("move BUS#1=2.0 --yes").code == 0
     assert say("move BUS#1=2.5 BUS#2=3.0 --yes").code == 0
     assert say("stop BUS#1").code == 0
-    assert say("feetech reg-write BUS#1 goal_position=2.2 --yes").code == 0
-    assert say("feetech action BUS#1").code == 0
-    assert say("feetech sync-write BUS goal_position 1=2.0 2=2.0 --yes").code == 0
-    assert say("feetech sync-read BUS#1-2 present_position").code == 0
 
 
 def test_it_is_let_go_and_stopped(other: tuple[str, Simulation], say: Say) -> None:
@@ -94,9 +90,6 @@ REFUSED = (
     "move BUS#1=0.5 BUS#2=3.0 --yes",
     "torque on BUS#1",
     "stop BUS#1",
-    "feetech reg-write BUS#1 goal_position=500 --yes",
-    "feetech action BUS#1",
-    "feetech sync-write BUS goal_position 1=500 --yes",
     "feetech factory-restore BUS#1 --yes",
 )
 

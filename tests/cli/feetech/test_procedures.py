@@ -1,41 +1,9 @@
-"""Forgetting turns and recovering from an overload, from the shell."""
+"""Recovering from an overload, from the shell."""
 
 from __future__ import annotations
 
-import math
-
 import motorbus
 from tests.cli.conftest import Run
-
-
-def test_turns_are_forgotten_where_a_servo_obeys(run: Run) -> None:
-    with motorbus.simulate("feetech", ids="3", model="hls3925") as servo:
-        bus = f"{servo.url}#3"
-        assert run("torque", "on", bus).code == 0
-        ran = run("feetech", "clear-turns", bus)
-        assert ran.code == 8
-        assert "let #3 go limp and forget its turns" in ran.err
-        assert servo[3].memory["torque_enable"] == 1
-        withheld = run("feetech", "clear-turns", bus, "--dry-run", "--json").document["withheld"]
-        assert [one["data"] for one in withheld] == ["FF FF 03 04 03 28 00 CD", "FF FF 03 02 0A F0"]
-        assert servo[3].memory["torque_enable"] == 1
-        document = run("feetech", "clear-turns", bus, "--yes", "--json").document
-        assert document["schema"] == "motorbus.feetech.clear-turns/1"
-        assert (document["id"], document["position"]) == (3, math.pi)
-        assert servo[3].memory["torque_enable"] == 0
-        assert "home it" in run("feetech", "clear-turns", bus, "--yes").out
-
-
-def test_a_silent_model_is_a_refusal_of_the_device(run: Run) -> None:
-    with motorbus.simulate("feetech", ids="3") as servo:
-        ran = run("feetech", "clear-turns", f"{servo.url}#3", "--yes")
-    assert ran.code == 7
-    assert "STS3215, firmware 3.10" in ran.err
-
-
-def test_a_map_without_turns_is_refused_before_anybody_is_asked(run: Run) -> None:
-    with motorbus.simulate("feetech", ids="3", model="scs0009") as servo:
-        assert run("feetech", "clear-turns", f"{servo.url}#3").code == 2
 
 
 def test_nothing_to_recover_from(run: Run) -> None:

@@ -1,22 +1,11 @@
-"""What the commands for one servo share: assignments as words, and whose servo it is."""
+"""What the commands for one servo share: whose servo it is."""
 
 from __future__ import annotations
 
 import pytest
 
-from motorbus.cli.feetech.servo import assigned, one_of_ours, reads_only
+from motorbus.cli.feetech.servo import one_of_ours, reads_only
 from motorbus.errors import RequestError
-
-
-def test_assignments() -> None:
-    assert assigned(["p=1", "d=-2"], ("p", "i", "d")) == {"p": "1", "d": "-2"}
-    assert assigned([], ("p",)) == {}
-
-
-@pytest.mark.parametrize("texts", [["p"], ["=1"], ["p="], ["q=1"], ["p=1", "p=1"]])
-def test_what_is_none(texts: list[str]) -> None:
-    with pytest.raises(RequestError):
-        assigned(texts, ("p", "i", "d"))
 
 
 def test_one_servo_of_this_family() -> None:

@@ -9,20 +9,20 @@ import pytest
 
 from motorbus.errors import OutcomeUnknown, VerificationFailed
 from motorbus.families.feetech import Servo
-from motorbus.families.feetech.driver import set_mode, set_torque_limit, write
+from motorbus.families.feetech.driver import set_mode, write
 from motorbus.families.feetech.driver.exchanges import Block, confirmed
 from motorbus.families.feetech.table import TABLES
 from tests.families.feetech.driver_script import Played, looks, play, prepared, prepares, reads, writes
-from tests.families.feetech.maps import met, simulated
+from tests.families.feetech.maps import simulated
 
 OFF, UNLOCK, LOCK, LOCKED = writes(3, 40, 0), writes(3, 55, 0), writes(3, 55, 1), reads(3, 55, 1)
 IDLE, OPEN, LIMP = reads(3, 64, 0), reads(3, 55, 0), reads(3, 40, 0)
 
 APPLIED: dict[str, Callable[[Any], object]] = {
     "registers": lambda servo: servo.write(max_temperature=61, led_mask=5, min_position_limit=1.0),
-    "gains": lambda servo: servo.set_gains(p=16, d=20),
-    "protection": lambda servo: servo.set_protection(max_temperature=60, unload=("overload",)),
-    "torque limit": lambda servo: servo.set_torque_limit(0.4, persistent=True),
+    "gains": lambda servo: servo.write(position_p=16, position_d=20),
+    "protection": lambda servo: servo.write(max_temperature=60, unload_mask=32),
+    "torque limit": lambda servo: servo.write(max_torque=0.4),
     "mode": lambda servo: servo.set_mode("velocity" if servo.identify().table == "hls" else "pwm"),
 }
 
@@ -80,15 +80,6 @@ def test_d9_only_registers_that_differ_are_written_and_whole() -> None:
 def test_d9_the_mode_it_has_is_not_written_and_it_is_limp_all_the_same() -> None:
     same = (prepares(), reads(3, 33, 0), LOCKED, OFF, prepares())
     play(set_mode(prepared(), "position"), *same)
-
-
-def test_d9_force_does_not_come_back_to_a_servo_with_torque_by_a_limit_it_keeps_already() -> None:
-    """Storing lets it go; where nothing is stored, the limit in RAM would let it go for its old goal."""
-    play(
-        set_torque_limit(met("sts"), 1, persistent=True),
-        *(reads(3, 16, 0xE8, 3), LOCKED, OFF),
-        *(writes(3, 48, 0xE8, 3), reads(3, 48, 0xE8, 3)),
-    )
 
 
 # -- what reads as set and is not kept -----------------------------------------------------------------------

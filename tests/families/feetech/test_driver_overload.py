@@ -91,8 +91,8 @@ def test_both_alarms_that_stay_after_their_cause_are_meant() -> None:
 def overloaded(name: str, **options: Any) -> Iterator[tuple[Any, Any]]:
     """A simulated servo of this map that has been kept from its goal until its protection tripped."""
     with simulated(name, **options) as (real, servo):
-        if servo.protection().threshold is None:  # HLS protect themselves by their current
-            servo.set_protection(current=1.0, current_time=1.0)
+        if name == "hls":  # HLS protect themselves by their current
+            servo.write(protection_current=1.0, overcurrent_time=1.0)
         servo.enable_torque()
         stood = real.raw_position
         real.blocked = (stood - 5, stood + 5)

@@ -44,7 +44,10 @@ COMMANDS: dict[str, tuple[Callable[[Servo], object], Callable[[Servo], bool]]] =
     ),
     "move": (lambda servo: servo.move(2.4, wait=False), lambda servo: near(servo.read("goal_position"), 2.4)),
     "stop": (lambda servo: servo.stop(), lambda servo: near(servo.read("goal_position"), servo.position())),
-    "set gains": (lambda servo: servo.set_gains(p=20), lambda servo: servo.gains().p == 20),
+    "write gain": (
+        lambda servo: servo.write(position_p=20),
+        lambda servo: near(servo.read("position_p"), 20),
+    ),
 }
 
 

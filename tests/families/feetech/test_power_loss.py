@@ -38,7 +38,7 @@ COMMANDS: list[tuple[str, Mode, str, tuple[Call, ...]]] = [
     *((name, mode, "stop", (STOP,)) for name, mode in MODES),
     *((name, mode, "zero", (ENABLE, ZERO[mode])) for name, mode in MODES if mode in ZERO),
     *(
-        (name, Mode.POSITION, "limit", (Call("set_torque_limit", (0,)), Call("set_torque_limit", (1.0,))))
+        (name, Mode.POSITION, "limit", (Call("cap_torque", (0,)), Call("cap_torque", (1.0,))))
         for name in TABLES
         if CONTROL[name].limit
     ),

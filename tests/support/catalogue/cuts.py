@@ -112,7 +112,6 @@ FEETECH = [
     identity("sts", "set_baud", SLOW, quirks=ERASED, pairs=50),
     identity("scs2", "set_baud", SLOW, quirks={"torn": "old", "baud_ack": "new"}, cuts=10),
     identity("smcl", "set_baud", SLOW, quirks={"eeprom_commit": "after_ack"}, cuts=10),
-    guarded("hls", "set_second_id", 20, options={"among": (OLD, OTHER)}, restart=1),
     guarded("sts", "set_mode", "velocity", pairs=50),
     guarded("sts", "set_many_turns", True, quirks={"torn": "new"}, pairs=50),
     guarded("sts", "calibrate", 1.0, name="-to", pairs=50),
@@ -256,7 +255,6 @@ COMMANDS = [*FEETECH, *guarded_writes(), *KST, *STEPPER]
 
 
 NOT_COMPLETED = {
-    "feetech": "called again it finds its value, and leaves the lock open",
     "stepper": "called again it finds its values in the edited copy, and does not save them",
 }
 NO_EFFECT = "after a loss of supply before the save it returns the old position without an error"

@@ -6,7 +6,7 @@ use, see `motorbus.cli.faces`.
 
 from __future__ import annotations
 
-from motorbus.cli.feetech import duplicates, many_turns, modes, procedures, second_id, tables, tuning
+from motorbus.cli.feetech import modes, procedures
 from motorbus.cli.feetech.commands import COMMANDS
 from motorbus.cli.feetech.offers import say, torque_after_write, torque_told
 from motorbus.cli.feetech.orders import app
@@ -17,16 +17,11 @@ __all__ = [
     "COMMANDS",
     "app",
     "disable_torque_everyone",
-    "duplicates",
-    "many_turns",
     "modes",
     "move_together",
     "ping_everyone",
     "procedures",
     "say",
-    "second_id",
-    "tables",
     "torque_after_write",
     "torque_told",
-    "tuning",
 ]

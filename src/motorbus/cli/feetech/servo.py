@@ -1,4 +1,4 @@
-"""What the commands for one servo share: its address, a verb carried out or only shown, and assignments as words."""
+"""What the commands for one servo share: its address, a verb carried out or only shown."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from motorbus.core import units
 from motorbus.errors import RequestError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping, Sequence
+    from collections.abc import Callable, Mapping
 
     from motorbus.families.feetech.driver import Servo
 
@@ -79,21 +79,6 @@ def reads_only(dry_run: bool) -> None:
             expected="a new value, or no --dry-run",
             advice="nothing was sent",
         )
-
-
-def assigned(texts: Sequence[str], names: Collection[str]) -> dict[str, str]:
-    """NAME=VALUE as said, each name once and one of `names`. Raises RequestError otherwise."""
-    pairs = [text.partition("=")[::2] for text in texts]
-    for (name, value), text in zip(pairs, texts, strict=True):
-        if name not in names or not value:
-            raise RequestError(
-                f"{text!r} says nothing that could be set",
-                expected=f"NAME=VALUE, with a name of {', '.join(names)}",
-                advice="nothing was sent",
-            )
-    if len(dict(pairs)) < len(pairs):
-        raise RequestError("a name is there twice", sent=" ".join(texts), advice="nothing was sent")
-    return dict(pairs)
 
 
 def both_limits(low: str, high: str) -> tuple[float, float] | None:

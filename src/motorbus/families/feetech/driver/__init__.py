@@ -54,9 +54,8 @@ from motorbus.families.feetech.driver.registers import (
 from motorbus.families.feetech.driver.renaming import set_id
 from motorbus.families.feetech.driver.restoring import factory_restore
 from motorbus.families.feetech.driver.scanning import GLANCE, Skipped, scan
-from motorbus.families.feetech.driver.second import second_id, set_second_id
 from motorbus.families.feetech.driver.servo import AsyncServo, Servo, ServoMethods
-from motorbus.families.feetech.driver.sharing import ScanWarning, duplicates
+from motorbus.families.feetech.driver.sharing import ScanWarning
 from motorbus.families.feetech.driver.states import States, sync_read_raw, sync_read_states
 from motorbus.families.feetech.driver.torque import (
     disable_torque,
@@ -64,17 +63,6 @@ from motorbus.families.feetech.driver.torque import (
     disable_torque_everyone,
 )
 from motorbus.families.feetech.driver.train import Train, limits, train, travel
-from motorbus.families.feetech.driver.tuning import (
-    Gains,
-    Protection,
-    TorqueLimit,
-    gains,
-    protection,
-    set_gains,
-    set_protection,
-    set_torque_limit,
-    torque_limit,
-)
 from motorbus.families.feetech.driver.turns import clear_turns
 from motorbus.families.feetech.driver.writer import SyncWriter, sync_writer
 
@@ -82,14 +70,12 @@ __all__ = [
     "GLANCE",
     "AsyncServo",
     "Calibration",
-    "Gains",
     "GroupResult",
     "ManyTurns",
     "Node",
     "Positions",
     "Powerless",
     "Promise",
-    "Protection",
     "Recounted",
     "Recovery",
     "ScanWarning",
@@ -100,7 +86,6 @@ __all__ = [
     "States",
     "SyncWriter",
     "TorqueAfterWrite",
-    "TorqueLimit",
     "Train",
     "Zero",
     "action",
@@ -116,10 +101,8 @@ __all__ = [
     "disable_torque",
     "disable_torque_all",
     "disable_torque_everyone",
-    "duplicates",
     "enable_torque",
     "factory_restore",
-    "gains",
     "health",
     "identify",
     "limits",
@@ -132,7 +115,6 @@ __all__ = [
     "position_reads",
     "prepare",
     "prepare_all",
-    "protection",
     "read",
     "read_positions",
     "read_raw",
@@ -142,17 +124,12 @@ __all__ = [
     "reg_write_all",
     "rewrite",
     "scan",
-    "second_id",
     "set_baud",
     "set_current",
     "set_duty",
-    "set_gains",
     "set_id",
     "set_many_turns",
     "set_mode",
-    "set_protection",
-    "set_second_id",
-    "set_torque_limit",
     "set_velocity",
     "step",
     "stop",
@@ -166,7 +143,6 @@ __all__ = [
     "telemetry",
     "temperature",
     "torque_after_write",
-    "torque_limit",
     "train",
     "travel",
     "velocity",

@@ -103,7 +103,7 @@ def _power(node: Node, table: RegisterMap, raws: Mapping[str, int]) -> Iterator[
         yield f"its torque is off (torque_enable {raws['torque_enable']}): enable_torque()"
     live = CONTROL[table.name].limit
     if live and raws[live] == 0:
-        yield f"{live} is 0: set_torque_limit(1.0)"
+        yield f"{live} is 0: write({live}=1.0)"
     if raws["max_torque"] == 0:
         later = " after the next power-up" if live else ""
         yield f"max_torque is 0, which bounds its torque{later}: write(max_torque=1.0)"

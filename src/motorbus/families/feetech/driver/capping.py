@@ -6,35 +6,48 @@ bounds the current. Source: `table.CONTROL`.
 
 from __future__ import annotations
 
-from motorbus.core.register import Storage
+from motorbus.core.register import shown
 from motorbus.core.setpoint import Setpoint
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.bound import raw_bound, refuse_current
-from motorbus.families.feetech.driver.exchanges import Block
+from motorbus.families.feetech.driver.exchanges import Block, verified
 from motorbus.families.feetech.driver.identity import writable
+from motorbus.families.feetech.driver.motion import calmed
 from motorbus.families.feetech.driver.node import Node
 from motorbus.families.feetech.driver.orders import shown_mode
+from motorbus.families.feetech.driver.registers import read_raw, write_limp
 from motorbus.families.feetech.driver.rest import asked_anew, ordered
-from motorbus.families.feetech.driver.tuning import limiting, set_torque_limit
-from motorbus.families.feetech.table import Mode
+from motorbus.families.feetech.table import CONTROL, Mode
 
 
 async def cap_torque(node: Node, fraction: float) -> None:
-    """Bound its torque to this fraction of the stall torque, 0 to 1, until power-off.
+    """Limit the torque to this fraction of the stall torque, 0 to 1, until power-off.
 
-    Raises RequestError outside 0 to 1, and for a servo whose torque is bounded by EEPROM alone; else errors as
-    `set_torque_limit`.
+    A limit of 0 releases the servo; before a greater one the goal becomes the present position, so nothing jumps.
+    Raises RequestError outside 0 to 1 and for a servo whose torque is limited in EEPROM only, LimitExceeded for a
+    released servo outside its position limits, VerificationFailed when it reads back different.
     """
-    table = await writable(node)
-    row = limiting(table)
-    if row.storage is not Storage.RAM:
+    if isinstance(fraction, bool) or not isinstance(fraction, int | float) or not 0 <= fraction <= 1:
         raise RequestError(
-            f"node {node.node} keeps what bounds its torque in EEPROM ({row.name}), which no cap is written to",
-            expected="a servo with torque_limit among its registers",
-            advice="set_torque_limit() sets it for good; nothing was sent",
+            f"{shown(fraction)} is no torque limit",
+            expected="a fraction of the stall torque, 0 to 1",
+            advice="nothing was sent",
             node=node.node,
         )
-    await set_torque_limit(node, fraction)
+    table = await writable(node)
+    name = CONTROL[table.name].limit
+    if not name:
+        raise RequestError(
+            f"node {node.node} keeps its torque limit in EEPROM (max_torque), which no cap is written to",
+            expected="a servo with torque_limit among its registers",
+            advice="write(max_torque=…) sets it for good; nothing was sent",
+            node=node.node,
+        )
+    row = table[name]
+    if fraction and not (await read_raw(node, name))[name]:
+        await calmed(node, await asked_anew(node))
+    await write_limp(node, {name: fraction})
+    await verified(node, Block(row.address, row.encode(node.raw(row, fraction))))
 
 
 async def cap_current(node: Node, current: float) -> None:

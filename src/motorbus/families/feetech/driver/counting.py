@@ -271,6 +271,6 @@ def _unsteady(node: Node, address: int, seen: bytes, again: bytes) -> Verificati
         received=f"{seen.hex(' ')}, then {again.hex(' ')}",
         expected="the same twice, for all other bits of its phase register are to stay as they are",
         cause="another program writes to this servo, or two servos answer to this id",
-        advice="see that nobody else uses this bus (duplicates() looks for two); nothing was changed",
+        advice="connect one servo and close other programs on this bus; nothing was changed",
         node=node.node,
     )

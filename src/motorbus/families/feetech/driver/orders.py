@@ -28,7 +28,6 @@ _CALIBRATE: Final = 128
 _INSTEAD: Final = {
     "id": "use set_id(), which sees to it that the servo is found again",
     "baud_rate": "use set_baud(), which sees to it that the servo is found again",
-    "second_id": "use set_second_id(), which sees to it that no other servo has it",
     "homing_offset": "use calibrate(), which reckons it from where the servo stands",
 }
 

@@ -58,6 +58,6 @@ async def _refuse_second(id: int, head: bytes, ids: Sequence[int]) -> None:
             f"servo {id} has {second} as its second id: it would obey every write to {second} without a word",
             expected="no servo whose second id is one of " + " and ".join(map(str, ids)),
             cause="HLS servos hear writes to a second id (register 7)",
-            advice=f"set_second_id({id}) of servo {id} ends that, or take it off the bus; nothing was written",
+            advice=f"take servo {id} off the bus; nothing was written",
             node=id,
         )

@@ -30,7 +30,7 @@ async def set_id(node: Node, new: int, *, among: Sequence[int] = ()) -> Found:
 
     The servo goes limp. `among` are the ids that other servos on this bus may have; () means every one, which takes
     some seconds to ask. What it has already is not written again. The second id of an HLS servo becomes the new id,
-    too, when it is the old one; any other second id stays (`set_second_id`).
+    too, when it is the old one; any other second id stays.
 
     Raises RequestError (nothing was written) for an impossible id, one that answers already, two servos that seem to
     have the old id, an HLS servo that has one of both as its second id, or while another change on this bus is

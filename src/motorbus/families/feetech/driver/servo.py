@@ -7,6 +7,7 @@ from motorbus.families.feetech.driver import (
     alarm,
     blocked,
     calibration,
+    capping,
     counting,
     drive,
     feedback,
@@ -19,10 +20,7 @@ from motorbus.families.feetech.driver import (
     registers,
     renaming,
     restoring,
-    second,
-    sharing,
     torque,
-    tuning,
     turns,
 )
 from motorbus.families.feetech.driver.node import Node
@@ -61,11 +59,8 @@ class ServoMethods(Node):
     set_duty = device_method(drive.set_duty)
     set_current = device_method(drive.set_current)
     step = device_method(drive.step)
-    duplicates = device_method(sharing.duplicates)
     set_id = device_method(renaming.set_id)
     set_baud = device_method(rates.set_baud)
-    second_id = device_method(second.second_id)
-    set_second_id = device_method(second.set_second_id)
     recover = device_method(recovery.recover)
     factory_restore = device_method(restoring.factory_restore)
     calibrate = device_method(calibration.calibrate)
@@ -73,12 +68,8 @@ class ServoMethods(Node):
     clear_turns = device_method(turns.clear_turns)
     many_turns = device_method(counting.many_turns)
     set_many_turns = device_method(counting.set_many_turns)
-    torque_limit = device_method(tuning.torque_limit)
-    set_torque_limit = device_method(tuning.set_torque_limit)
-    gains = device_method(tuning.gains)
-    set_gains = device_method(tuning.set_gains)
-    protection = device_method(tuning.protection)
-    set_protection = device_method(tuning.set_protection)
+    cap_torque = device_method(capping.cap_torque)
+    cap_current = device_method(capping.cap_current)
     recover_overload = device_method(overload.recover_overload)
     alarms = device_method(alarm.alarms)
     blockers = device_method(blocked.blockers)

@@ -108,7 +108,7 @@ def model(name: str, firmware: str = "") -> Model:
         raise RequestError(
             f"there is no simulated FEETECH model {name!r}",
             expected=f"perhaps {', '.join(near)}" if near else f"one of {len(MODELS)}, as {_USUAL}",
-            advice="`motorbus feetech models` lists them",
+            advice="docs/reference/feetech-registers.md lists them",
         )
     if not firmware:
         return known[0]
