@@ -70,7 +70,7 @@ def test_a_bad_script_leaves_the_one_that_is_set() -> None:
         hall = Hall(listener)
         hall.faulted.set("exchange 2: drop")
         line = hall.mount.course.line
-        for wrong in ("exchange 1: explode", "exchange 1: power-cycle 9", "exchange 1 on adapter: drop"):
+        for wrong in ("exchange 1: explode", "exchange 1: power-cycle 9"):
             with pytest.raises(RequestError):
                 hall.faulted.set(wrong)
         for nothing in ("seed 3", "# nothing"):
@@ -195,16 +195,6 @@ def test_a_pulled_can_adapter_comes_back_as_new() -> None:
         assert hall.faulted.count == 1
 
 
-def test_the_text_of_an_adapter_suffers() -> None:
-    with closing(Door(TcpPort(), SlcanAdapter)) as door:
-        hall = Hall(door, "kst")
-        hall.faulted.set("exchange 2 on adapter: duplicate")
-        with reached(hall, door.port) as client:
-            assert asked(client.fileno(), b"S6\r".hex(), 1) == "0D"
-            assert asked(client.fileno(), b"O\r".hex(), 2) == "0D 0D"
-        assert [one["fault"] for one in hall.faulted.facts()["fired"]] == ["exchange 2 on adapter: duplicate"]
-
-
 def test_a_terminal_without_a_name_cannot_be_pulled() -> None:
     with closing(PtyMaster()) as terminal:
         assert "nobody would find" in CanClient(terminal, SlcanAdapter()).fixed
@@ -243,7 +233,7 @@ def test_faults_are_refused_on_a_bus_that_may_have_real_devices() -> None:
     link = QueueLink(no_wire=False, name="can://socketcan/can0")
     hall = Hall(LinkClient(link), "kst")
     line = hall.mount.line
-    for script in ("1%: drop", "at 1 s: power-cycle 1", "exchange 1 on adapter: drop"):
+    for script in ("1%: drop", "at 1 s: power-cycle 1"):
         with pytest.raises(RequestError, match="can://socketcan/can0: faults are refused"):
             read_order(hall.faulted, script)
     assert hall.mount.line is line
