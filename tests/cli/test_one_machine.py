@@ -1,8 +1,4 @@
-"""One machine on three real ports, each with a simulator in a process of its own: what goes well, and what goes wrong.
-
-Whatever is refused is refused before a port is opened: the machine of those tests has ports that do not exist, so one
-that was opened would end with another exit code.
-"""
+"""One machine on three real ports, each with a simulator in a process of its own: what goes well, and what fails."""
 
 from __future__ import annotations
 
@@ -140,67 +136,3 @@ def test_one_bus_that_is_gone_keeps_no_other_from_being_stopped(served_machine: 
     ran = run("estop", "--json")
     assert ran.code == 6
     assert [bool(one["error"]) for one in ran.document["buses"]] == [True, False, False]
-
-
-BAD = {
-    "move": (
-        "", "a1", "a1=", "a1=nan", "a1=10mm", "a9=1", "a1=1 a1=2", "a1=1 arm#1=1", "a1=1 --speed 0", "a1=1 --kind x",
-        "lift=1deg", "a1=1 --velocity 2", "a1=1 --colour red",
-    ),
-    "pose": (
-        "redy", "a1", "ready more", "ready --force", "ready --speed 2", "ready --duration 0", "ready --duration nan",
-        "--save 1", "--save Up", "--save ready", "--save up --home", "--save up a9", "ready --assume lift",
-    ),
-    "park": (
-        "a2", "a9", "ready", "arm#1", "a1=1", "can", "a1 --speed fast", "a1 --duration -1", "a1 --kind x",
-        "a1 --assume a1", "a1 --colour red",
-    ),
-    "hold": (
-        "a9", "ready", "arm#1", "a1=1", "a1 a9", "''", "arm,baud=1", "feetech:x", "a1 --baud fast", "--colour red",
-    ),
-    "home": (
-        "", "a9", "ready", "lift=1", "arm", "can#37", "lift --velocity 0", "lift --deadline long",
-        "lift --deadline nan", "lift stage#1", "lift --colour red",
-    ),
-    "jog": (
-        "lift", "lift=1mm/s", "lift=1mm/s --seconds 0", "lift=1mm/s --seconds x", "lift=1 --seconds nan",
-        "lift=1deg/s --seconds 1", "a9=1 --seconds 1", "upper=1 --seconds 1", "=1 --seconds 1", "a1=fast --seconds 1",
-        "a1=nan --seconds 1", "a1=1 --seconds 1 --colour red",
-    ),
-    "stop": ("a9", "a9 a8", "ready", "arm#254", "arm#x", "arm#", "a1#1", "arm,baud=1", "nobody:x", "a1=1"),
-    "torque": (
-        "", "on", "sideways a1", "on a9", "on ready", "on a1 arm#1", "off can", "off a9", "on a1=1",
-        "on arm#254", "on c1", "on a1 lift",
-        "on a1 --colour red",
-    ),
-    "init": (
-        "arm", "a1", "arm#1", "Arm=feetech:x", "=feetech:x", "nobody:x", "feetech:x#254", "feetech:x feetech:x",
-        "feetech:x", "feetech:x --output .", "feetech:x,colour=red --force",
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("name", "words"), [(name, words) for name, several in BAD.items() for words in several]
-)
-def test_what_is_refused_is_refused_in_one_message_before_a_port_is_opened(
-    name: str, words: str, tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    write(
-        tmp_path,
-        {
-            "arm": "feetech:/dev/nowhere1",
-            "can": "kst:can://slcan/dev/nowhere2",
-            "stage": "stepper:/dev/nowhere3",
-        },
-    )
-    before = (tmp_path / "motorbus.toml").read_bytes()
-    ran = run(name, *(word.strip("'") for word in words.split()))
-    assert (ran.code, ran.out) == (2, ""), ran.err
-    assert ran.err.count("error: ") == 1
-    assert (tmp_path / "motorbus.toml").read_bytes() == before
-
-
-def test_there_are_ten_kinds_for_each_command() -> None:
-    assert {name: len(several) for name, several in BAD.items() if len(set(several)) < 10} == {}

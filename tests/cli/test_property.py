@@ -79,16 +79,8 @@ class Typist:
         spot = self.chance.choice(list(BOUNDS))
         typed, to = self.goal(spot)
         device = self.word(spot)
-        kind = self.chance.randrange(5 if spot[0] == "arm" else 4)
-        if kind < 2:
+        if self.chance.randrange(2):
             return ["write", device, f"goal_position={typed}", "--yes", "--expert"], {spot: to}
-        if kind == 2 and spot[0] == "arm":
-            return ["feetech", "reg-write", device, f"goal_position={typed}", "--yes"], {spot: to}
-        if kind == 4:
-            second, there = self.goal(("arm", 3 - spot[1]))
-            pairs = [f"{spot[1]}={typed}", f"{3 - spot[1]}={second}"]
-            words = ["feetech", "sync-write", "arm", "goal_position", *pairs, "--yes"]
-            return words, {spot: to, ("arm", 3 - spot[1]): there}
         device = (
             self.addresses[spot[0]] + f"#{spot[1]}"
         )  # by its name it is an axis, with an angle of its own

@@ -7,7 +7,6 @@ import pytest
 import motorbus
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
-from tests.support.processes import Simulated
 
 
 def wear(arm: Simulation) -> int:
@@ -29,13 +28,6 @@ def test_for_programs(run: Run, arm: Simulation) -> None:
         "new": 16,
         "address": f"{arm.url}#16",
     }
-
-
-def test_on_a_real_port(run: Run, served: Simulated) -> None:
-    ran = run("set-id", f"{served.bus}#3", "7", "--yes", "--among", "1-9")
-    assert ran.code == 0, ran.err
-    devices = run("scan", served.bus, "--ids", "1-9", "--json").document["devices"]
-    assert [one["id"] for one in devices] == [1, 2, 7]
 
 
 def test_it_is_asked_before_and_nobody_there_to_agree_is_8(run: Run, arm: Simulation) -> None:

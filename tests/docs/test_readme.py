@@ -1,7 +1,7 @@
-"""Every command of the README and of the page on a machine runs as written, on simulated devices behind real ports.
+"""Every command of the README and of the page on a machine runs as written, on simulated devices.
 
-The ports of a command are replaced by pseudo-terminals with simulated devices of the same ids. A command runs in this
-process, except one that ends by a signal or needs a person. The Python of the README runs in `test_docs`.
+The ports of a command are replaced by simulated buses of this process with devices of the same ids. A command runs in
+this process, except one that ends by a signal. The Python of the README runs in `test_docs`.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 import shlex
 import signal
-import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -19,11 +18,11 @@ from typing import NamedTuple
 
 import pytest
 
+import motorbus
 from motorbus.cli import main
 from motorbus.cli.exits import Exit
 from motorbus.motion.machine import Machine
 from motorbus.session import prepare
-from tests.support.processes import Simulated
 
 ROOT = Path(__file__).resolve().parents[2]
 MACHINE_PAGE = ROOT / "docs" / "how-to" / "machine.md"
@@ -42,10 +41,12 @@ PORTS = {
     "kst": (re.compile(r"kst:can://slcan/dev/ttyACM\d"), "0x25"),
     "stepper": (re.compile(r"stepper:/dev/ttyUSB0"), "1"),
 }
-NAMED = re.compile(r"^motorbus (pose|park|teach|replay|follow|loop-stats|safety|budget arm|move shoulder)")
+NAMED = re.compile(r"^motorbus (pose|park|teach|replay|follow|loop-stats|budget arm|move shoulder)")
 """Commands that go by names of a machine file."""
 FOR_EVER = re.compile(r"^motorbus simulate ")
 WITH_HANDS = re.compile(r"^motorbus kst provision ")
+POWER_CYCLE = "at 9 s: power-cycle 37"
+"""What its user does when the command asks for it."""
 FEED = """format = 1
 name = "Feed"
 project = 2
@@ -73,7 +74,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def ports(request: pytest.FixtureRequest, folder: Path) -> Iterator[dict[str, str]]:
+def ports(request: pytest.FixtureRequest) -> Iterator[dict[str, str]]:
     """The addresses of simulated buses, by family, of those that the line needs."""
     line: str = request.node.callspec.params["line"]
     with ExitStack() as stack:
@@ -82,10 +83,8 @@ def ports(request: pytest.FixtureRequest, folder: Path) -> Iterator[dict[str, st
             if pattern.search(line) or (
                 family == "feetech" and NAMED.search(line) and "readme" in request.node.name
             ):
-                child = Simulated(
-                    family, ids=ids, link=folder / family, control=str(folder / f"{family}.control")
-                )
-                found[family] = stack.enter_context(child).bus
+                faults = POWER_CYCLE if WITH_HANDS.search(line) else ""
+                found[family] = stack.enter_context(motorbus.simulate(family, ids=ids, faults=faults)).url
         yield found
 
 
@@ -123,16 +122,16 @@ def shell(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
 
     def run(line: str, *more: str) -> Ran:
         words = [*shlex.split(line)[1:], *more]
-        if FOR_EVER.search(line) or (more and WITH_HANDS.search(line)):
-            return run_process(line, words, folder)
+        if FOR_EVER.search(line):
+            return run_process(words, folder)
         capsys.readouterr()
         return Ran(main(words), *capsys.readouterr())
 
     return run
 
 
-def run_process(line: str, words: list[str], folder: Path) -> Ran:
-    """Run the command in a process of its own; send Ctrl-C, or do what it asks its user to do."""
+def run_process(words: list[str], folder: Path) -> Ran:
+    """Run the command in a process of its own; send Ctrl-C after its first line."""
     with subprocess.Popen(
         [sys.executable, "-m", "motorbus", *words],
         cwd=folder,
@@ -142,23 +141,10 @@ def run_process(line: str, words: list[str], folder: Path) -> Ran:
         text=True,
     ) as process:
         assert process.stdout is not None
-        assert process.stderr is not None
-        first = process.stdout.readline() if FOR_EVER.search(line) else ""
-        if first:
-            process.send_signal(signal.SIGINT)
-        if WITH_HANDS.search(line):
-            assert "switch the supply" in process.stderr.readline()
-            power_cycle(folder / "kst.control")
+        first = process.stdout.readline()
+        process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=60)
     return Ran(process.returncode, first + out, err)
-
-
-def power_cycle(control: Path) -> None:
-    """Switch the supply of the servo off and on, as the user is asked to."""
-    with socket.socket(socket.AF_UNIX) as line:
-        line.connect(str(control))
-        line.sendall(b"power-cycle\n")
-        assert line.recv(1000)
 
 
 def shortened(line: str) -> str:
@@ -188,8 +174,6 @@ def worked(line: str, ports: dict[str, str], folder: Path, shell: Shell) -> Ran:
     if meant.startswith("motorbus stepper run"):
         assert shell(f"motorbus stepper write feed.toml {ports['stepper']} --yes").returncode == 0
     ran = shell(meant)
-    if ran.returncode == Exit.NO_REPLY:  # a busy machine gave the simulator's process no time; once is enough
-        ran = shell(meant)
     return shell(meant, "--yes") if "nobody agreed" in ran.stderr else ran
 
 

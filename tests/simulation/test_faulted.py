@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import os
-import select
 import socket
 import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from motorbus import families
 from motorbus.errors import RequestError
-from motorbus.simulation.clients import CanClient, Door
+from motorbus.simulation.clients import CanClient
 from motorbus.simulation.faulted import Faulted, read_order
 from motorbus.simulation.faults import World
 from motorbus.simulation.listener import TcpListener, TcpPort
@@ -24,7 +21,7 @@ from motorbus.simulation.pty import PtyMaster
 from motorbus.simulation.served import LinkClient
 from motorbus.simulation.slcan import SlcanAdapter
 from tests.simulation.links import QueueLink
-from tests.support.mounts import PATIENCE, asked, received, served
+from tests.support.mounts import PATIENCE, asked, served
 
 PING, PONG = "FF FF 01 02 01 FB", "FF FF 01 02 00 FC"
 
@@ -50,27 +47,12 @@ def reached(hall: Hall, port: TcpListener | TcpPort) -> Iterator[socket.socket]:
         yield client
 
 
-def test_a_fault_on_a_socket_and_what_is_told_of_it() -> None:
-    with closing(TcpListener()) as listener:
-        hall = Hall(listener)
-        hall.faulted.set("exchange 2 byte 5: corrupt 01; exchange 9: drop")
-        with reached(hall, listener) as client:
-            assert asked(client.fileno(), PING, 6) == PONG
-            assert asked(client.fileno(), PING, 6) == "FF FF 01 02 00 FD"
-        facts = hall.faulted.facts()
-        assert [one["fault"] for one in facts["fired"]] == ["exchange 2 byte 5: corrupt 01"]
-        assert facts["pending"] == ["exchange 9: drop"]
-        assert (facts["exchange"], facts["count"], facts["seed"]) == (2, 1, None)
-        assert 0 <= facts["fired"][0]["at"] < PATIENCE
-        assert hall.faulted.replay() == "faults: 1 happened"
-
-
 def test_a_bad_script_leaves_the_one_that_is_set() -> None:
     with closing(TcpListener()) as listener:
         hall = Hall(listener)
         hall.faulted.set("exchange 2: drop")
         line = hall.mount.course.line
-        for wrong in ("exchange 1: explode", "exchange 1: power-cycle 9", "exchange 1 on adapter: drop"):
+        for wrong in ("exchange 1: explode", "exchange 1: power-cycle 9"):
             with pytest.raises(RequestError):
                 hall.faulted.set(wrong)
         for nothing in ("seed 3", "# nothing"):
@@ -96,113 +78,6 @@ def test_chance_gets_a_seed_that_is_told() -> None:
         assert hall.faulted.replay() == (
             "faults: 1 happened, by the seed 5; the same again: --faults 'seed 5; 100%: duplicate'"
         )
-
-
-def test_a_pulled_terminal_hangs_up_and_is_another_one_behind_the_same_name(tmp_path: Path) -> None:
-    link = tmp_path / "arm"
-    with closing(PtyMaster()) as terminal:
-        terminal.symlink(link)
-        hall = Hall(terminal)
-        hall.faulted.set("exchange 2: unplug 0.2")
-        with served(hall.mount):
-            descriptor = os.open(link, os.O_RDWR | os.O_NOCTTY)
-            assert asked(descriptor, PING, 6) == PONG
-            os.write(descriptor, bytes.fromhex(PING))
-            assert hung_up(descriptor)
-            os.close(descriptor)
-            descriptor = opened_again(link)
-            assert asked(descriptor, PING, 6) == PONG
-            os.close(descriptor)
-        assert hall.faulted.count == 1
-
-
-def hung_up(descriptor: int) -> bool:
-    """Whether this end is told that the other one is gone."""
-    poll = select.poll()
-    poll.register(descriptor, 0)
-    return bool(poll.poll(PATIENCE * 1000)) and received_nothing(descriptor)
-
-
-def received_nothing(descriptor: int) -> bool:
-    try:
-        return os.read(descriptor, 64) == b""
-    except OSError:
-        return True
-
-
-def opened_again(link: Path) -> int:
-    end = time.monotonic() + PATIENCE
-    while True:
-        try:
-            return os.open(link, os.O_RDWR | os.O_NOCTTY)
-        except OSError:
-            assert time.monotonic() < end
-            select.select((), (), (), 0.01)
-
-
-def test_a_pulled_socket_is_dropped_and_refused_and_is_back() -> None:
-    with closing(TcpListener()) as listener:
-        hall = Hall(listener)
-        hall.faulted.set("exchange 2: unplug 600")
-        address = listener.host, listener.port
-        with socket.create_connection(address, timeout=PATIENCE) as client:
-            assert stepped(hall, client) == bytes.fromhex(PONG)
-            assert stepped(hall, client) == b""
-        for pause in (0.0, 300.0):
-            hall.slept += pause
-            hall.mount.step(timeout=0)
-            with pytest.raises(ConnectionRefusedError):
-                socket.create_connection(address, timeout=PATIENCE).close()
-        hall.slept += 301.0
-        hall.mount.step(timeout=0)
-        with socket.create_connection(address, timeout=PATIENCE) as client:
-            assert stepped(hall, client) == bytes.fromhex(PONG)
-
-
-def stepped(hall: Hall, client: socket.socket) -> bytes:
-    """What comes of a ping, a step of the mount at a time."""
-    client.sendall(bytes.fromhex(PING))
-    while not select.select([client], (), (), 0)[0]:
-        hall.mount.step(timeout=0.01)
-    return client.recv(64)
-
-
-@contextmanager
-def called_again(port: TcpPort) -> Iterator[socket.socket]:
-    end = time.monotonic() + PATIENCE
-    while True:
-        try:
-            client = socket.create_connection((port.host, port.port), timeout=PATIENCE)
-            break
-        except ConnectionRefusedError:
-            assert time.monotonic() < end
-            select.select((), (), (), 0.01)
-    with client:
-        yield client
-
-
-def test_a_pulled_can_adapter_comes_back_as_new() -> None:
-    with closing(Door(TcpPort(), SlcanAdapter)) as door:
-        hall = Hall(door, "kst")
-        hall.faulted.set("exchange 1: unplug 0.2")
-        with reached(hall, door.port) as client:
-            client.sendall(b"S6\rO\rt62584002600000000000\r")
-            while client.recv(64):
-                pass
-            with called_again(door.port) as again:
-                again.sendall(b"V\r")
-                assert received(again.fileno(), 1)
-        assert hall.faulted.count == 1
-
-
-def test_the_text_of_an_adapter_suffers() -> None:
-    with closing(Door(TcpPort(), SlcanAdapter)) as door:
-        hall = Hall(door, "kst")
-        hall.faulted.set("exchange 2 on adapter: duplicate")
-        with reached(hall, door.port) as client:
-            assert asked(client.fileno(), b"S6\r".hex(), 1) == "0D"
-            assert asked(client.fileno(), b"O\r".hex(), 2) == "0D 0D"
-        assert [one["fault"] for one in hall.faulted.facts()["fired"]] == ["exchange 2 on adapter: duplicate"]
 
 
 def test_a_terminal_without_a_name_cannot_be_pulled() -> None:
@@ -243,7 +118,7 @@ def test_faults_are_refused_on_a_bus_that_may_have_real_devices() -> None:
     link = QueueLink(no_wire=False, name="can://socketcan/can0")
     hall = Hall(LinkClient(link), "kst")
     line = hall.mount.line
-    for script in ("1%: drop", "at 1 s: power-cycle 1", "exchange 1 on adapter: drop"):
+    for script in ("1%: drop", "at 1 s: power-cycle 1"):
         with pytest.raises(RequestError, match="can://socketcan/can0: faults are refused"):
             read_order(hall.faulted, script)
     assert hall.mount.line is line

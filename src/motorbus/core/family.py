@@ -16,7 +16,6 @@ from importlib import import_module
 from math import inf
 from typing import Any, NamedTuple, Protocol
 
-from motorbus.core.guarantees import Guarantees
 from motorbus.core.recording import RecordingReceiver
 from motorbus.core.register import RegisterMap
 from motorbus.core.request import Data, Event, Request, Response
@@ -384,7 +383,6 @@ class Family:
     devices: DeviceTypes
     driver: Callable[..., BusDriver]
     """driver(family, **settings) makes the driver of a bus. Raises RequestError for a bad setting."""
-    safety: Guarantees | None = None
     # Names of modules that are imported on first use.
     simulator_module: str  # has `simulate(ids, model, **options)`, and `OPTIONS` if it has options
     recording_module: str = ""  # has `Recording(direction)`; "": the receiver of the bus decodes recordings

@@ -14,9 +14,7 @@ from typing import Any, Final, Protocol
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Data
 from motorbus.errors import RequestError
-from motorbus.link.base import Line, PerfectLine
 from motorbus.simulation.adapter import Adapter
-from motorbus.simulation.adapter_text import Text
 from motorbus.simulation.listener import TcpClient, TcpPort
 
 MOST_CLIENTS: Final = 16
@@ -137,10 +135,7 @@ class SerialClient(Participant):
 
 
 class CanClient(Participant):
-    """A program behind an adapter. A frame reaches it whole or, when it does not read, not at all.
-
-    What lies between the adapter and its host is told by `heed`.
-    """
+    """A program behind an adapter. A frame reaches it whole or, when it does not read, not at all."""
 
     def __init__(self, endpoint: Endpoint, adapter: Adapter) -> None:
         self.adapter = adapter
@@ -148,7 +143,6 @@ class CanClient(Participant):
         self._rate: int | None = None
         self._stuck = False
         self._as_new = deepcopy(adapter)
-        self._text: Text | None = None
         self._out = bytearray(adapter.greet())
 
     @property
@@ -162,8 +156,6 @@ class CanClient(Participant):
         _pullable(self._endpoint).plug()
         self.adapter = deepcopy(self._as_new)
         self._rate, self._stuck = None, False
-        if self._text:
-            self._text.half = b""
         self._out = bytearray(self.adapter.greet())
 
     def fileno(self) -> int:
@@ -171,10 +163,8 @@ class CanClient(Participant):
 
     def read(self, at: float, patience: float = 0.0) -> list[Data]:
         said = self._endpoint.read()
-        frames: list[Data] = [*self.adapter.feed(self._text.said(said, at) if self._text else said, at)]
+        frames: list[Data] = [*self.adapter.feed(said, at)]
         answer = self.adapter.take()
-        if self._text:
-            answer = self._text.answered(answer, at)
         if len(self._out) < _UNREAD:  # who never reads misses answers at last
             self._out += answer
         self._rate = self.adapter.bitrate if self.adapter.open or frames else None
@@ -183,17 +173,10 @@ class CanClient(Participant):
     def rate(self) -> int | None:
         return self._rate
 
-    def heed(self, line: Line | None) -> None:
-        """What lies between adapter and host from now on; None: nothing."""
-        half = self._text.half if self._text else b""
-        self._text = None if line is None and not half else Text(line or PerfectLine(), half)
-
     def tell(self, data: Data, at: float) -> None:
         if not isinstance(data, CanFrame):
             raise RequestError("this simulator speaks bytes, which a CAN adapter cannot carry")
         said = self.adapter.deliver(data, at)
-        if self._text:
-            said = self._text.answered(said, at)
         if self._stuck:
             self.lost += bool(said)
         else:
@@ -223,7 +206,6 @@ class Door:
         self.port = port
         self.clients: list[CanClient] = []
         self._adapter = adapter
-        self._line: Line | None = None
 
     def fileno(self) -> int:
         """Turns readable when somebody knocks."""
@@ -237,15 +219,7 @@ class Door:
         if len(self.clients) >= MOST_CLIENTS:
             connection.close()
         else:
-            client = CanClient(connection, self._adapter())
-            client.heed(self._line)
-            self.clients.append(client)
-
-    def heed(self, line: Line | None) -> None:
-        """What lies between each adapter and its host from now on; None: nothing."""
-        self._line = line
-        for client in self.clients:
-            client.heed(line)
+            self.clients.append(CanClient(connection, self._adapter()))
 
     def sweep(self) -> list[CanClient]:
         """Forget those who have left; these were they."""

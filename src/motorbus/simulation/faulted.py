@@ -1,7 +1,6 @@
 """The faults of a simulation that is served: set before, changed and looked at while it runs.
 
-The wire suffers at the course of the mount, devices and ports in a `World`, and the text between a CAN adapter and its
-host at the clients, for it has neither check sum nor time of its own.
+The wire suffers at the course of the mount, devices and ports in a `World`.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from motorbus.errors import RequestError
 from motorbus.link.base import PerfectLine
 from motorbus.simulation.faults import Fault, FaultyLine, Script, World
 from motorbus.simulation.faults.script import requested
-from motorbus.simulation.faults.struck import on_a_wire, without_adapter
+from motorbus.simulation.faults.struck import on_a_wire
 from motorbus.simulation.mount import Mount
 
 SCHEMA: Final = "motorbus.simulator-script/1"
@@ -39,7 +38,7 @@ class Faulted:
         self._mount = mount
         self._world = world
         self._began = world.now
-        self._lines: tuple[FaultyLine, ...] = ()
+        self._line = FaultyLine(most=KEPT)
         self._script = Script()
         self._before = self._seen = self._left = 0
         self._since = 0.0
@@ -53,7 +52,7 @@ class Faulted:
     @property
     def count(self) -> int:
         """How many faults have happened, under all scripts."""
-        return self._before + sum(line.count for line in self._lines)
+        return self._before + self._line.count
 
     @property
     def script(self) -> Script:
@@ -76,32 +75,28 @@ class Faulted:
             given = given.seeded(secrets.randbelow(1 << 32))
         if given.faults and self._mount.real:
             raise on_a_wire(self._mount.real)
-        if not self._mount.texts:
-            without_adapter(given)
         ended = self._ended()  # before the world forgets
         line = FaultyLine(given, self._world, most=KEPT)
-        text = FaultyLine(given, adapter=True, most=KEPT, began=self._world.now)
         self._news += ended
         self._sets, self._set_at = self._sets + 1, self._world.now
         self._left += self.count - self._seen
         self._before = self._seen = self.count
         self._mount.line = line if len(given) else PerfectLine()
-        self._mount.text(text if text.faults else None)
-        self._lines, self._script = (line, text), given
+        self._line, self._script = line, given
         if given.by_chance:
             self._news.append(f"faults: seed {given.seed}")
 
     def facts(self) -> dict[str, Any]:
         """What is set, what has happened and what has not, as plain data; times in s from the beginning."""
         fired = self._fired(TOLD)
-        pending = [str(fault) for line in self._lines for fault in line.pending]
-        never = [str(fault) for line in self._lines for fault in line.never]
+        pending = [str(fault) for fault in self._line.pending]
+        never = [str(fault) for fault in self._line.never]
         return {
             "schema": SCHEMA,
             "simulated": True,
             "script": self._script.line,
             "seed": self._script.seed,
-            "exchange": self._lines[0].exchange if self._lines else 0,
+            "exchange": self._line.exchange,
             "count": self.count,
             "fired": [{"at": round(at - self._began, 6), "fault": fault} for at, fault in fired],
             "pending": pending[:TOLD],
@@ -134,8 +129,8 @@ class Faulted:
 
     def _fired(self, most: int) -> list[tuple[float, str]]:
         """The latest so many, with their moments; those of one moment in the order in which they happened."""
-        latest = [(one.at, one.fault) for line in self._lines for one in line.fired[-most:]]
-        return sorted(latest, key=itemgetter(0))[-most:]
+        latest = [(one.at, one.fault) for one in self._line.fired[-most:]]
+        return sorted(latest, key=itemgetter(0))
 
     def rest(self) -> list[str]:
         """How many have not been shown; nothing when none."""
@@ -174,14 +169,13 @@ class Faulted:
     def unhappened(self) -> list[str]:
         """A line for each fault of the latest script that has not happened, and what there was; not too many."""
         found = [
-            f"faults: `{fault}` has not happened ({self._why(line, fault)})"
-            for line in self._lines
-            for fault in (*line.pending, *line.never)
+            f"faults: `{fault}` has not happened ({self._why(fault)})"
+            for fault in (*self._line.pending, *self._line.never)
         ]
         beyond = len(found) - TOLD
         return [*found[:TOLD], *([f"faults: … and {beyond} more have not happened"] if beyond > 0 else [])]
 
-    def _why(self, line: FaultyLine, fault: Fault) -> str:
+    def _why(self, fault: Fault) -> str:
         """What there was while it did not happen."""
         passed = self._world.now - self._set_at
         if fault in self._world.armed:
@@ -190,9 +184,10 @@ class Faulted:
             return "its moment has passed, and nothing came since that it could change"
         if fault.moment is not None:
             return f"{passed:.1f} s have passed"
-        if fault.exchange is not None and fault.exchange < line.exchange:
+        if fault.exchange is not None and fault.exchange < self._line.exchange:
             return f"exchange {fault.exchange} has passed, and nothing was in it that this could change"
-        return f"{line.exchange} exchange{' was' if line.exchange == 1 else 's were'} seen"
+        seen = self._line.exchange
+        return f"{seen} exchange{' was' if seen == 1 else 's were'} seen"
 
 
 def read_order(faults: Faulted | None, text: str) -> dict[str, Any] | None:

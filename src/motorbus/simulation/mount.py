@@ -116,16 +116,6 @@ class Mount:
         self.course.forget()
 
     @property
-    def texts(self) -> list[CanClient | Door]:
-        """Where hosts speak to an adapter in text."""
-        return [port for port in self._ports if isinstance(port, CanClient | Door)]
-
-    def text(self, line: Line | None) -> None:
-        """What lies between adapters and their hosts; None: nothing."""
-        for port in self.texts:
-            port.heed(line)
-
-    @property
     def clients(self) -> list[Participant]:
         """Whoever takes part now."""
         if self._back_at is not None:

@@ -21,7 +21,7 @@ from motorbus.link.base import Line, PerfectLine
 from motorbus.link.memory import MemoryLink
 from motorbus.simulation.faults import Fault, FaultyLine, Script, World
 from motorbus.simulation.faults.script import requested
-from motorbus.simulation.faults.struck import is_calm, on_a_wire, without_adapter
+from motorbus.simulation.faults.struck import is_calm, on_a_wire
 from motorbus.simulation.served import LinkClient, Served, check_harmless, join
 from motorbus.simulation.told import told
 
@@ -119,7 +119,6 @@ class Simulation:
     @faults.setter
     def faults(self, script: Faults) -> None:
         given = requested(script)
-        without_adapter(given)
         link = self._link
         if given.faults:
             self._check_wire()

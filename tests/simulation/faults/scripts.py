@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from motorbus.link.base import Side
 from motorbus.simulation.faults import ANY, WORDS, Fault, Script
-from motorbus.simulation.faults.fault import ON_ADAPTER
 from motorbus.simulation.faults.words import Takes
 
 SECONDS = st.floats(1e-6, 1e6)
@@ -31,13 +30,11 @@ def places(draw: st.DrawFn, action: str) -> dict[str, Any]:
         place["per_byte"] = kind == "per_byte"
     if action != "echo" and draw(st.booleans()):
         place["to"] = draw(st.sampled_from(Side))
-    if action in ON_ADAPTER:
-        place["adapter"] = draw(st.booleans())
     return place
 
 
 @st.composite
-def arguments(draw: st.DrawFn, action: str, at_byte: bool, timeless: bool = False) -> dict[str, Any]:
+def arguments(draw: st.DrawFn, action: str, at_byte: bool) -> dict[str, Any]:
     """What stands behind the word."""
     takes = WORDS[action].takes
     if takes in BY_CHANCE:
@@ -51,9 +48,9 @@ def arguments(draw: st.DrawFn, action: str, at_byte: bool, timeless: bool = Fals
     if takes is Takes.NOTHING:
         return {}
     found: dict[str, Any] = {"seconds": draw(SECONDS)}
-    if takes.name.startswith("PERHAPS") and (timeless or draw(st.booleans())):
+    if takes.name.startswith("PERHAPS") and draw(st.booleans()):
         return {}
-    if takes in (Takes.SPAN, Takes.PERHAPS_SPAN) and draw(st.booleans()):
+    if takes is Takes.SPAN and draw(st.booleans()):
         found["until"] = found["seconds"] * draw(st.floats(1.5, 10))
     if takes is Takes.SECONDS_NODE:
         found["node"] = draw(st.none() | st.integers(0, 253))
@@ -64,9 +61,7 @@ def arguments(draw: st.DrawFn, action: str, at_byte: bool, timeless: bool = Fals
 def _fault(draw: st.DrawFn, actions: tuple[str, ...]) -> Fault:
     action = draw(st.sampled_from(actions))
     place = draw(places(action))
-    at_byte = "byte" in place or place.get("per_byte", False)
-    timeless = action == "reorder" and (at_byte or place.get("adapter", False))
-    return Fault(action=action, **place, **draw(arguments(action, "byte" in place, timeless)))
+    return Fault(action=action, **place, **draw(arguments(action, "byte" in place)))
 
 
 def faults(*actions: str) -> st.SearchStrategy[Fault]:

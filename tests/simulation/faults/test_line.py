@@ -45,10 +45,8 @@ def asked(script: str, exchange: int = 1) -> FaultyLine:
         ("insert 00", [(0.0, "FF FF 01 00 02 00 FC")]),
         ("truncate", [(0.0, "FF FF 01")]),
         ("delay 0.02", [(0.0, "FF FF 01"), (0.02, "02 00 FC")]),
-        ("stall 0.02", [(0.0, "FF FF 01"), (0.02, "02 00 FC")]),
         ("split", [(0.0, "FF FF 01"), (0.001, "02 00 FC")]),
         ("split 0.1", [(0.0, "FF FF 01"), (0.1, "02 00 FC")]),
-        ("reorder", [(0.0, "FF FF 01 00 02 FC")]),
     ],
 )
 def test_each_harm_at_byte_3(action: str, got: list[tuple[float, str]]) -> None:
@@ -68,10 +66,6 @@ def test_each_harm_at_byte_3(action: str, got: list[tuple[float, str]]) -> None:
         ("drop", [], WHOLE),
         ("duplicate", WHOLE * 2, WHOLE),
         ("delay 0.02", [(0.02, "FF FF 01 02 00 FC")], [(0.02, "FF FF 01 02 00 FC")]),
-        ("stall 0.02", [(0.02, "FF FF 01 02 00 FC")], [(0.02, "FF FF 01 02 00 FC")]),
-        ("reorder", [], WHOLE * 2),
-        ("reorder 0.5", [(0.5, "FF FF 01 02 00 FC")], WHOLE),
-        ("merge", [], [(0.0, "FF FF 01 02 00 FC FF FF 01 02 00 FC")]),
         (
             "split",
             [(i / 1000, byte) for i, byte in enumerate(["FF", "FF", "01", "02", "00", "FC"])],
@@ -118,14 +112,6 @@ def test_toward_the_device() -> None:
     assert carried(line) == WHOLE
 
 
-def test_a_stall_holds_both_ways() -> None:
-    line = asked("exchange 1: stall 0.5")
-    carried(line)
-    assert line.carry(Side.HOST, b"\x01", 1.1) == [Delivery(1.5, Side.DEVICE, b"\x01")]
-    assert carried(line, at=1.2) == [(0.3, "FF FF 01 02 00 FC")]
-    assert line.carry(Side.HOST, b"\x01", 1.6) == [Delivery(1.6, Side.DEVICE, b"\x01")]
-
-
 @pytest.mark.parametrize(
     ("script", "got"),
     [
@@ -133,8 +119,6 @@ def test_a_stall_holds_both_ways() -> None:
         ("exchange 1 byte 5: drop; exchange 1 byte 5: insert 11", "FF FF 01 02 00 11"),
         ("exchange 1 byte 5: drop; exchange 1 byte 5: corrupt 11", "FF FF 01 02 00"),
         ("exchange 1 byte 4: insert 11; exchange 1 byte 2: drop", "FF FF 02 11 00 FC"),
-        ("exchange 1 byte 3: reorder; exchange 1 byte 4: corrupt FF", "FF FF 01 00 FD FC"),
-        ("exchange 1 byte 3: drop; exchange 1 byte 3: reorder", "FF FF 01 00 FC"),
     ],
 )
 def test_several_at_once_in_the_order_of_the_bytes_and_of_the_script(script: str, got: str) -> None:
@@ -162,16 +146,6 @@ def test_of_a_can_frame_the_data_bytes_count(script: str, got: list[CanFrame]) -
     line = FaultyLine(script)
     assert line.carry(Side.HOST, FRAME, 0.0) == [Delivery(0.0, Side.DEVICE, FRAME)]
     assert line.carry(Side.DEVICE, FRAME, 1.0) == [Delivery(1.0, Side.HOST, frame) for frame in got]
-
-
-def test_frames_wait_for_each_other_too() -> None:
-    line = asked("exchange 1: merge; exchange 1 packet 2: delay 0.5; exchange 2: reorder")
-    other = FRAME._replace(id=0x582)
-    assert line.carry(Side.DEVICE, FRAME, 1.0) == []
-    assert line.carry(Side.DEVICE, other, 1.0) == [Delivery(1.5, Side.HOST, one) for one in (FRAME, other)]
-    line.carry(Side.HOST, FRAME, 2.0)
-    assert line.carry(Side.DEVICE, FRAME, 2.0) == []
-    assert line.carry(Side.DEVICE, other, 2.0) == [Delivery(2.0, Side.HOST, one) for one in (other, FRAME)]
 
 
 def test_at_a_moment_it_is_the_first_packet_from_then_on() -> None:
@@ -203,14 +177,6 @@ def test_every_packet_at_a_hundred_percent() -> None:
     line = FaultyLine("100%: duplicate")
     line.carry(Side.HOST, b"\x01", 0.0)
     assert carried(line) == carried(line) == WHOLE * 2
-
-
-def test_what_is_for_the_text_of_an_adapter_is_for_another_line() -> None:
-    script = "exchange 1 on adapter: drop; exchange 2: drop"
-    assert [str(fault) for fault in FaultyLine(script).faults] == ["exchange 2: drop"]
-    assert [str(fault) for fault in FaultyLine(script, adapter=True).faults] == [
-        "exchange 1 on adapter: drop"
-    ]
 
 
 WIRE = [name for name, word in WORDS.items() if not word.world]
@@ -248,7 +214,7 @@ def test_the_record_does_the_same_again(
 
 @given(st.lists(faults(*WIRE), max_size=20), st.lists(st.binary(min_size=1, max_size=20), max_size=10))
 def test_what_has_a_place_fires_once_or_is_pending(script: list[Fault], traffic: list[bytes]) -> None:
-    placed = [fault for fault in script if not fault.percent and not fault.adapter]
+    placed = [fault for fault in script if not fault.percent]
     line = FaultyLine(placed)
     for data in traffic:
         line.carry(Side.HOST, data, 0.0)

@@ -122,21 +122,6 @@ def test_a_torn_eeprom_is_what_the_switch_says() -> None:
         assert world.simulator.servos[0].lives > 1
 
 
-def test_a_clock_step_makes_devices_older_and_nobody_hears_it() -> None:
-    link, world, line, _ = host("exchange 2: clock-step 3600")
-    servo = world.nodes[1]
-    asked(link, PING)
-    servo.memory["torque_enable"] = 1
-    servo.memory["goal_position"] = 3000
-    servo.move(world.simulator.now)
-    assert asked(link, PING, 0.01) == PONG
-    assert servo.raw_position == 3000
-    assert link.now() < 1
-    assert world.simulator.now > 3600
-    assert asked(link, PING) == PONG
-    assert len(line.fired) == 1
-
-
 @pytest.mark.parametrize(
     ("family", "fault", "why"),
     [

@@ -54,7 +54,6 @@ from motorbus.families.feetech.driver import (
     sync_write_positions,
     sync_writer,
 )
-from motorbus.families.feetech.driver.assured import ASSURANCE
 from motorbus.families.feetech.table import BAUD_CODES, CONTROL, MODELS, TABLES
 
 __all__ = [
@@ -180,6 +179,5 @@ FAMILY: Final = Family(
     driver=FeetechDriver,
     simulator_module="motorbus.families.feetech.simulator",
     recording_module="motorbus.families.feetech.wire.recording",
-    safety=ASSURANCE,
     cli="motorbus.cli.feetech",
 )

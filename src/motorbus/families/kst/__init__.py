@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import Final
 
 from motorbus.core.family import DeviceTypes, Family, LinkSpec, Option
-from motorbus.core.guarantees import Guarantee, Guarantees, Level
 from motorbus.core.scan import Skipped
 from motorbus.families.kst.driver.broadcast import (
     broadcast_bit_rate,
@@ -61,33 +60,6 @@ _SETTINGS: Final = (
     Option("nmt", str, "profile", "form of start and stop: profile, none, vendor or standard", NMT),
 )
 
-GUARANTEES: Final = Guarantees(
-    measured=Guarantee(Level.YES, "the servo reports its position on request"),
-    limits=Guarantee(
-        Level.PARTLY, "the range of the profile that the bus was opened with; no servo reports its make"
-    ),
-    stop=Guarantee(Level.PARTLY, Promise.HOLD_REQUESTED.value),
-    estops={"hold": Guarantee(Level.PARTLY, Promise.HOLD_REQUESTED.value)},
-    alone=Guarantee(
-        Level.PARTLY,
-        "during a loop, it moves to its last goal, one cycle ahead, and holds; during a single move, to its goal",
-    ),
-    ends=Guarantee(Level.YES, "every goal is a position"),
-    torque=Guarantee(Level.NO, "none: it holds with full force while it has its supply"),
-    restart=Guarantee(
-        Level.PARTLY,
-        "a boot-up message of CANopen is reported as a fault; no sheet promises that message, and a frame may be lost",
-    ),
-    strain=Guarantee(
-        Level.PARTLY,
-        "current and temperature, where its make reports them; off its goal for too long counts as stalled in any case",
-    ),
-    watchdog=Guarantee(Level.NO, "none: it moves to its last goal and holds"),
-    led=True,
-)
-"""Source: the CAN protocol sheets of the makers: they have a target position, no stop, torque switch or heartbeat."""
-
-
 FAMILY: Final = Family(
     name="kst",
     link=LinkSpec("frames", DEFAULT_RATE, RATES, _SETTINGS, stops=("hold",)),
@@ -96,6 +68,5 @@ FAMILY: Final = Family(
     driver=KstDriver,
     simulator_module="motorbus.families.kst.simulator",
     recording_module="motorbus.families.kst.recording",
-    safety=GUARANTEES,
     cli="motorbus.families.kst.cli",
 )

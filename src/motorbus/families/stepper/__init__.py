@@ -63,7 +63,6 @@ from motorbus.families.stepper.driver import (
     presence,
     stopping,
 )
-from motorbus.families.stepper.driver.assured import ASSURANCE
 from motorbus.families.stepper.execution import Behaviour
 from motorbus.families.stepper.program import Conditions, Estimate, Finding, Plan, Program
 from motorbus.families.stepper.program.backups import Backup
@@ -186,6 +185,5 @@ FAMILY: Final = Family(
     driver=StepperDriver,
     simulator_module="motorbus.families.stepper.simulator",
     recording_module="motorbus.families.stepper.wire.recording",
-    safety=ASSURANCE,
     cli="motorbus.cli.stepper",
 )

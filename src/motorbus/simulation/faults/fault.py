@@ -47,7 +47,6 @@ class Fault:
     `percent`   above 0: by chance, for every packet or, `per_byte`, for every byte; there is no exchange then
     `moment`    s from the beginning: the first packet from then on, or devices at that very moment
     `node`      whom it happens to; None: all
-    `adapter`   it strikes the text between a CAN adapter and its host
     """
 
     exchange: int | None = None
@@ -62,7 +61,6 @@ class Fault:
     moment: float | None = None
     node: int | None = None
     until: float = 0.0
-    adapter: bool = False
 
     def __post_init__(self) -> None:
         if self.action not in WORDS:
@@ -87,7 +85,7 @@ class Fault:
         usual = Side.DEVICE if self.word.outward else Side.HOST
         side = "" if self.to is usual else f" to {self.to.value}"
         argument = _ARGUMENTS.get(self.word.takes, _nothing)(self)
-        return f"{_where(self)}{side}{' on adapter' if self.adapter else ''}: {self.action}{argument}"
+        return f"{_where(self)}{side}: {self.action}{argument}"
 
     def settled(self, exchange: int, packet: int, byte: int | None, random: Random) -> Fault:
         """The same by position, with whatever chance has left open."""
@@ -147,23 +145,10 @@ def _check_what(fault: Fault) -> None:
     spans = (fault.seconds, fault.until)
     if not all(0 <= seconds <= LONGEST for seconds in spans) or (takes in _TIMED and not fault.seconds):
         raise RequestError(f"fault {fault}: impossible {fault.action}", expected=takes.value)
-    if fault.until and (takes not in (Takes.SPAN, Takes.PERHAPS_SPAN) or fault.until <= fault.seconds):
+    if fault.until and (takes is not Takes.SPAN or fault.until <= fault.seconds):
         raise RequestError(f"fault {fault}: impossible span", expected="the lower one first, as 0.02-0.5")
-    if fault.action == "reorder" and fault.seconds and (fault.byte is not None or fault.per_byte):
-        raise RequestError(f"fault {fault}: bytes change places at once", expected="no seconds, or no byte")
     if takes is Takes.NODE and fault.node is None:
         raise RequestError(f"fault {fault.action} needs a device", expected=takes.value)
-    if fault.adapter and fault.action not in ON_ADAPTER:
-        raise RequestError(
-            f"fault {fault}: {fault.action} cannot be done to the text of an adapter",
-            expected=f"one of {', '.join(ON_ADAPTER)}",
-        )
-    if fault.adapter and fault.seconds:
-        raise RequestError(f"fault {fault}: the text of an adapter takes no time", expected="no seconds")
-
-
-ON_ADAPTER: Final = ("drop", "duplicate", "corrupt", "flip", "insert", "truncate", "reorder", "merge")
-"""What can be done to the text between an adapter and its host."""
 
 
 def number(value: float) -> str:
@@ -210,7 +195,6 @@ _ARGUMENTS: Final[Mapping[Takes, Callable[[Fault], str]]] = MappingProxyType(
         Takes.BYTE: _hex,
         Takes.SECONDS: _seconds,
         Takes.SPAN: _seconds,
-        Takes.PERHAPS_SPAN: _seconds,
         Takes.PERHAPS_SECONDS: _seconds,
         Takes.PERHAPS_COUNT: lambda fault: f" {fault.value}" if fault.value else "",
         Takes.NODE: _node,

@@ -30,12 +30,11 @@ class Strike(NamedTuple):
 
 class Harmed(NamedTuple):
     """What is left of the bytes: pieces with how much later they come (s). `later` is what later packets suffer too,
-    `lost` that nothing follows in this exchange, `stalled` until when after the packet nothing passes (s)."""
+    `lost` that nothing follows in this exchange."""
 
     pieces: list[tuple[float, bytes]]
     later: float
     lost: bool
-    stalled: float
 
 
 def harmed(
@@ -49,35 +48,32 @@ def harmed(
 
     `happen` is told what happens to the bus, and how much later than the packet (s).
     """
-    rest, run, start = bytearray(body), b"", 0
+    run, start = b"", 0
     pieces: list[tuple[float, bytes]] = []
-    shift, stalled = later, 0.0
+    shift = later
     for place, group in groupby(strikes, key=lambda strike: strike.place):
-        run += bytes(rest[start:place]) if not lost else b""
-        byte, start = bytes(rest[place : place + 1]), place + 1
+        run += body[start:place] if not lost else b""
+        byte, start = body[place : place + 1], place + 1
         for _, _, fault in group:
             if fault.word.waits:
                 happen(fault, shift)
                 continue
-            if fault.action in ("delay", "stall", "split") or fault.word.world:
+            if fault.action in ("delay", "split") or fault.word.world:
                 pieces.append((shift, run))
                 run = b""
             if fault.word.world:
                 happen(fault, shift + INSTANT)
                 shift += 2 * INSTANT
-            elif fault.action in ("delay", "stall", "split"):
+            elif fault.action in ("delay", "split"):
                 shift += fault.seconds or GAP
                 later += fault.seconds if fault.action == "delay" else 0.0
-                stalled = shift if fault.action == "stall" else stalled
             elif fault.action == "truncate":
                 lost = True
-            elif fault.action == "reorder":
-                byte = _swapped(rest, place, byte)
             else:
                 byte = changed(fault, byte)
         run += byte if not lost else b""
-    pieces.append((shift, run + (bytes(rest[start:]) if not lost else b"")))
-    return Harmed([(when, piece) for when, piece in pieces if piece], later, lost, stalled)
+    pieces.append((shift, run + (body[start:] if not lost else b"")))
+    return Harmed([(when, piece) for when, piece in pieces if piece], later, lost)
 
 
 def changed(fault: Fault, byte: bytes) -> bytes:
@@ -88,15 +84,6 @@ def changed(fault: Fault, byte: bytes) -> bytes:
         bits = fault.value if fault.action == "corrupt" else 1 << fault.value
         return bytes([byte[0] ^ bits]) + byte[1:] if byte else byte
     return byte * 2 if fault.action == "duplicate" else b""
-
-
-def _swapped(rest: bytearray, place: int, byte: bytes) -> bytes:
-    """Put what is here into the next place, and give what was there."""
-    after = bytes(rest[place + 1 : place + 2])
-    if len(byte) != 1 or not after:
-        return byte
-    rest[place + 1] = byte[0]
-    return after
 
 
 def whole(fault: Fault, pieces: list[Piece]) -> list[Piece]:

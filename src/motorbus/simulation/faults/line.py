@@ -45,8 +45,6 @@ class _Way:
         self.luck: list[Luck] = []
         self.moments: list[tuple[int, Fault]] = []
         self.floor = -inf  # nothing comes before this moment: whoever was sent first arrives first
-        self.front: list[Data] = []
-        self.behind: list[Data] = []
         self.begin()
 
     def begin(self) -> None:
@@ -66,7 +64,6 @@ class FaultyLine:
     `never`    what stands there by chance and has not happened once
     `exchange` how many things the host has sent
     `most`     how many of the latest are kept; None: all
-    `began`    from when moments count (s), if not from now
 
     The same script and the same traffic give the same bytes at the same moments. What happens to the bus and its
     devices needs a `world`, which forgets what another line has wanted of it; RequestError without one, or when these
@@ -78,15 +75,11 @@ class FaultyLine:
         script: Script | str | Iterable[Fault] = (),
         world: World | None = None,
         *,
-        adapter: bool = False,
         most: int | None = None,
-        began: float | None = None,
     ) -> None:
         given = as_script(script)
-        self.faults = tuple(fault for fault in given if fault.adapter is adapter)
-        self.script = Script(self.faults, given.seed)
-        if self.script.by_chance:
-            self.script = self.script.seeded(0)
+        self.faults = given.faults
+        self.script = given.seeded(0) if given.by_chance else given
         self.fired: list[Fired] = []
         self.exchange = 0
         self.count = 0
@@ -98,7 +91,7 @@ class FaultyLine:
         self._waiting: dict[int, list[tuple[int, Fault]]] = {}
         self._timed: set[int] = set()
         self._lucky: set[int] = set()
-        self._began = began if began is not None else world.now if world is not None else 0.0
+        self._began = world.now if world is not None else 0.0
         for fault in self.faults:
             self._check(fault)
         if world is not None:
@@ -132,23 +125,6 @@ class FaultyLine:
             fault for index, fault in enumerate(self.faults) if fault.percent and index not in self._lucky
         )
 
-    @property
-    def holds_back(self) -> bool:
-        """Data of an earlier packet wait for the next packet."""
-        return any(way.front or way.behind for way in self._ways.values())
-
-    @property
-    def last_arrival(self) -> float:
-        """When the last data that were delayed arrive (s)."""
-        return max(way.floor for way in self._ways.values())
-
-    def extend(self, script: Script | str | Iterable[Fault]) -> None:
-        """Add faults to the script while it runs."""
-        for fault in as_script(script):
-            self._check(fault)
-            self.faults += (fault,)
-            self._place(len(self.faults) - 1, fault, twin=0)
-
     def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
         """What arrives of this, and when."""
         to = Side.HOST
@@ -160,7 +136,7 @@ class FaultyLine:
         way = self._ways[to]
         size = len(data.data) if isinstance(data, CanFrame) else len(data)
         way.packet += 1
-        calm = way.floor <= at and not (way.later or way.lost or way.front or way.behind)
+        calm = way.floor <= at and not (way.later or way.lost)
         strikes = self._strikes(to, way, size, at, data)
         way.passed += size
         if calm and not strikes:
@@ -231,8 +207,6 @@ class FaultyLine:
                 if fault.byte is None
                 else 0 <= place < size + (fault.action == "insert")
             )
-            if fault.action == "reorder" and place >= 0:
-                here = here and place + 1 < size
             if fault.to is not to or not here or self._is_moot(fault, way, data):
                 continue
             waiting.remove(pair)
@@ -248,8 +222,7 @@ class FaultyLine:
             return []
         if not fault.per_byte:
             return [Strike(-1, index, fault.settled(self.exchange, way.packet, None, random))]
-        size = len(data.data) if isinstance(data, CanFrame) else len(data)
-        if (fault.action == "reorder" and place + 1 >= size) or _is_behind(fault, place, way.passed):
+        if _is_behind(fault, place, way.passed):
             return []
         return [Strike(place, index, fault.settled(self.exchange, way.packet, way.passed + place, random))]
 
@@ -262,7 +235,7 @@ class FaultyLine:
             return True
         if fault.action == "split" and fault.byte is None and not fault.per_byte:
             return isinstance(data, CanFrame) or len(data) < 2
-        return way.lost and fault.action not in ("echo", "stall")
+        return way.lost and fault.action != "echo"
 
     def _somewhere(self, strike: Strike, way: _Way, passed: int, size: int) -> list[Strike]:
         """At a byte by chance, for what needs one."""
@@ -287,24 +260,22 @@ class FaultyLine:
         for strike in strikes:
             self._lucky.add(strike.rank)
             self._note(strike.fault, at, to, data)
-        pieces, stalled = self._at_bytes(way, data, body, at, [one for one in strikes if one.place >= 0])
+        pieces = self._at_bytes(way, data, body, at, [one for one in strikes if one.place >= 0])
         packet = [one.fault for one in strikes if one.place < 0]
-        return self._at_packet(to, way, data, at, pieces, stalled, packet)
+        return self._at_packet(to, way, data, at, pieces, packet)
 
-    def _at_bytes(
-        self, way: _Way, data: Data, body: bytes, at: float, strikes: list[Strike]
-    ) -> tuple[list[Piece], float]:
+    def _at_bytes(self, way: _Way, data: Data, body: bytes, at: float, strikes: list[Strike]) -> list[Piece]:
         if not strikes and (way.lost or isinstance(data, CanFrame)):
-            return ([] if way.lost else [(way.later, data)]), 0.0
+            return [] if way.lost else [(way.later, data)]
         found = harmed(
             body, strikes, way.later, way.lost, lambda fault, later: self._happen(fault, at + later)
         )
         way.later, way.lost = found.later, way.lost or found.lost
         if not isinstance(data, CanFrame):
-            return [*found.pieces], found.stalled
+            return [*found.pieces]
         shift = found.pieces[-1][0] if found.pieces else way.later
         left = b"".join(piece for _, piece in found.pieces)[:_LONGEST]
-        return [(shift, data._replace(data=left))], found.stalled
+        return [(shift, data._replace(data=left))]
 
     def _at_packet(
         self,
@@ -313,60 +284,27 @@ class FaultyLine:
         data: Data,
         at: float,
         pieces: list[Piece],
-        stalled: float,
         faults: list[Fault],
     ) -> list[Delivery]:
         sent: list[Delivery] = []
-        held: list[Data] | None = None
-        freely = 0.0
         for fault in faults:
             action = fault.action
             if fault.word.world:
                 self._happen(fault, at)
                 pause = 0.0 if fault.word.waits else INSTANT
                 pieces = [(shift + pause, piece) for shift, piece in pieces]
-            elif action in ("merge", "reorder") and not fault.seconds:
-                held = way.front if action == "merge" else way.behind
             elif action == "echo":
                 sent += self._echoed(data, at, fault.value)
-            elif action == "reorder":
-                freely += fault.seconds
-            elif action == "stall":
-                stalled = max(stalled, fault.seconds)
-                pieces = [(shift + fault.seconds, piece) for shift, piece in pieces]
             elif isinstance(data, CanFrame) and action in SOMEWHERE:
                 pieces = []
                 sent += self._delivered(Side.HOST, at, [(0.0, BROKEN)])
             else:
                 pieces = whole(fault, pieces)
-        if held is not None:
-            held += [piece for _, piece in pieces]
-        elif freely:
-            sent += [Delivery(at + shift + freely, to, piece) for shift, piece in pieces]
-        elif pieces:
-            sent += self._delivered(to, at, self._with_held(way, pieces))
-        if stalled:
-            for each in self._ways.values():
-                each.floor = max(each.floor, at + stalled)
-        return sent
+        return sent + self._delivered(to, at, pieces)
 
     def _echoed(self, data: Data, at: float, count: int) -> list[Delivery]:
         heard = data if isinstance(data, CanFrame) or not count else data[:count]
         return self._delivered(Side.HOST, at, [(0.0, heard)])
-
-    def _with_held(self, way: _Way, pieces: list[Piece]) -> list[Piece]:
-        """What has waited for this packet: what merges with it comes first, and bytes in one piece with it."""
-        front, behind = way.front, way.behind
-        if front or behind:
-            way.front, way.behind = [], []
-            shift, first = pieces[0]
-            if isinstance(first, CanFrame):
-                pieces = [*((shift, piece) for piece in front), *pieces]
-            else:
-                before = b"".join(piece for piece in front if isinstance(piece, bytes))
-                pieces = [(shift, before + first), *pieces[1:]]
-            pieces += [(pieces[-1][0], piece) for piece in behind]
-        return pieces
 
     def _delivered(self, to: Side, at: float, pieces: list[Piece]) -> list[Delivery]:
         """Whoever was sent first arrives first."""

@@ -27,15 +27,15 @@ EXAMPLES: Final = (
 )
 LONGEST: Final = 80
 """Characters of what is wrong that are said again."""
-_KEYS: Final = ("seed", "exchange", "packet", "byte", "bytes", "host", "device", "adapter", "all")
+_KEYS: Final = ("seed", "exchange", "packet", "byte", "bytes", "host", "device", "all")
 _WHERE: Final = re.compile(
     r"(?:at\s+)?(?:exchange\s+(?P<exchange>\d+)(?:\s+(?:byte\s+(?P<byte>\d+)|packet\s+(?P<packet>\d+)))?"
     r"|(?P<percent>[\d.]+(?:e[+-]?\d+)?)\s*%(?:\s+of\s+(?P<unit>bytes|packets))?"
     r"|(?P<moment>[\d.]+(?:e[+-]?\d+)?)\s*s)"
-    r"(?:\s+to\s+(?P<to>host|device))?(?P<adapter>\s+on\s+adapter)?",
+    r"(?:\s+to\s+(?P<to>host|device))?",
     re.ASCII,
 )
-_SIDE: Final = re.compile(r"\b(?:on\s+adapter|to\s+(?:host|device))\b")
+_SIDE: Final = re.compile(r"\bto\s+(?:host|device)\b")
 _SIGNED: Final = (
     (re.compile(r"\bexchange\s+[-+]"), "exchanges are counted from 1, without a sign"),
     (re.compile(r"\bpacket\s+[-+]"), "packets are counted from 1, without a sign"),
@@ -158,7 +158,6 @@ def _made(match: re.Match[str], words: list[str]) -> Fault:
     if match["to"]:
         place["to"] = Side(match["to"])
     place["per_byte"] = match["unit"] == "bytes"
-    place["adapter"] = bool(match["adapter"])
     return Fault(action=words[0], **place, **_arguments(words[0], words[1:], loose=not match["byte"]))
 
 
@@ -195,7 +194,7 @@ def _values(takes: Takes, said: list[str]) -> dict[str, Any]:
     if takes is Takes.SECONDS_NODE:
         whom = said[1] if len(said) > 1 else "all"
         return {"seconds": _real(said[0]), "node": None if whom == "all" else _node(whom)}
-    span = _SPAN.fullmatch(said[0]) if takes in (Takes.SPAN, Takes.PERHAPS_SPAN) else None
+    span = _SPAN.fullmatch(said[0]) if takes is Takes.SPAN else None
     if span:
         return {"seconds": _real(span["low"]), "until": _real(span["high"])}
     return {"seconds": _real(said[0])}

@@ -16,23 +16,13 @@ from motorbus.simulation.faults.world import World
 def strike(link: MemoryLink, script: Script | str | Iterable[Fault]) -> FaultyLine:
     """Let this happen on a memory link from now on, in place of its line; gives the line that is there then.
 
-    Raises RequestError for a bad script, for what these devices cannot do, and for faults of an adapter's text.
+    Raises RequestError for a bad script, for what these devices cannot do.
     """
     given = requested(script)
-    without_adapter(given)
     world = World(link.simulator, port=link, now=link.now())
     line = FaultyLine(given, world)
     link.simulator, link.line = world, line
     return line
-
-
-def without_adapter(script: Script, why: str = "nothing here speaks the text of an adapter") -> None:
-    """Raises RequestError when a fault is for the text between an adapter and its host, and there is none."""
-    for fault in script:
-        if fault.adapter:
-            raise RequestError(
-                f"fault {fault}: {why}", expected="a CAN bus that is served by slcan or socketcand"
-            )
 
 
 def is_calm(line: Line) -> bool:

@@ -23,7 +23,6 @@ class Takes(Enum):
     BYTE = "the byte in front, in hex, 00 to FF"
     SECONDS = "seconds, more than 0, a year at most"
     SPAN = "seconds, more than 0, a year at most, or two as 0.02-0.5 for anything between them"
-    PERHAPS_SPAN = "nothing, or seconds as 0.02 or 0.02-0.5"
     PERHAPS_SECONDS = "nothing, or seconds"
     PERHAPS_COUNT = "nothing, or how many bytes of it"
     NODE = "the id of a device"
@@ -90,24 +89,6 @@ _WORDS: Final = (
         "the packet comes so much later, and nothing that follows overtakes it",
     ),
     Word(
-        "stall",
-        Takes.SECONDS,
-        "nothing passes any more, either way, for so long; then all of it comes at once",
-        "the same, from this packet on",
-    ),
-    Word(
-        "reorder",
-        Takes.PERHAPS_SPAN,
-        "the byte changes places with the next one of its packet",
-        "it comes behind the next packet that goes there; with seconds so much later, and others overtake it",
-    ),
-    Word(
-        "merge",
-        Takes.NOTHING,
-        "",
-        "it waits in the adapter, and comes in one piece with the next packet that goes there",
-    ),
-    Word(
         "split",
         Takes.PERHAPS_SECONDS,
         "the packet is cut before this byte; the rest comes so much later (0.001 s)",
@@ -147,13 +128,6 @@ _WORDS: Final = (
         Takes.NODE,
         _AT,
         "the next thing that this device stores is cut by a power cut, in the middle of a step",
-        world=True,
-    ),
-    Word(
-        "clock-step",
-        Takes.SECONDS,
-        _AT,
-        "the host sleeps for so long and does not know it: the devices live on, and what they say is lost",
         world=True,
     ),
 )

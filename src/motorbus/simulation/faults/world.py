@@ -60,7 +60,6 @@ class World:
         self.port = port
         self.why = why
         self.now = now
-        self._ahead = 0.0
         self._events: list[_Event] = []
         self._order = count()
         self._armed: list[_Armed] = []
@@ -73,11 +72,6 @@ class World:
     def nodes(self) -> Mapping[int, SimulatedNode]:
         """The devices by their ids."""
         return self.simulator.nodes
-
-    @property
-    def ahead(self) -> float:
-        """How far the clock of the devices is ahead of the host's (s)."""
-        return self._ahead
 
     @property
     def scheduled(self) -> bool:
@@ -137,7 +131,7 @@ class World:
         """The host's data have arrived."""
         self._run_until(at)
         self.now = max(self.now, at)
-        self.simulator.receive(data, at + self._ahead)
+        self.simulator.receive(data, at)
         if self._armed:
             self._look()
 
@@ -151,7 +145,7 @@ class World:
     def due(self) -> float | None:
         """The next moment at which something happens by itself."""
         own = self.simulator.due()
-        moment = inf if own is None else own - self._ahead
+        moment = inf if own is None else own
         if self._events:
             moment = min(moment, self._events[0].moment)
         if self._out:
@@ -168,8 +162,8 @@ class World:
 
     def _collect(self, to: float) -> None:
         """Let time pass for the devices, and keep what they say meanwhile."""
-        said = self.simulator.advance(to + self._ahead)
-        self._out += [(when - self._ahead, data) for when, data in said] if self._ahead else said
+        said = self.simulator.advance(to)
+        self._out += said
         self.now = max(self.now, to)
         if self._armed:
             self._look()
@@ -193,8 +187,6 @@ class World:
         elif fault.action == "torn-eeprom":
             self._armed += [_Armed(node, fault, tell) for node in self._whom(fault)]
             self._look()
-        elif fault.action == "clock-step":
-            self._sleep(fault.seconds, moment)
 
     def _whom(self, fault: Fault) -> list[SimulatedNode]:
         return [node for id, node in self.nodes.items() if fault.node in (None, id)]
@@ -203,16 +195,11 @@ class World:
         for node in nodes:
             node.plug()
 
-    def _sleep(self, seconds: float, moment: float) -> None:
-        """The devices live on while nobody hears them; what is to happen to them waits, for it is the host's time."""
-        self._ahead += seconds
-        self.simulator.advance(moment + self._ahead)
-
     def _look(self) -> None:
         """Whoever stores something now has its supply cut in the middle of that."""
         for one in tuple(self._armed):
             middle: Callable[[], float] = getattr(one.node, _STORES)
-            moment = middle() - self._ahead
+            moment = middle()
             if moment < inf:
                 self._armed.remove(one)
                 self.at(max(moment, self.now), partial(self._cut, one))
