@@ -62,13 +62,14 @@ class AsyncBus(BaseBus):
         with self.turn:
             try:
                 prepared = self.find_prepared(request)
-                if prepared is not None:
-                    self.write(prepared)
-                    self._direct = prepared, call
-            except LinkError as error:
+                if prepared is not None and self.write(prepared) is None:
+                    prepared = None
+            except LinkLost as error:
                 self._lost(error)
                 raise
-            if prepared is None:
+            if prepared is not None:
+                self._direct = prepared, call
+            else:
                 self.engine.submit(call, self.link.now())
                 self.send()
             self.watch()

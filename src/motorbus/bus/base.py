@@ -24,7 +24,7 @@ from motorbus.bus.turn import Turn
 from motorbus.core.family import BusDriver, Family, IdChanged
 from motorbus.core.request import Data, Priority, Request
 from motorbus.core.steps import JournalEntry, Runnable
-from motorbus.errors import LinkError, LinkLost, MotorbusError, RequestError
+from motorbus.errors import LinkError, LinkFull, LinkLost, MotorbusError, RequestError
 from motorbus.link.base import Link, Renewable
 from motorbus.link.memory import MemoryLink
 
@@ -61,6 +61,7 @@ class BaseBus:
             rate=link.rate,
             latency=link.latency,
             paced=link.paced,
+            queue=getattr(link, "queue", 0),
             listen_only=bool(getattr(link, "listen_only", False)),
         )
         self.engine.diagnosis = getattr(link, "trouble", str)
@@ -140,8 +141,14 @@ class BaseBus:
                 if isinstance(out, RateJob):
                     self._set_rate(out)
                 else:
-                    link.write(out)
-                    engine.written()
+                    try:
+                        link.write(out)
+                    except LinkLost:
+                        raise
+                    except LinkError as error:
+                        engine.not_written(error)
+                    else:
+                        engine.written()
         except LinkError as error:
             self._lost(error)
 
@@ -233,8 +240,11 @@ class BaseBus:
 
     def write(
         self, prepared: Prepared, order: Request[Any] | None = None, since: Since | None = None
-    ) -> Attempt:
-        """Write a prepared request; an order without reply goes in front of it. Raises what forbids the order."""
+    ) -> Attempt | None:
+        """Write a prepared request; an order without reply goes in front of it. None: the link is full.
+
+        Raises what forbids the order.
+        """
         engine, now = self.engine, self.link.now()
         attempt = prepared.attempt
         if attempt.ended:
@@ -246,9 +256,16 @@ class BaseBus:
             wire, attempt.sent_at = self._write_order(order, since, now) + wire, engine.free_at
         attempt.deadline = attempt.sent_at + prepared.budget
         engine.in_flight[prepared.lane] = attempt
+        try:
+            self.link.write(wire)
+        except LinkFull:
+            del engine.in_flight[prepared.lane]
+            return None
+        if order is not None:
+            engine.statistics.other["sent"] += 1
         if engine.trace.subscriptions:
-            engine.trace.put(TraceRecord(now, "tx", prepared.wire))
-        self.link.write(wire)
+            for request in (prepared.request,) if order is None else (order, prepared.request):
+                engine.trace.put(TraceRecord(now, "tx", request.wire))
         return attempt
 
     def _write_order(self, order: Request[Any], since: Since, now: float) -> Any:
@@ -260,10 +277,7 @@ class BaseBus:
             engine.note_stop(order)
         else:
             engine.positions.sent(order)
-        engine.statistics.other["sent"] += 1
         engine.free_at = now + engine.air_time(order)
-        if engine.trace.subscriptions:
-            engine.trace.put(TraceRecord(now, "tx", order.wire))
         return order.wire
 
     def accept(self, prepared: Prepared, chunks: Sequence[Data], deadline: float) -> Any:

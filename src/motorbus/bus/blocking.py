@@ -17,7 +17,7 @@ from motorbus.bus.tasks import Notify
 from motorbus.core.register import shown
 from motorbus.core.request import Priority, Request
 from motorbus.core.steps import Runnable, discard, gather
-from motorbus.errors import LinkError, MotorbusError, RequestError
+from motorbus.errors import LinkError, LinkLost, MotorbusError, RequestError
 
 T = TypeVar("T")
 
@@ -49,12 +49,13 @@ class Bus(BaseBus):
             turn.acquire(request.priority)
             try:
                 prepared = self.find_prepared(request)
-                if prepared is not None:
-                    return self._receive(prepared, self.write(prepared))
+                attempt = None if prepared is None else self.write(prepared)
+                if prepared is not None and attempt is not None:
+                    return self._receive(prepared, attempt)
                 job = RequestJob(request, since=since)
                 self.engine.submit(job, self.link.now())
                 return self._finish(job)
-            except LinkError as error:
+            except LinkLost as error:
                 self._lost(error)
                 raise
             finally:
@@ -123,7 +124,7 @@ class Bus(BaseBus):
         try:
             if self.turn.acquire(Priority.CONTROL, timeout):
                 pending.prepared = self._write_batch(requests, pending.since)
-        except LinkError as error:
+        except LinkLost as error:
             self._lost(error)
             raise
         finally:
@@ -137,13 +138,13 @@ class Bus(BaseBus):
         if len(requests) > 2 or not requests or (order is not None and not self._may_join(order)):
             return None
         prepared = self.find_prepared(requests[-1])
-        if prepared is not None:
-            try:
-                self.write(prepared, order, since)
-            except LinkError:
-                raise
-            except MotorbusError:  # the order is refused: `result` says so
+        try:
+            if prepared is None or self.write(prepared, order, since) is None:
                 return None
+        except LinkError:
+            raise
+        except MotorbusError:  # the order is refused: `result` says so
+            return None
         return prepared
 
     def _may_join(self, order: Request[Any]) -> bool:
@@ -211,7 +212,7 @@ class Pending:
         value: Any
         try:
             value = bus._receive(prepared, prepared.attempt)
-        except LinkError as error:
+        except LinkLost as error:
             bus._lost(error)
             raise
         except tolerated as error:

@@ -14,12 +14,13 @@ import contextlib
 import json
 import os
 import socket
+import time
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as LateError
 from pathlib import Path
 from selectors import EVENT_READ, DefaultSelector
 from threading import Event, Lock, Thread
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 from motorbus.bus.engine import Engine
 from motorbus.bus.jobs import RateJob
@@ -27,9 +28,9 @@ from motorbus.bus.stop_rounds import stop_in_rounds
 from motorbus.bus.stop_socket import STOP_TIMEOUT, StopOutcome, asked_by, client_name, listening
 from motorbus.bus.tasks import TaskTree
 from motorbus.bus.turn import Turn
-from motorbus.core.request import Priority
+from motorbus.core.request import Priority, Request
 from motorbus.core.steps import SetBitrate
-from motorbus.errors import LinkError, LinkLost
+from motorbus.errors import LinkError, LinkFull, LinkLost
 from motorbus.link.base import Link
 
 CLIENT_TIME: Final = 0.05
@@ -132,13 +133,26 @@ class EmergencyStop:
         disturbs_no_reply = [request for request in stop.requests if not request.expected]
         for request in disturbs_no_reply or stop.requests:
             engine.note_stop(request)
-            with contextlib.suppress(LinkError):
-                bus.link.write(request.wire)
+            self._write_blind(request)
         if bus.turn.acquire(Priority.STOP, STOP_TIMEOUT):
             return self._stop_with_turn(by)
         engine.stop_sent()
         silent = tuple(sorted(engine.positions.nodes))
         return StopOutcome((), silent, 1, f"{stop.promise}; sent once, no acknowledgement could be read")
+
+    def _write_blind(self, request: Request[Any]) -> None:
+        """Write a frame of a stop without the turn; while the link is full, again and again until its deadline."""
+        link, engine = self.bus.link, self.bus.engine
+        end = link.now() + engine.air_time(request) + engine.reply_timeout(request)
+        with contextlib.suppress(LinkError):
+            while True:
+                try:
+                    link.write(request.wire)
+                    return
+                except LinkFull:
+                    if link.now() >= end:
+                        return
+                time.sleep(engine.air_time(request))
 
     def _stop_with_turn(self, by: str) -> StopOutcome:
         bus, engine = self.bus, self.bus.engine
