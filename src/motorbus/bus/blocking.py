@@ -13,7 +13,7 @@ from motorbus.bus.jobs import Attempt, RequestJob, Since
 from motorbus.bus.positions import GATED
 from motorbus.bus.prepared import Prepared
 from motorbus.bus.running import TURN_TIMEOUT, run_here, run_on
-from motorbus.bus.tasks import Notify
+from motorbus.bus.tasks import Notify, check_outside
 from motorbus.core.register import shown
 from motorbus.core.request import Priority, Request
 from motorbus.core.steps import Runnable, discard, gather
@@ -39,6 +39,7 @@ class Bus(BaseBus):
 
     def transact(self, request: Request[Any]) -> Any:
         """Carry out one request."""
+        check_outside()
         turn = self.turn
         if self.link.virtual:
             self.check_thread()
@@ -116,6 +117,7 @@ class Bus(BaseBus):
         nothing else.
         """
         _check_requests(requests)
+        check_outside()
         if self.link.virtual:
             self.check_thread()
         signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
