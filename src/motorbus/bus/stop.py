@@ -123,10 +123,16 @@ class EmergencyStop:
             return StopOutcome((), silent, 0, "nothing: the stop thread did not answer")
 
     def stop(self, client: str = "") -> StopOutcome:
-        """Latch the engine and send the stop frames, in the calling thread."""
-        bus, engine = self.bus, self.bus.engine
-        by = asked_by(client)
+        """Latch the engine and send the stop frames, in the calling thread. Raises what the driver raises."""
+        engine, by = self.bus.engine, asked_by(client)
         engine.announce_stop(by)
+        try:
+            return self._stop(by)
+        finally:
+            engine.stop_sent()
+
+    def _stop(self, by: str) -> StopOutcome:
+        bus, engine = self.bus, self.bus.engine
         if bus.turn.acquire(Priority.STOP, engine.stop_delay(bus.now())):
             return self._stop_with_turn(by)
         stop = engine.positions.frames(bus.now())
@@ -136,7 +142,6 @@ class EmergencyStop:
             self._write_blind(request)
         if bus.turn.acquire(Priority.STOP, STOP_TIMEOUT):
             return self._stop_with_turn(by)
-        engine.stop_sent()
         silent = tuple(sorted(engine.positions.nodes))
         return StopOutcome((), silent, 1, f"{stop.promise}; sent once, no acknowledgement could be read")
 
@@ -167,7 +172,7 @@ class EmergencyStop:
                     bus.receive(tree.next_moment())
             return tree.result()
         finally:
-            engine.stop_sent()
+            engine.stop_sent()  # before the turn is free
             bus.turn.release()
 
     def _restore_rate(self) -> None:
@@ -222,7 +227,12 @@ class EmergencyStop:
 
     def _stop_and_answer(self, client: str = "") -> StopOutcome:
         requests, self._requests = self._requests, []
-        outcome = self.stop(client)
+        try:
+            outcome = self.stop(client)
+        except BaseException as error:
+            for request in requests:
+                request.set_exception(error)
+            raise
         for request in requests:
             request.set_result(outcome)
         return outcome
