@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 from pathlib import Path
@@ -39,6 +40,8 @@ class BaseBus:
     events of procedures. `journal` gets the journal entries first. `stop_socket` is where another process can request
     an emergency stop. `warnings` are for the user. `on_id_change` is called before a device gets another id.
     """
+
+    _open = False
 
     def __init__(
         self,
@@ -84,8 +87,20 @@ class BaseBus:
         self._on_reconnect: list[Callable[[], None]] = []
         self.background: list[TaskTree[Any]] = []
         """Procedures that are stepped whenever the bus is used; see `BackgroundTask`."""
+        self._open = True
         if stop_socket is not None:
             self.stopper.start()
+
+    def __del__(self) -> None:
+        """Give back what a bus holds that was dropped without `close`."""
+        if not self._open:
+            return
+        self._drop()
+        if not self.link.simulated:
+            warnings.warn(f"{self!r} was not closed", ResourceWarning, source=self, stacklevel=2)
+
+    def _drop(self) -> None:
+        self._hang_up()
 
     @property
     def family(self) -> Family:
@@ -424,6 +439,7 @@ class BaseBus:
 
     def _hang_up(self) -> None:
         """End the stop thread, then give the port back."""
+        self._open = False
         self.stopper.close()
         self.reconnects = False
         self.link.close()

@@ -173,6 +173,8 @@ class Bus(BaseBus):
             self._defers_signals = False
             INTERRUPTS.uninstall()
 
+    _drop = close
+
     def __enter__(self) -> Self:
         return self
 

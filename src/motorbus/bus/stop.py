@@ -19,8 +19,9 @@ from concurrent.futures import Future
 from concurrent.futures import TimeoutError as LateError
 from pathlib import Path
 from selectors import EVENT_READ, DefaultSelector
-from threading import Event, Lock, Thread
+from threading import Event, Lock, Thread, current_thread
 from typing import Any, Final, Protocol
+from weakref import ref
 
 from motorbus.bus.engine import Engine
 from motorbus.bus.jobs import RateJob
@@ -53,10 +54,10 @@ class StoppableBus(Protocol):
 
 
 class EmergencyStop:
-    """The emergency stop of one bus."""
+    """The emergency stop of one bus, which it keeps alive only while it stops."""
 
     def __init__(self, bus: StoppableBus, socket_path: Path | None = None) -> None:
-        self.bus = bus
+        self._bus = ref(bus)
         self.socket_path = socket_path
         self._pair: tuple[socket.socket, socket.socket] | None = None
         self._requests: list[Future[StopOutcome]] = []
@@ -64,6 +65,14 @@ class EmergencyStop:
         self._starting = Lock()
         self._thread: Thread | None = None
         self._closed = False
+
+    @property
+    def bus(self) -> StoppableBus:
+        """The bus. Raises LinkLost when it was dropped."""
+        bus = self._bus()
+        if bus is None:
+            raise LinkLost("the bus was dropped: no stop was sent", advice="open it again, or cut the power")
+        return bus
 
     def start(self) -> None:
         """Start the thread, unless it runs or time is virtual.
@@ -252,7 +261,7 @@ class EmergencyStop:
             self._starting.release()
         atexit.unregister(self.close)
         self._wake(END)
-        if self._thread is not None:
+        if self._thread is not None and self._thread is not current_thread():
             self._thread.join(STOP_TIMEOUT)
         for end in self._pair or ():
             end.close()
