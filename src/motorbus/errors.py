@@ -4,6 +4,7 @@
     ├── LinkError            the port: cannot open, busy, lost                    (also OSError)
     │   ├── PortNotFound     there is no such port
     │   ├── PortBusy         another program holds it; `owner` names it
+    │   ├── LinkFull         it takes no more data at present
     │   └── LinkLost         it was open and went away
     │       └── AnotherAdapter   and another adapter is there in its place
     ├── WireError            bytes came that are not an answer; they are attached
@@ -101,6 +102,10 @@ class PortBusy(LinkError):
     """Another program holds the port; `owner` is its process id where it is known."""
 
     owner: int | None = None
+
+
+class LinkFull(LinkError):
+    """The port takes no more data at present; nothing of this data was sent."""
 
 
 class LinkLost(LinkError):

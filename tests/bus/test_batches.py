@@ -1,9 +1,10 @@
-"""Batches of a control loop: goals and questions of one bus and of several, sent by `start`, read by `result`."""
+"""Batches of a control loop: goals and questions of one bus and of several."""
 
 from __future__ import annotations
 
 import asyncio
 import signal
+import threading
 from collections.abc import Iterator
 from contextlib import ExitStack
 from typing import Any
@@ -14,8 +15,12 @@ import motorbus
 from motorbus import feetech
 from motorbus.bus.blocking import Bus, exchange_on
 from motorbus.bus.running import run_on
+from motorbus.core.can_frame import CanFrame
+from motorbus.core.request import Request, Response
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.simulation.named import Simulation
+from tests.bus.adapter import Engine
+from tests.bus.frames import Servos, can_read, can_value
 
 COUNT = 6.283185307179586 / 4096
 NOISY = "seed 3; 2%: drop; 2%: corrupt; 1%: delay 0.001-0.05"
@@ -94,14 +99,61 @@ def test_what_is_no_request_is_refused(stack: ExitStack) -> None:
     assert arm.bus.exchange([]) == []
 
 
-def test_a_signal_between_start_and_result_is_raised_by_result(stack: ExitStack) -> None:
-    arm = Arm(stack, "real")
-    arm.bus.exchange(arm.batch())
-    pending = arm.bus.start(arm.batch())
-    signal.raise_signal(signal.SIGINT)
-    with pytest.raises(KeyboardInterrupt):
-        pending.result()
-    assert arm.bus.exchange(arm.batch())[1].missing == ()
+def test_a_batch_that_is_torn_off_leaves_every_bus_free(
+    stack: ExitStack, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Other threads use both buses at once, a signal is raised at once, and no old reply is taken."""
+    arms = [Arm(stack, "real") for _ in range(2)]
+    work = {arm.bus: arm.batch() for arm in arms}
+    for _ in range(3):
+        exchange_on(work)
+
+    def tear(until: float) -> Any:
+        raise KeyboardInterrupt
+
+    for arm in arms:
+        with monkeypatch.context() as patched:
+            receive = arm.bus.link.read
+            patched.setattr(
+                arm.bus.link,
+                "read",
+                lambda until, receive=receive: tear(until) if until > 0 else receive(until),
+            )
+            with pytest.raises(KeyboardInterrupt):
+                exchange_on(work)
+        for one in arms:
+            one.sim[1].raw_position = place = one.sim[1].raw_position + 400
+            found: list[float] = []
+            read = feetech.Servo(one.bus, 1).position
+            thread = threading.Thread(target=lambda read=read, found=found: found.append(read()), daemon=True)
+            thread.start()
+            thread.join(10)
+            assert found == [pytest.approx(place * COUNT, abs=100 * COUNT)]  # it moves back to its goal
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+
+
+def test_the_value_of_an_order_is_the_same_on_an_idle_and_a_busy_bus(stack: ExitStack) -> None:
+    arm = Arm(stack)
+    order, read = arm.batch()
+    order = Request(order.wire, decode=lambda answer: "sent")
+    for _ in range(4):
+        assert arm.bus.exchange([order, read])[0] == "sent"
+    plain: Request[Any] = Request(order.wire)
+    for _ in range(2):
+        assert isinstance(arm.bus.exchange([plain, read])[0], Response)
+
+
+def test_can_frames_of_a_batch_are_written_one_by_one() -> None:
+    can = Engine("kst")
+    can.bus.engine.echo.exclude()
+    can.wire.answer = lambda frame: Servos()(frame) if frame.id > 0x600 else []
+    order: Request[Any] = Request(CanFrame(0x123, b"\1"))
+    read = can_read(1)
+    read.decode_exact = lambda frame, at: can_value([frame.data])
+    for _ in range(3):
+        assert can.bus.exchange([order, read])[1] == 100
+    assert can.sent() == [order.wire, read.wire] * 3
 
 
 def test_reads_of_tasks_on_a_real_clock_are_fresh_also_after_a_cancellation() -> None:

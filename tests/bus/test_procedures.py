@@ -13,6 +13,7 @@ import motorbus
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.steps import (
     Emit,
+    Exclusive,
     JournalEntry,
     Procedure,
     Progress,
@@ -272,6 +273,19 @@ def test_what_is_neither_procedure_nor_step_is_refused(engine: Engine, wrong: An
     with pytest.raises(RequestError, match="neither a procedure nor a step"):
         engine.bus.run(gather(read(1), wrong))
     assert engine.run(read(1)) == 100
+
+
+@pytest.mark.parametrize("call", ["run", "exchange"])
+def test_a_blocking_call_inside_a_procedure_is_refused(engine: Engine, call: str) -> None:
+    """It would wait for the procedure that it stops."""
+
+    async def inside() -> Any:
+        return engine.bus.run(read(1)) if call == "run" else engine.bus.exchange([read(1)])
+
+    for procedure in (inside, lambda: Exclusive(inside())):
+        with pytest.raises(RequestError, match="called inside of a procedure"):
+            engine.run(procedure())
+        assert engine.run(read(1)) == 100
 
 
 def test_what_a_bus_refuses_is_closed() -> None:

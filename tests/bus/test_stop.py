@@ -117,6 +117,30 @@ def test_a_port_that_is_full_for_a_while_does_not_lose_the_stop() -> None:
     assert 1 in torque_offs(responder)
 
 
+@pytest.mark.parametrize("turn_is_free", [True, False])
+def test_a_stop_that_the_driver_fails_is_raised_and_leaves_the_bus_usable(
+    turn_is_free: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus, _ = memory_bus(virtual=False)
+    known(bus, 1)
+
+    def fail(nodes: Any) -> Any:
+        raise RuntimeError("of the driver")
+
+    monkeypatch.setattr(bus.driver, "stop", fail)
+    with ThreadPoolExecutor(2) as pool:
+        if not turn_is_free:
+            bus.turn.acquire()
+        begun = time.monotonic()
+        with pytest.raises(RuntimeError, match="of the driver"):
+            pool.submit(bus.estop).result()
+        assert time.monotonic() - begun < STOP_TIMEOUT
+        bus.turn.release()
+        assert pool.submit(bus.run, position(1)).result(STOP_TIMEOUT) == 1
+    assert bus.latched
+    bus.close()
+
+
 def test_the_stop_thread_sleeps_from_the_first_torque_command_on_and_ends_with_the_bus() -> None:
     bus, _ = memory_bus(virtual=False)
 

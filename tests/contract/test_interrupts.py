@@ -6,6 +6,8 @@ A child gets SIGINT every millisecond. It may see KeyboardInterrupt and nothing 
 from __future__ import annotations
 
 import json
+import signal
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -110,3 +112,20 @@ def test_changes_of_an_id(tmp_path: Path, rounds: Rounds) -> None:
         found = bombarded("rename", total, simulated.address.replace(LATENCY, ",latency=0.02"))
         assert found == {"right": True, "interrupts": total, "errors": []}
         check_one_servo(simulated, 1, 2)
+
+
+def test_a_bus_closed_in_another_thread_leaves_no_handler() -> None:
+    """Python changes handlers in the main thread only: the first signal after it is already the default one."""
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = [signal.getsignal(number) for number in numbers]
+    with motorbus.simulate("feetech", clock="real") as sim:
+        bus = motorbus.open(sim.url)
+        assert [signal.getsignal(number) for number in numbers] != before
+        closing = threading.Thread(target=bus.close)
+        closing.start()
+        closing.join(LIMIT)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        assert [signal.getsignal(number) for number in numbers] == before
+        motorbus.open(sim.url).close()
+        assert [signal.getsignal(number) for number in numbers] == before

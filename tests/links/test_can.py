@@ -7,13 +7,14 @@ import os
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
+from pathlib import Path
 
 import can
 import pytest
 
 from motorbus.core.can_frame import ERROR_FLAG, CanFrame
-from motorbus.errors import LinkError, LinkLost, PortBusy, PortNotFound, RequestError
-from motorbus.link.can import BUS_OFF, CanLink
+from motorbus.errors import LinkError, LinkFull, LinkLost, PortBusy, PortNotFound, RequestError
+from motorbus.link.can import BUS_OFF, CanLink, kernel_queue
 from tests.links.can_peer import (
     LONG_PING,
     PING,
@@ -196,3 +197,18 @@ def test_d13_bus_off_is_a_lost_link() -> None:
         with pytest.raises(LinkLost, match="is off the bus"):
             link.read(link.now() + 30)
         link.close()
+
+
+def test_a_full_queue_is_no_loss(tmp_path: Path) -> None:
+    link = open_can("can://virtual/full")
+    with can.Bus(interface="virtual", channel="full", rx_queue_size=1) as other:
+        link.write(PING)
+        with pytest.raises(LinkFull, match="takes no more frames"):
+            link.write(PING)
+        assert other.recv(30) is not None
+        link.write(PING)
+    link.close()
+    assert link.queue == kernel_queue("can0", tmp_path) == 0
+    (tmp_path / "class/net/can0").mkdir(parents=True)
+    (tmp_path / "class/net/can0/tx_queue_len").write_text("10\n")
+    assert kernel_queue("can0", tmp_path) == 10

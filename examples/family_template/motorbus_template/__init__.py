@@ -13,6 +13,7 @@ from .registers import TABLE
 
 
 class _Methods(driver.Node):
+    _family = "template"
     ping = device_method(driver.ping)
     identify = device_method(driver.identify)
     read = device_method(driver.read)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Coroutine, Mapping, Sequence
 from math import inf
 from threading import get_ident
 from typing import Any, Final, Generic, Self, TypeVar
+from weakref import WeakMethod
 
 from motorbus.bus.base import IDLE, BaseBus, check_clocks
 from motorbus.bus.interrupts import DEFAULTS, SIGNALS
@@ -62,13 +63,14 @@ class AsyncBus(BaseBus):
         with self.turn:
             try:
                 prepared = self.find_prepared(request)
-                if prepared is not None:
-                    self.write(prepared)
-                    self._direct = prepared, call
-            except LinkError as error:
+                if prepared is not None and self.write(prepared) is None:
+                    prepared = None
+            except LinkLost as error:
                 self._lost(error)
                 raise
-            if prepared is None:
+            if prepared is not None:
+                self._direct = prepared, call
+            else:
                 self.engine.submit(call, self.link.now())
                 self.send()
             self.watch()
@@ -95,7 +97,7 @@ class AsyncBus(BaseBus):
             self._unwatch()
             self._loop, self._descriptor, self._thread = loop, descriptor, get_ident()
             if descriptor is not None and descriptor >= 0 and self.engine.gone is None:
-                loop.add_reader(descriptor, self._look)
+                loop.add_reader(descriptor, _call, WeakMethod(self._look))
         seconds = self.engine.next_deadline() - self.now()
         if self.engine.gone is not None or self.engine.stopping:
             seconds = min(seconds, IDLE)
@@ -108,7 +110,7 @@ class AsyncBus(BaseBus):
             if self._timer.when() <= moment:  # it looks again then
                 return
             self._timer.cancel()
-        self._timer = loop.call_at(moment, self._wake)
+        self._timer = loop.call_at(moment, _call, WeakMethod(self._wake))
 
     def _wake(self) -> None:
         self._timer = None
@@ -171,6 +173,10 @@ class AsyncBus(BaseBus):
             else:
                 loop.call_soon_threadsafe(self._unwatch)
 
+    def _drop(self) -> None:
+        self._forget_descriptor()
+        self._hang_up()
+
     async def close(self) -> None:
         """Give the port back. Nothing is sent: devices keep doing what they were ordered. Calls that wait fail."""
         error = LinkLost("the bus is closed", advice="open it again")
@@ -187,6 +193,12 @@ class AsyncBus(BaseBus):
 
     async def __aexit__(self, *exc: object) -> None:
         await self.close()
+
+
+def _call(method: WeakMethod[Callable[[], None]]) -> None:
+    """Call this method, unless its bus was dropped."""
+    if (found := method()) is not None:
+        found()
 
 
 def call_in(loop: asyncio.AbstractEventLoop, function: Callable[[], object]) -> None:

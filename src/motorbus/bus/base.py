@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 from pathlib import Path
@@ -24,7 +25,7 @@ from motorbus.bus.turn import Turn
 from motorbus.core.family import BusDriver, Family, IdChanged
 from motorbus.core.request import Data, Priority, Request
 from motorbus.core.steps import JournalEntry, Runnable
-from motorbus.errors import LinkError, LinkLost, MotorbusError, RequestError
+from motorbus.errors import LinkError, LinkFull, LinkLost, MotorbusError, RequestError
 from motorbus.link.base import Link, Renewable
 from motorbus.link.memory import MemoryLink
 
@@ -39,6 +40,8 @@ class BaseBus:
     events of procedures. `journal` gets the journal entries first. `stop_socket` is where another process can request
     an emergency stop. `warnings` are for the user. `on_id_change` is called before a device gets another id.
     """
+
+    _open = False
 
     def __init__(
         self,
@@ -61,6 +64,7 @@ class BaseBus:
             rate=link.rate,
             latency=link.latency,
             paced=link.paced,
+            queue=getattr(link, "queue", 0),
             listen_only=bool(getattr(link, "listen_only", False)),
         )
         self.engine.diagnosis = getattr(link, "trouble", str)
@@ -83,8 +87,20 @@ class BaseBus:
         self._on_reconnect: list[Callable[[], None]] = []
         self.background: list[TaskTree[Any]] = []
         """Procedures that are stepped whenever the bus is used; see `BackgroundTask`."""
+        self._open = True
         if stop_socket is not None:
             self.stopper.start()
+
+    def __del__(self) -> None:
+        """Give back what a bus holds that was dropped without `close`."""
+        if not self._open:
+            return
+        self._drop()
+        if not self.link.simulated:
+            warnings.warn(f"{self!r} was not closed", ResourceWarning, source=self, stacklevel=2)
+
+    def _drop(self) -> None:
+        self._hang_up()
 
     @property
     def family(self) -> Family:
@@ -140,8 +156,14 @@ class BaseBus:
                 if isinstance(out, RateJob):
                     self._set_rate(out)
                 else:
-                    link.write(out)
-                    engine.written()
+                    try:
+                        link.write(out)
+                    except LinkLost:
+                        raise
+                    except LinkError as error:
+                        engine.not_written(error)
+                    else:
+                        engine.written()
         except LinkError as error:
             self._lost(error)
 
@@ -233,8 +255,11 @@ class BaseBus:
 
     def write(
         self, prepared: Prepared, order: Request[Any] | None = None, since: Since | None = None
-    ) -> Attempt:
-        """Write a prepared request; an order without reply goes in front of it. Raises what forbids the order."""
+    ) -> Attempt | None:
+        """Write a prepared request; an order without reply goes in front of it. None: the link is full.
+
+        Raises what forbids the order.
+        """
         engine, now = self.engine, self.link.now()
         attempt = prepared.attempt
         if attempt.ended:
@@ -246,9 +271,16 @@ class BaseBus:
             wire, attempt.sent_at = self._write_order(order, since, now) + wire, engine.free_at
         attempt.deadline = attempt.sent_at + prepared.budget
         engine.in_flight[prepared.lane] = attempt
+        try:
+            self.link.write(wire)
+        except LinkFull:
+            del engine.in_flight[prepared.lane]
+            return None
+        if order is not None:
+            engine.statistics.other["sent"] += 1
         if engine.trace.subscriptions:
-            engine.trace.put(TraceRecord(now, "tx", prepared.wire))
-        self.link.write(wire)
+            for request in (prepared.request,) if order is None else (order, prepared.request):
+                engine.trace.put(TraceRecord(now, "tx", request.wire))
         return attempt
 
     def _write_order(self, order: Request[Any], since: Since, now: float) -> Any:
@@ -260,10 +292,7 @@ class BaseBus:
             engine.note_stop(order)
         else:
             engine.positions.sent(order)
-        engine.statistics.other["sent"] += 1
         engine.free_at = now + engine.air_time(order)
-        if engine.trace.subscriptions:
-            engine.trace.put(TraceRecord(now, "tx", order.wire))
         return order.wire
 
     def accept(self, prepared: Prepared, chunks: Sequence[Data], deadline: float) -> Any:
@@ -410,6 +439,7 @@ class BaseBus:
 
     def _hang_up(self) -> None:
         """End the stop thread, then give the port back."""
+        self._open = False
         self.stopper.close()
         self.reconnects = False
         self.link.close()

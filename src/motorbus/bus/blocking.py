@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from math import inf
 from threading import get_ident
 from typing import Any, Self, TypeVar
@@ -13,11 +14,11 @@ from motorbus.bus.jobs import Attempt, RequestJob, Since
 from motorbus.bus.positions import GATED
 from motorbus.bus.prepared import Prepared
 from motorbus.bus.running import TURN_TIMEOUT, run_here, run_on
-from motorbus.bus.tasks import Notify
+from motorbus.bus.tasks import Notify, check_outside
 from motorbus.core.register import shown
-from motorbus.core.request import Priority, Request
+from motorbus.core.request import Priority, Request, Response
 from motorbus.core.steps import Runnable, discard, gather
-from motorbus.errors import LinkError, MotorbusError, RequestError
+from motorbus.errors import LinkError, LinkLost, MotorbusError, RequestError
 
 T = TypeVar("T")
 
@@ -39,6 +40,7 @@ class Bus(BaseBus):
 
     def transact(self, request: Request[Any]) -> Any:
         """Carry out one request."""
+        check_outside()
         turn = self.turn
         if self.link.virtual:
             self.check_thread()
@@ -49,12 +51,13 @@ class Bus(BaseBus):
             turn.acquire(request.priority)
             try:
                 prepared = self.find_prepared(request)
-                if prepared is not None:
-                    return self._receive(prepared, self.write(prepared))
+                attempt = None if prepared is None else self.write(prepared)
+                if prepared is not None and attempt is not None:
+                    return self._receive(prepared, attempt)
                 job = RequestJob(request, since=since)
                 self.engine.submit(job, self.link.now())
                 return self._finish(job)
-            except LinkError as error:
+            except LinkLost as error:
                 self._lost(error)
                 raise
             finally:
@@ -105,25 +108,26 @@ class Bus(BaseBus):
         An error of a `tolerated` type becomes the value of its request; any other is raised, and requests behind it
         have not been sent.
         """
-        return self.start(requests).result(tolerated)
+        with self._start(requests) as batch:
+            return batch.result(tolerated)
 
-    def start(self, requests: Sequence[Request[Any]], timeout: float = -1.0) -> Pending:
-        """Send a batch, see `exchange`; `Pending.result` gives its values.
+    def _start(self, requests: Sequence[Request[Any]], timeout: float = -1.0) -> _Batch:
+        """Send a batch, see `exchange`; `result` gives its values.
 
         A batch that cannot be sent at once, or for which the bus is not free within `timeout` s (-1: no limit), is sent
-        by `result`. Until then the calling thread has the bus, signals are deferred, and the thread uses the bus for
-        nothing else.
+        by `result`. Until then the calling thread has the bus, and signals are deferred.
         """
         _check_requests(requests)
+        check_outside()
         if self.link.virtual:
             self.check_thread()
         signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
-        pending = Pending(self, requests, signals)
+        pending = _Batch(self, requests, signals)
         signals.depth += 1
         try:
             if self.turn.acquire(Priority.CONTROL, timeout):
                 pending.prepared = self._write_batch(requests, pending.since)
-        except LinkError as error:
+        except LinkLost as error:
             self._lost(error)
             raise
         finally:
@@ -137,21 +141,18 @@ class Bus(BaseBus):
         if len(requests) > 2 or not requests or (order is not None and not self._may_join(order)):
             return None
         prepared = self.find_prepared(requests[-1])
-        if prepared is not None:
-            try:
-                self.write(prepared, order, since)
-            except LinkError:
-                raise
-            except MotorbusError:  # the order is refused: `result` says so
+        try:
+            if prepared is None or self.write(prepared, order, since) is None:
                 return None
+        except LinkError:
+            raise
+        except MotorbusError:  # the order is refused: `result` says so
+            return None
         return prepared
 
     def _may_join(self, order: Request[Any]) -> bool:
-        """This order may leave in one write with the next request."""
-        interlock = self.engine.interlock
-        if order.expected != () or order.effect not in GATED or interlock is None:
-            return order.expected == ()
-        return not self._needs_reads(order)
+        """This order may leave in one write with the next request; CAN frames are written one by one."""
+        return order.expected == () and isinstance(order.wire, bytes) and not self._needs_reads(order)
 
     def _needs_reads(self, request: Request[Any]) -> bool:
         """Whether the gate must read positions first; `run_here` makes these reads again."""
@@ -172,6 +173,8 @@ class Bus(BaseBus):
             self._defers_signals = False
             INTERRUPTS.uninstall()
 
+    _drop = close
+
     def __enter__(self) -> Self:
         return self
 
@@ -179,10 +182,13 @@ class Bus(BaseBus):
         self.close()
 
 
-class Pending:
-    """A batch that was started. `prepared` is the request whose reply is awaited, None where nothing was sent yet."""
+class _Batch:
+    """A batch that was started. `prepared` is the request whose reply is awaited, None where nothing was sent yet.
 
-    __slots__ = ("bus", "ended", "prepared", "requests", "signals", "since")
+    At the end of its block the bus is free, also where an error was raised before `result`.
+    """
+
+    __slots__ = ("bus", "prepared", "requests", "signals", "since")
 
     def __init__(self, bus: Bus, requests: Sequence[Request[Any]], signals: Interrupts) -> None:
         self.bus = bus
@@ -190,7 +196,16 @@ class Pending:
         self.signals = signals
         self.since = bus.engine.since
         self.prepared: Prepared | None = None
-        self.ended = False
+
+    def __enter__(self) -> _Batch:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        if (
+            self.prepared is not None
+        ):  # its reply is not awaited, and the node is out of sync from its deadline on
+            self.prepared = None
+            self.release()
 
     def release(self) -> None:
         """Give the bus back; raise a signal that came meanwhile."""
@@ -203,15 +218,12 @@ class Pending:
     def result(self, tolerated: tuple[type[Exception], ...] = ()) -> list[Any]:
         """The values of all requests; an error of a `tolerated` type is the value of its request. Raises others."""
         prepared, bus = self.prepared, self.bus
-        if self.ended:
-            raise RequestError("result() was called before", advice="start the batch again")
-        self.ended = True
         if prepared is None:
             return run_here(bus, carry_out_batch(self.requests, tolerated), since=self.since)
-        value: Any
+        answer, value = Response((), (), bus.engine.time), None
         try:
             value = bus._receive(prepared, prepared.attempt)
-        except LinkError as error:
+        except LinkLost as error:
             bus._lost(error)
             raise
         except tolerated as error:
@@ -219,7 +231,10 @@ class Pending:
         finally:
             self.prepared = None
             self.release()
-        return [value] if len(self.requests) == 1 else [None, value]
+        if len(self.requests) == 1:
+            return [value]
+        decode = self.requests[0].decode
+        return [answer if decode is None else decode(answer), value]
 
 
 async def carry_out_batch(
@@ -247,21 +262,19 @@ def exchange_on(
 ) -> dict[BaseBus, Any]:
     """Carry out a batch on each bus at the same time: the values of each, or its MotorbusError."""
     found: dict[BaseBus, Any] = {}
-    pending: list[Pending] = []
-    with interrupts():
-        try:
-            for bus, requests in batches.items():
-                try:
-                    pending.append(bus.start(requests, -1.0 if not pending else TURN_TIMEOUT))
-                except MotorbusError as error:
-                    found[bus] = error
-        finally:
-            sent = [one for one in pending if one.prepared is not None]
-            for one in sent:
-                try:
-                    found[one.bus] = one.result(tolerated)
-                except Exception as error:
-                    found[one.bus] = error
+    pending: list[_Batch] = []
+    with interrupts(), ExitStack() as stack:
+        for bus, requests in batches.items():
+            try:
+                pending.append(stack.enter_context(bus._start(requests, TURN_TIMEOUT if pending else -1.0)))
+            except MotorbusError as error:
+                found[bus] = error
+        sent = [one for one in pending if one.prepared is not None]
+        for one in sent:
+            try:
+                found[one.bus] = one.result(tolerated)
+            except Exception as error:
+                found[one.bus] = error
         unsent = [one for one in pending if one not in sent]
         if unsent:
             work = {one.bus: carry_out_batch(one.requests, tolerated) for one in unsent}

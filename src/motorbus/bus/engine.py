@@ -42,7 +42,7 @@ from motorbus.core.request import (
     Response,
     TimeoutClass,
 )
-from motorbus.errors import LinkError, LinkLost, MotorbusError
+from motorbus.errors import LinkError, LinkFull, LinkLost, MotorbusError
 
 T = TypeVar("T")
 
@@ -56,7 +56,7 @@ STOP_DELAY: Final = 0.003
 
 class Engine:
     """The engine of one bus. `rate` (bit/s) and `latency` (s) describe the link; `paced`: the link takes air
-    time, so nothing is sent before `free_at` (s).
+    time, so nothing is sent before `free_at` (s). `queue`: frames that its adapter takes at once, 0 if unknown.
 
     `time` (s) is `now` of the last `submit`, `next_frame` or `feed`. `losses` and `latches` count lost ports and
     emergency stops. An emergency stop is announced (`stopping`), sent (`stop_sent`), and stays `latched` until `reset`.
@@ -69,11 +69,12 @@ class Engine:
         rate: int,
         latency: float = 0.0,
         paced: bool = False,
+        queue: int = 0,
         listen_only: bool = False,
         interlock: Interlock | None = None,
     ) -> None:
         self.driver = driver
-        self.window = driver.window
+        self.window = min(driver.window, queue or driver.window)
         self.paced = paced
         self.interlock = interlock
         self.before_motion: Callable[[], None] | None = None
@@ -99,6 +100,8 @@ class Engine:
         self.gone: LinkLost | None = None
         """Why there is no port; None again when it is back."""
         self.free_at = self.time = 0.0
+        self.full_until = 0.0
+        """s; the link was full, and nothing is written before."""
         self.rate = rate
         """bit/s"""
         self.latency = latency
@@ -106,7 +109,8 @@ class Engine:
         self.since = Since(self.positions.stops, self.latches, self.losses)
         """Present counts of stops, emergency stops and losses. A caller keeps them; `check` compares."""
         self._serial = count()
-        self._unacknowledged: list[Attempt] = []
+        self._leaving: Attempt | None = None
+        """The attempt whose request is being written."""
         self.ready = False
         self.last: Prepared | None = None
         """The prepared request that was carried out last, if nothing else happened since."""
@@ -226,7 +230,8 @@ class Engine:
     def next_frame(self, now: float) -> Data | RateJob | None:
         """What to do now: write this data, or change the rate; None: nothing until `next_deadline` or new data.
 
-        After a write call `written`, after a change of rate `rate_changed`. Also grants exclusive use of the bus.
+        After a write call `written` or `not_written`, after a change of rate `rate_changed`. Also grants exclusive use
+        of the bus.
         """
         self.time = now
         for job in list(self.queue):
@@ -255,7 +260,7 @@ class Engine:
         """Begin the next attempt of this job: its lane and the wire are free, its nodes are in sync, `check` passes."""
         if job.request.lane in self.in_flight or len(self.in_flight) >= self.window:
             return None
-        if self.paced and now < self.free_at:
+        if now < self.full_until or (self.paced and now < self.free_at):
             return None
         if not isinstance(job.step, Attempt):
             if job.step is not None and now < job.step.until:
@@ -338,27 +343,17 @@ class Engine:
         self.since = Since(self.positions.stops, self.latches, self.losses)
 
     def begin(self, attempt: Attempt, now: float) -> None:
-        """Record an attempt before its request is written."""
+        """Record an attempt before its request is written; `written` or `not_written` follows."""
         request = attempt.request
         if self.receiver.held:  # bytes from before the request are no part of its reply
             self._take_all(self.receiver.flush(), now)
-        start, air = max(now, self.free_at), self.air_time(request)
-        attempt.sent_at = now
+        attempt.sent_at, attempt.air = now, self.air_time(request)
         if request.expected != ():
-            self.sync.mark_sent(request, now)
-            attempt.deadline = start + air + self.reply_timeout(request)
-            self._share_wire(attempt, air)
+            attempt.deadline = max(now, self.free_at) + attempt.air + self.reply_timeout(request)
             self.in_flight[request.lane] = attempt
-        else:
-            self.free_at = start + air
-            self._unacknowledged.append(attempt)
         if (request.effect or request.setpoints) and request.priority is not Priority.STOP:
             self.positions.sent(request)
-        if isinstance(request.wire, bytes):
-            self.echo.sent(request.wire, attempt.is_probe or request is self.echo.test)
-        self.statistics.asked(request.expected)
-        if self.trace.subscriptions:
-            self.trace.put(TraceRecord(now, "tx", request.wire))
+        self._leaving = attempt
 
     def adopt(self, attempt: Attempt) -> None:
         """Record of a written prepared request what `begin` records; it continues on the general path."""
@@ -371,24 +366,64 @@ class Engine:
 
     def written(self) -> None:
         """The data of `next_frame` was written. If its request expects no reply, settle the job."""
-        attempts, self._unacknowledged = self._unacknowledged, []
-        for attempt in attempts:
-            assert attempt.job is not None
+        attempt, self._leaving = self._leaving, None
+        assert attempt is not None
+        request = attempt.request
+        if request.expected == ():
+            self.free_at = max(attempt.sent_at, self.free_at) + attempt.air
+        else:
+            self.sync.mark_sent(request, attempt.sent_at)
+            self._share_wire(attempt)
+        if isinstance(request.wire, bytes):
+            self.echo.sent(request.wire, attempt.is_probe or request is self.echo.test)
+        self.statistics.asked(request.expected)
+        if self.trace.subscriptions:
+            self.trace.put(TraceRecord(attempt.sent_at, "tx", request.wire))
+        if request.expected == () and attempt.job is not None:
             self._decode(attempt.job, attempt.answer(self.time))
 
-    def _share_wire(self, attempt: Attempt, air: float) -> None:
-        """Extend this deadline by the air time of each attempt in flight, and theirs by `air`.
+    def not_written(self, error: LinkError) -> None:
+        """The link did not take the data of `next_frame`; other requests lose nothing.
+
+        If it is full, the request is written again after its air time, until the deadline of this attempt. Any other
+        error ends the request, of which a part may have been sent.
+        """
+        attempt, self._leaving = self._leaving, None
+        assert attempt is not None
+        assert attempt.job is not None
+        request, job = attempt.request, attempt.job
+        if request.expected != ():
+            del self.in_flight[request.lane]
+        if not isinstance(error, LinkFull):
+            self._mark_owed(attempt)
+        elif not attempt.write_until or attempt.sent_at < attempt.write_until:
+            attempt.write_until = attempt.write_until or (
+                attempt.sent_at + attempt.air + self.reply_timeout(request)
+            )
+            alone: Request[Response] = Request(request.wire)
+            self.full_until = attempt.sent_at + self.air_time(alone)
+            insort(self.queue, job)
+            return
+        job.settle(error=error)
+
+    def _mark_owed(self, attempt: Attempt) -> None:
+        """The replies to this attempt may still come."""
+        for due in attempt.dues:
+            self.sync.mark_owed(attempt.request.lane, due, attempt.sent_at + self.quiet_time)
+
+    def _share_wire(self, attempt: Attempt) -> None:
+        """Extend this deadline by the air time of each other attempt in flight, and theirs by its own.
 
         Each attempt counts each competitor once, and at most window - 1 of them.
         """
         if self.window == 1:
             return
-        attempt.air = air
-        attempt.competitors = len(self.in_flight)
-        for other in self.in_flight.values():
+        others = [other for other in self.in_flight.values() if other is not attempt]
+        attempt.competitors = len(others)
+        for other in others:
             attempt.deadline += other.air
             if other.competitors < self.window - 1 and other.job is not None:
-                other.deadline += air
+                other.deadline += attempt.air
                 other.competitors += 1
 
     def rate_changed(self, job: RateJob, error: MotorbusError | None = None) -> None:
@@ -656,8 +691,9 @@ class Engine:
         steps = [job.step for job in self.queue if isinstance(job, RequestJob)]
         waits = [self._earliest(step) for step in steps if step is not None]
         moments += [moment for moment in waits if moment > self.time]
-        if self.queue and self.paced and self.free_at > self.time:
-            moments.append(self.free_at)
+        if self.queue:
+            free = (self.full_until, self.free_at if self.paced else -inf)
+            moments += [moment for moment in free if moment > self.time]
         return min(moments, default=inf)
 
     def announce_stop(self, by: str) -> None:
@@ -715,15 +751,15 @@ class Engine:
     def lost(self, error: LinkError) -> None:
         """The link failed: everything that waits fails with this error."""
         self.ready = False
-        jobs = [*self.queue, *(attempt.job for attempt in self.in_flight.values())]
-        jobs += [attempt.job for attempt in self._unacknowledged]
-        for lane, attempt in self.in_flight.items():
-            for due in () if attempt.request.expected is ANY else attempt.request.expected:
+        leaving, self._leaving = self._leaving, None
+        attempts = {*self.in_flight.values(), *([] if leaving is None else [leaving])}
+        jobs = [*self.queue, *(attempt.job for attempt in attempts)]
+        for attempt in self.in_flight.values():
+            self._mark_owed(attempt)
+            for due in attempt.dues:
                 self.statistics.of(due.node).errors["lost"] += 1
-                self.sync.mark_owed(lane, due, attempt.sent_at + self.quiet_time)
         self.in_flight.clear()
         self.queue.clear()
-        self._unacknowledged.clear()
         self.exclusive = None
         if isinstance(error, LinkLost):
             if self.gone is None:

@@ -53,17 +53,22 @@ class Interrupts:
         return True
 
     def uninstall(self) -> None:
-        """Give the default handlers back when the last bus is closed."""
-        if current_thread() is not main_thread() or not self._opened:
-            return
+        """Give the default handlers back when the last bus is closed; from another thread with the next signal."""
         self._opened -= 1
-        if self._opened == 0:
-            for number, handler in self._replaced.items():
-                if signal.getsignal(number) == self._handle:
-                    signal.signal(number, handler)
-            self._replaced.clear()
+        if self._opened == 0 and current_thread() is main_thread():
+            self._restore()
+
+    def _restore(self) -> None:
+        for number, handler in self._replaced.items():
+            if signal.getsignal(number) == self._handle:
+                signal.signal(number, handler)
+        self._replaced.clear()
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
+        if not self._opened and not self.depth and not self.cleanups:  # closed in another thread
+            self._restore()
+            signal.raise_signal(number)
+            return
         self.count = self.count + 1 if self.depth or self.cleanups else 1
         if self.count == 1:
             self._first_at = monotonic()

@@ -122,6 +122,7 @@ class Attempt:
     shown since that there is none, so a reply may equal a request. `air` is its time on the wire (s), `competitors` the
     number of attempts on other lanes that its deadline allows for. `fault` is why it failed, "" while it has not;
     `surplus`: more came than was expected. `accepted` is what the caller gets. `ended`: it is not in flight any more.
+    `write_until` is when it fails (s) if the link is still full, 0 while the link was not.
     """
 
     request: Request[Any]
@@ -133,6 +134,7 @@ class Attempt:
     sent_at: float = 0.0
     deadline: float = inf
     air: float = 0.0
+    write_until: float = 0.0
     competitors: int = 0
     replies: dict[int, Reply] = field(default_factory=dict)
     noise: list[tuple[str, bytes]] = field(default_factory=list)

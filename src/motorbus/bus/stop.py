@@ -14,12 +14,14 @@ import contextlib
 import json
 import os
 import socket
+import time
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as LateError
 from pathlib import Path
 from selectors import EVENT_READ, DefaultSelector
-from threading import Event, Lock, Thread
-from typing import Final, Protocol
+from threading import Event, Lock, Thread, current_thread
+from typing import Any, Final, Protocol
+from weakref import ref
 
 from motorbus.bus.engine import Engine
 from motorbus.bus.jobs import RateJob
@@ -27,9 +29,9 @@ from motorbus.bus.stop_rounds import stop_in_rounds
 from motorbus.bus.stop_socket import STOP_TIMEOUT, StopOutcome, asked_by, client_name, listening
 from motorbus.bus.tasks import TaskTree
 from motorbus.bus.turn import Turn
-from motorbus.core.request import Priority
+from motorbus.core.request import Priority, Request
 from motorbus.core.steps import SetBitrate
-from motorbus.errors import LinkError, LinkLost
+from motorbus.errors import LinkError, LinkFull, LinkLost
 from motorbus.link.base import Link
 
 CLIENT_TIME: Final = 0.05
@@ -52,10 +54,10 @@ class StoppableBus(Protocol):
 
 
 class EmergencyStop:
-    """The emergency stop of one bus."""
+    """The emergency stop of one bus, which it keeps alive only while it stops."""
 
     def __init__(self, bus: StoppableBus, socket_path: Path | None = None) -> None:
-        self.bus = bus
+        self._bus = ref(bus)
         self.socket_path = socket_path
         self._pair: tuple[socket.socket, socket.socket] | None = None
         self._requests: list[Future[StopOutcome]] = []
@@ -63,6 +65,14 @@ class EmergencyStop:
         self._starting = Lock()
         self._thread: Thread | None = None
         self._closed = False
+
+    @property
+    def bus(self) -> StoppableBus:
+        """The bus. Raises LinkLost when it was dropped."""
+        bus = self._bus()
+        if bus is None:
+            raise LinkLost("the bus was dropped: no stop was sent", advice="open it again, or cut the power")
+        return bus
 
     def start(self) -> None:
         """Start the thread, unless it runs or time is virtual.
@@ -122,23 +132,41 @@ class EmergencyStop:
             return StopOutcome((), silent, 0, "nothing: the stop thread did not answer")
 
     def stop(self, client: str = "") -> StopOutcome:
-        """Latch the engine and send the stop frames, in the calling thread."""
-        bus, engine = self.bus, self.bus.engine
-        by = asked_by(client)
+        """Latch the engine and send the stop frames, in the calling thread. Raises what the driver raises."""
+        engine, by = self.bus.engine, asked_by(client)
         engine.announce_stop(by)
+        try:
+            return self._stop(by)
+        finally:
+            engine.stop_sent()
+
+    def _stop(self, by: str) -> StopOutcome:
+        bus, engine = self.bus, self.bus.engine
         if bus.turn.acquire(Priority.STOP, engine.stop_delay(bus.now())):
             return self._stop_with_turn(by)
         stop = engine.positions.frames(bus.now())
         disturbs_no_reply = [request for request in stop.requests if not request.expected]
         for request in disturbs_no_reply or stop.requests:
             engine.note_stop(request)
-            with contextlib.suppress(LinkError):
-                bus.link.write(request.wire)
+            self._write_blind(request)
         if bus.turn.acquire(Priority.STOP, STOP_TIMEOUT):
             return self._stop_with_turn(by)
-        engine.stop_sent()
         silent = tuple(sorted(engine.positions.nodes))
         return StopOutcome((), silent, 1, f"{stop.promise}; sent once, no acknowledgement could be read")
+
+    def _write_blind(self, request: Request[Any]) -> None:
+        """Write a frame of a stop without the turn; while the link is full, again and again until its deadline."""
+        link, engine = self.bus.link, self.bus.engine
+        end = link.now() + engine.air_time(request) + engine.reply_timeout(request)
+        with contextlib.suppress(LinkError):
+            while True:
+                try:
+                    link.write(request.wire)
+                    return
+                except LinkFull:
+                    if link.now() >= end:
+                        return
+                time.sleep(engine.air_time(request))
 
     def _stop_with_turn(self, by: str) -> StopOutcome:
         bus, engine = self.bus, self.bus.engine
@@ -153,7 +181,7 @@ class EmergencyStop:
                     bus.receive(tree.next_moment())
             return tree.result()
         finally:
-            engine.stop_sent()
+            engine.stop_sent()  # before the turn is free
             bus.turn.release()
 
     def _restore_rate(self) -> None:
@@ -208,7 +236,12 @@ class EmergencyStop:
 
     def _stop_and_answer(self, client: str = "") -> StopOutcome:
         requests, self._requests = self._requests, []
-        outcome = self.stop(client)
+        try:
+            outcome = self.stop(client)
+        except BaseException as error:
+            for request in requests:
+                request.set_exception(error)
+            raise
         for request in requests:
             request.set_result(outcome)
         return outcome
@@ -228,7 +261,7 @@ class EmergencyStop:
             self._starting.release()
         atexit.unregister(self.close)
         self._wake(END)
-        if self._thread is not None:
+        if self._thread is not None and self._thread is not current_thread():
             self._thread.join(STOP_TIMEOUT)
         for end in self._pair or ():
             end.close()

@@ -53,16 +53,21 @@ class _Stepping(local):
 _STEPPING: Final = _Stepping()
 
 
+def check_outside() -> None:
+    """Raise RequestError inside of a procedure: a call that waits there would wait for itself."""
+    if _STEPPING.active:
+        raise RequestError(
+            "a bus or a device method was called inside of a procedure",
+            expected="a step, or the driver function: `await feetech.Servo.position.function(servo)`",
+            advice="nothing was sent",
+        )
+
+
 @contextmanager
 def starting(*runnables: object) -> Iterator[None]:
     """Close these procedures if they are refused. Raises RequestError inside of another procedure."""
     try:
-        if _STEPPING.active:
-            raise RequestError(
-                "a bus or a device method was called inside of a procedure",
-                expected="a step, or the driver function: `await feetech.Servo.position.function(servo)`",
-                advice="nothing was sent",
-            )
+        check_outside()
         yield
     except BaseException:
         for one in runnables:

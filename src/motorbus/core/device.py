@@ -40,6 +40,8 @@ class AsyncRunner(Protocol):
 
 class _Device:
     _is_async: ClassVar[bool]
+    _family: ClassVar[str] = ""
+    """The family of its bus; "" for a device of any family."""
 
     def __init__(self, bus: Any) -> None:
         if getattr(bus, "is_async", self._is_async) is not self._is_async:
@@ -48,6 +50,12 @@ class _Device:
                 f"{type(self).__name__} needs {needed} bus, not {bus!r}",
                 advice=f"open the bus with motorbus.{opener}; nothing was sent",
             )
+        family: str = getattr(getattr(bus, "family", None), "name", self._family)
+        if self._family and family != self._family:
+            raise RequestError(
+                f"{bus!r} is a bus of {family} devices, and this {type(self).__name__} is one of {self._family}",
+                advice=f"use a device of motorbus.{family}, or open {self._family}:PORT; nothing was sent",
+            )
         self.bus = bus
 
     def __repr__(self) -> str:
@@ -55,14 +63,16 @@ class _Device:
 
 
 class BlockingDevice(_Device):
-    """A device whose methods run on a blocking bus. Raises RequestError for an async bus."""
+    """A device whose methods run on a blocking bus. Raises RequestError for an async bus, or one of another family."""
 
     _is_async = False
     bus: BlockingRunner
 
 
 class AsyncDevice(_Device):
-    """A device whose methods return coroutines of an async bus. Raises RequestError for a blocking bus.
+    """A device whose methods return coroutines of an async bus.
+
+    Raises RequestError for a blocking bus, or one of another family.
 
     A method calls its driver function at once; what that refuses by itself is raised before the `await`.
     """

@@ -37,7 +37,7 @@ class Link(Protocol):
         """Seconds on the monotonic clock of this link."""
 
     def write(self, data: Data) -> None:
-        """Send data without blocking. Raises LinkLost, or LinkError when the buffer is full."""
+        """Send data without blocking. Raises LinkLost, LinkFull when nothing fits, LinkError when a part was sent."""
 
     def read(self, until: float) -> list[Data]:
         """Return what has arrived; wait for the first of it until this moment. Raises LinkLost.

@@ -14,13 +14,14 @@ import time
 import warnings
 from collections.abc import Mapping
 from contextlib import nullcontext
+from pathlib import Path
 from threading import Lock
 from types import ModuleType
 from typing import Any, Final
 
 from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
 from motorbus.core.request import Data
-from motorbus.errors import LinkError, LinkLost, MotorbusError, PortNotFound, RequestError
+from motorbus.errors import LinkError, LinkFull, LinkLost, MotorbusError, PortNotFound, RequestError
 from motorbus.link import usb_adapters
 from motorbus.link.can_options import SHARED, CanOptions, check_rate, kernel_rate, read_options
 from motorbus.link.can_text import TextChannel
@@ -73,7 +74,7 @@ def describe(port: str, options: Mapping[str, object]) -> CanOptions:
 
 
 class CanLink:
-    """An open CAN channel. Arguments as for `open_link`.
+    """An open CAN channel. Arguments as for `open_link`. `queue`: frames that it takes at once, 0 if unknown.
 
     `options`  `listen_only` (yes, no), `config_context` (a section of python-can's configuration), and what the back
                end's constructor takes
@@ -115,6 +116,7 @@ class CanLink:
             self._channel = self._open(connect_time)
         self.latency = self._channel.latency
         self.warnings = self._channel.warnings + warning
+        self.queue = kernel_queue(str(found.channel)) if found.interface == "socketcan" else 0
 
     def _check_settings(self, rate: int, listen_only: bool) -> tuple[str, ...]:
         """Check rate (bit/s, 0 for any) and mode; a warning when the adapter does not tell its rate.
@@ -286,7 +288,7 @@ class BusChannel:
             text = str(error).lower()
             is_full = isinstance(error, TimeoutError) or _error_code(error) in _FULL
             if is_full or any(words in text for words in _FULL_TEXTS):
-                raise LinkError(
+                raise LinkFull(
                     f"{self.name} takes no more frames: {error}",
                     cause="no node acknowledges, the bus is off, or frames are written faster than its rate",
                 ) from error
@@ -303,6 +305,14 @@ class BusChannel:
         if bus is not None:
             with self._access, contextlib.suppress(Exception):  # it may be broken already
                 bus.shutdown()
+
+
+def kernel_queue(channel: str, sysfs: Path = Path("/sys")) -> int:
+    """Frames that a SocketCAN interface takes at once; 0 when the system does not tell."""
+    try:
+        return int((sysfs / "class" / "net" / channel / "tx_queue_len").read_text())
+    except (OSError, ValueError):
+        return 0
 
 
 def frame_of(message: Any) -> CanFrame | None:

@@ -83,14 +83,14 @@ class TextChannel:
         self.send(self._codec.encode(frame))
 
     def send(self, text: bytes) -> None:
-        """Send a whole line. Raises LinkLost, or LinkError when the buffer is full."""
+        """Send a whole line. Raises LinkLost, or LinkFull: a line that was sent in part is no frame."""
         cancel = self._codec.cancel
         if self._unfinished and self._link.send(cancel) == len(cancel):
             self._unfinished = False
         written = 0 if self._unfinished else self._link.send(text)
         if written != len(text):
             self._unfinished = self._unfinished or written > 0
-            raise full(self.name, written, len(text))
+            raise full(self.name, 0, len(text))
 
     def trouble(self) -> str:
         """What the adapter has reported since the last call; "" for nothing."""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from motorbus.errors import LinkError, LinkLost, PortBusy, PortNotFound
+from motorbus.errors import LinkError, LinkFull, LinkLost, PortBusy, PortNotFound
 from motorbus.link.usb_adapters import PortInfo
 
 ADVICE = {
@@ -101,8 +101,8 @@ def lost(port: str, reason: object) -> LinkLost:
 
 
 def full(port: str, written: int, length: int) -> LinkError:
-    """The port accepted only `written` of `length` bytes."""
-    return LinkError(
+    """The port accepted only `written` of `length` bytes. LinkFull if it accepted none."""
+    return (LinkError if written else LinkFull)(
         f"{port} takes no more bytes: {written} of {length} went out",
         cause="the other end does not read, or bytes are written faster than the rate allows",
     )

@@ -168,6 +168,7 @@ class Reconnecting:
         self.rate: int = link.rate
         self.warnings: tuple[str, ...] = link.warnings
         self.latency: float = link.latency
+        self.queue: int = getattr(link, "queue", 0)
         self.now = link.now  # type: ignore[method-assign]
         self.read = link.read  # type: ignore[method-assign]
         self.write = link.write  # type: ignore[method-assign]

@@ -48,7 +48,7 @@ def open(address: str, *, report: Notify | None = None, **options: object) -> Bu
         if test is not None:
             _settled(bus, lambda: bus.run(test))
     except BaseException:
-        bus.link.close()
+        bus.close()
         raise
     bus.defer_signals()
     return bus

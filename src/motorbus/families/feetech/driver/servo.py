@@ -33,6 +33,7 @@ class ServoMethods(Node):
     nothing; the first method that needs the register map reads it.
     """
 
+    _family = "feetech"
     ping = device_method(identity.ping)
     identify = device_method(identity.identify)
     prepare = device_method(identity.prepare)

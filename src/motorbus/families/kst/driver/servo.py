@@ -27,6 +27,7 @@ class ServoMethods(Node):
     power cycle and verify: they are `provision` with one value.
     """
 
+    _family = "kst"
     ping = device_method(identity.ping)
     identify = device_method(identity.identify)
     version = device_method(identity.version)

@@ -35,6 +35,7 @@ class ControllerMethods(Node):
     Making one costs nothing and sends nothing.
     """
 
+    _family = "stepper"
     ping = device_method(presence.ping)
     identify = device_method(presence.identify)
     read = device_method(reading.read)
