@@ -114,6 +114,8 @@ FEETECH: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("calibrate", 1.0), "to", PREPARED),
     (call("clear_turns"), "", PREPARED),
     (call("set_many_turns", True), "on", PREPARED),
+    (call("cap_torque", 0.5), "", PREPARED),
+    (call("cap_current", 0.5), "", PREPARED),
     (call("recover_overload"), "", TORQUE_ON),
     (shared("scan", (1, 2, 3)), "ids", ()),
     (shared("sync_read", ("present_position", "present_velocity"), DEVICES), "", ()),
