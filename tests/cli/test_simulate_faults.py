@@ -89,7 +89,7 @@ def test_a_serial_line_suffers_before_and_while_it_runs(way: str, tmp_path: Path
         servo.position()
 
 
-@pytest.mark.parametrize("way", ["link", "socketcand"])
+@pytest.mark.parametrize("way", ["link", "tcp"])
 def test_a_can_bus_suffers_whatever_adapter_is_before_it(way: str, tmp_path: Path) -> None:
     ways: dict[str, Any] = {"link": tmp_path / "can"} if way == "link" else {way: "0"}
     with (
@@ -178,7 +178,7 @@ def test_faults_are_refused_on_a_can_bus_that_may_have_real_devices(
     said = run("simulate", "kst", "--ids", "0x25", *flags, "--faults", "100%: echo")
     assert said.code == Exit.USAGE
     assert f"can://{bus}: faults are refused on a CAN bus that may have real devices" in said.err
-    for word in ("vcan0", "--link", "--socketcand"):
+    for word in ("vcan0", "--link", "--tcp"):
         assert word in said.err
     assert said.out == ""
     assert list(tmp_path.iterdir()) == []  # nothing was opened or made

@@ -29,7 +29,7 @@ PLACES = (
     ("1%: …", "each packet, by chance"),
     ("1% of bytes: …", "each byte, by chance"),
     ("at 2.5 s: …", "the first packet from that moment on, or devices at that very moment"),
-    ("… on adapter: …", "the text between a CAN adapter (slcan, socketcand) and its host"),
+    ("… on adapter: …", "the text between an slcan adapter and its host"),
     ("seed 42", "what chance begins with"),
 )
 """Where a fault can stand, and what that means."""

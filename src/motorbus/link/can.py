@@ -1,7 +1,7 @@
 """CAN channels: `can://INTERFACE/CHANNEL`.
 
-Every interface of python-can works, with its configuration files and CAN_* variables; slcan and socketcand are read
-by our own code. Where python-can would silently take another bit rate, ignore an option or wait without end, this link
+Every interface of python-can works, with its configuration files and CAN_* variables; slcan is read by our own
+code. Where python-can would silently take another bit rate, ignore an option or wait without end, this link
 raises an error. python-can is imported here only, when a port is opened.
 """
 
@@ -23,12 +23,10 @@ from motorbus.core.request import Data
 from motorbus.errors import LinkError, LinkLost, MotorbusError, PortNotFound, RequestError
 from motorbus.link import usb_adapters
 from motorbus.link.can_options import SHARED, CanOptions, check_rate, kernel_rate, read_options
-from motorbus.link.can_text import TextChannel
 from motorbus.link.errors import busy, lost
 from motorbus.link.lock import PortLock, opening
 from motorbus.link.serial import NO_DEVICE
 from motorbus.link.slcan import SlcanChannel
-from motorbus.link.socketcand import open_socketcand
 
 BUS_OFF: Final = 0x40  # CAN_ERR_BUSOFF in the identifier of an error frame, linux/can/error.h
 SLICE: Final = 0.02  # s of one wait inside python-can
@@ -139,12 +137,10 @@ class CanLink:
             return (f"the bit rate is set at the server; whether that is {rate} bit/s cannot be checked",)
         return ()
 
-    def _open(self, connect_time: float | None) -> TextChannel | BusChannel:
-        channel: TextChannel | BusChannel
+    def _open(self, connect_time: float | None) -> SlcanChannel | BusChannel:
+        channel: SlcanChannel | BusChannel
         if self._options.interface == "slcan":
             channel = SlcanChannel(self._options, connect_time)
-        elif self._options.interface == "socketcand":
-            channel = open_socketcand(self._options, connect_time)
         else:
             channel = BusChannel(self._options)
         try:

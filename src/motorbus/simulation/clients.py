@@ -149,7 +149,7 @@ class CanClient(Participant):
         self._stuck = False
         self._as_new = deepcopy(adapter)
         self._text: Text | None = None
-        self._out = bytearray(adapter.greet())
+        self._out = bytearray()
 
     @property
     def fixed(self) -> str:
@@ -164,7 +164,7 @@ class CanClient(Participant):
         self._rate, self._stuck = None, False
         if self._text:
             self._text.half = b""
-        self._out = bytearray(self.adapter.greet())
+        self._out = bytearray()
 
     def fileno(self) -> int:
         return self._endpoint.fileno()
@@ -208,8 +208,7 @@ class CanClient(Participant):
         return self._stuck
 
     def is_gone(self) -> bool:
-        gone = isinstance(self._endpoint, TcpClient) and self._endpoint.gone
-        return gone or (self.adapter.finished and not self._stuck)
+        return isinstance(self._endpoint, TcpClient) and self._endpoint.gone
 
     def close(self) -> None:
         if isinstance(self._endpoint, TcpClient):

@@ -30,9 +30,7 @@ def without_adapter(script: Script, why: str = "nothing here speaks the text of 
     """Raises RequestError when a fault is for the text between an adapter and its host, and there is none."""
     for fault in script:
         if fault.adapter:
-            raise RequestError(
-                f"fault {fault}: {why}", expected="a CAN bus that is served by slcan or socketcand"
-            )
+            raise RequestError(f"fault {fault}: {why}", expected="a CAN bus that is served by slcan")
 
 
 def is_calm(line: Line) -> bool:
@@ -46,5 +44,5 @@ def on_a_wire(port: str) -> RequestError:
         f"{port}: faults are refused on a CAN bus that may have real devices; nothing was changed",
         expected="a bus of programs alone: can://virtual, can://udp_multicast, or can://socketcan/vcan0 (vxcan0)",
         cause="what is done to frames there, other devices suffer or obey too",
-        advice="serve the devices by --link, --tcp or --socketcand, or on can://socketcan/vcan0",
+        advice="serve the devices by --link or --tcp, or on can://socketcan/vcan0",
     )
