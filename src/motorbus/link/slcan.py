@@ -11,8 +11,8 @@ import re
 import time
 from typing import Final
 
-from motorbus.core.can_frame import REMOTE_FLAG, CanFrame
 from motorbus.core import units
+from motorbus.core.can_frame import REMOTE_FLAG, CanFrame
 from motorbus.errors import LinkError, RequestError
 from motorbus.link.can_options import SLCAN_RATES, CanOptions
 from motorbus.link.can_text import TextChannel, TextCodec
