@@ -97,6 +97,7 @@ class State(NamedTuple):
     moving: bool | None = None
     alarm: tuple[str, ...] = ()  # names of the alarm bits that are set
     quality: Quality = Quality.FRESH
+    refused: tuple[str, ...] = ()  # errors of values that the device refused; they are None
 
 
 class Health(NamedTuple):
