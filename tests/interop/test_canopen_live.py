@@ -1,4 +1,4 @@
-"""python-canopen, unmodified, works with our simulated servos through the EDS files that we write.
+"""python-canopen, unmodified, works with our simulated servos.
 
 It knows neither these servos nor us: objects, sizes and units come from the file, replies from the simulator in
 another process, by slcan.
@@ -11,9 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from motorbus.core.register import Register
+from motorbus.core.register import Coding, Register
 from motorbus.core.request import Effect
-from motorbus.families.kst.eds import eds
 from motorbus.families.kst.profiles import PROFILES, Profile
 from tests.interop.can_bus import Way, can_bus
 from tests.interop.canopen_peer import Canopen, CanopenError
@@ -24,10 +23,29 @@ PATIENCE = 10.0
 READ_ONLY, TOO_HIGH, NO_OBJECT = 0x06010002, 0x06090031, 0x06020000
 
 
+TYPES = {(1, False): 5, (2, False): 6, (4, False): 7, (2, True): 3}
+VISIBLE_STRING = 9
+
+
+def dictionary(profile: Profile) -> str:
+    """The readable objects of this profile as python-canopen loads them (CiA 306); angles in degrees."""
+    rows = [row for row in profile.table.values() if row.readable]
+    listed = [f"{number}=0x{row.address:04X}" for number, row in enumerate(rows, 1)]
+    lines = ["[DeviceInfo]", "[OptionalObjects]", f"SupportedObjects={len(rows)}", *listed]
+    for row in rows:
+        is_text, signed = row in profile.version_rows, row.coding is Coding.TWOS_COMPLEMENT
+        kind = VISIBLE_STRING if is_text else TYPES[row.size, signed]
+        lines += [f"[{row.address:04X}]", f"ParameterName={row.name}", "ObjectType=0x7", "PDOMapping=0"]
+        lines += [f"DataType=0x{kind:04X}", f"AccessType={'rw' if row.writable else 'ro'}"]
+        if row.unit == "rad":
+            lines += [f"Factor={1 / profile.counts_per_degree}", "Unit=deg"]
+    return "\n".join(lines) + "\n"
+
+
 def canopen(way: Way, profile: Profile, folder: Path) -> Canopen:
-    """The library with the data sheet of this profile."""
+    """The library with the objects of this profile."""
     file = folder / f"{profile.name}.eds"
-    file.write_text(eds(profile, node_id=NODE), encoding="ascii")
+    file.write_text(dictionary(profile), encoding="ascii")
     peer = Canopen(way.interface, way.channel, way.kwargs, file, NODE)
     peer.timeout(PATIENCE)
     return peer

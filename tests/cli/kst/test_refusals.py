@@ -46,7 +46,6 @@ READS = ("#40", "#60", "#70")
         ("kst limits EXT#37 -1 --yes", 2, "one limit alone"),
         ("kst reverse EXT#37 on", 8, "--yes"),
         ("kst mid-point EXT#37", 8, "--yes"),
-        ("kst eds --profile acme", 2, "no profile 'acme'"),
         ("read BUS#37 status --profile kst-ext", 7, "does not exist"),
         ("move BUS#37+38=200deg --yes", 8, "out of range"),
         ("write BUS#37 present_position=1", 2, "present_position"),
