@@ -118,7 +118,6 @@ def test_devices_that_ship_with_another_rate_are_opened_by_the_address_of_the_re
         (["feetech", "--switch", "gravity"], 2),
         (["feetech", "--gravity", "off"], 2),
         (["feetech", "--gravity"], 2),
-        (["feetech", "--socketcand", "0"], 2),
         (["feetech", "--can", "virtual/x"], 2),
         (["feetech", "--bitrate", "500000"], 2),
         (["feetech", "--baud", "-1"], 2),
@@ -129,7 +128,6 @@ def test_devices_that_ship_with_another_rate_are_opened_by_the_address_of_the_re
         (["kst", "--ids", "0"], 2),
         (["kst", "--profile", "abacus"], 2),
         (["kst", "--out-of-range", "explode"], 2),
-        (["kst", "--socketcand", "somewhere"], 2),
         (["kst", "--can", "nowhere/x"], 2),
         (["feetech", "--tcp", "0", "--link", "bus"], 2),
         (["feetech", "--tcp", "somewhere"], 2),
@@ -177,9 +175,9 @@ def slcan(descriptor: int) -> bytes:
 
 def test_a_can_bus_is_served_in_every_way_at_once(tmp_path: Path) -> None:
     link = tmp_path / "can"
-    with Simulated("kst", ids="0x25,0x26", link=link, tcp="0", socketcand="0") as simulated:
+    with Simulated("kst", ids="0x25,0x26", link=link, tcp="0") as simulated:
         assert simulated.ready["ids"] == [0x25, 0x26]
-        one, other, third = simulated.buses
+        one, other = simulated.buses
         assert simulated.bus == one == f"kst:can://slcan{link}"
         terminal = os.open(link, os.O_RDWR | os.O_NOCTTY)
         try:
@@ -189,14 +187,6 @@ def test_a_can_bus_is_served_in_every_way_at_once(tmp_path: Path) -> None:
         host, _, port = other.removeprefix("kst:can://slcan/socket://").rpartition(":")
         with socket.create_connection((host, int(port))) as client:
             assert slcan(client.fileno()) == POSITION
-        host, _, port = third.removeprefix("kst:can://socketcand/").removesuffix("/can0").rpartition(":")
-        with socket.create_connection((host, int(port))) as client:
-            assert asked(client.fileno(), b"", 6) == b"< hi >"
-            for word in (b"< open can0 >", b"< rawmode >"):
-                assert asked(client.fileno(), word, 6) == b"< ok >"
-            answer = asked(client.fileno(), b"< send 625 8 40 2 60 0 0 0 0 0 >", 40)
-            assert answer.startswith(b"< frame 5A5 ")
-            assert b"4B02600000000000" in answer
 
 
 def test_without_a_way_a_can_bus_is_on_a_terminal() -> None:
@@ -222,14 +212,14 @@ def test_switches_are_flags_and_settings_belong_to_the_address(tmp_path: Path) -
         "kst",
         ids="37",
         link=tmp_path / "can",
-        socketcand="0",
+        tcp="0",
         profile="kst-ext",
         status_6002="x1x2",
         x1="64",
         bitrate="500000",
     ) as simulated:
         assert simulated.bus == f"kst:can://slcan{tmp_path / 'can'},profile=kst-ext,bitrate=500000"
-        assert simulated.buses[1].endswith("/can0,profile=kst-ext")
+        assert simulated.buses[1].endswith(",profile=kst-ext,bitrate=500000")
         terminal = os.open(tmp_path / "can", os.O_RDWR | os.O_NOCTTY)
         try:
             assert slcan(terminal) == b"t5A584B02600040000000\r"

@@ -89,7 +89,7 @@ def test_a_serial_line_suffers_before_and_while_it_runs(way: str, tmp_path: Path
         servo.position()
 
 
-@pytest.mark.parametrize("way", ["link", "socketcand"])
+@pytest.mark.parametrize("way", ["link", "tcp"])
 def test_a_can_bus_suffers_whatever_adapter_is_before_it(way: str, tmp_path: Path) -> None:
     ways: dict[str, Any] = {"link": tmp_path / "can"} if way == "link" else {way: "0"}
     with (
@@ -166,7 +166,7 @@ def test_what_happens_is_said_on_stderr_and_at_the_end_how_to_have_it_again(tmp_
 # A CAN bus that others have.
 
 
-@pytest.mark.parametrize("bus", ["socketcan/can0", "slcan/dev/nothing", "socketcand/127.0.0.1:1/can0"])
+@pytest.mark.parametrize("bus", ["socketcan/can0", "slcan/dev/nothing"])
 def test_faults_are_refused_on_a_can_bus_that_may_have_real_devices(
     bus: str, run: Run, tmp_path: Path
 ) -> None:
@@ -174,7 +174,7 @@ def test_faults_are_refused_on_a_can_bus_that_may_have_real_devices(
     said = run("simulate", "kst", "--ids", "0x25", *flags, "--faults", "100%: echo")
     assert said.code == Exit.USAGE
     assert f"can://{bus}: faults are refused on a CAN bus that may have real devices" in said.err
-    for word in ("vcan0", "--link", "--socketcand"):
+    for word in ("vcan0", "--link", "--tcp"):
         assert word in said.err
     assert said.out == ""
     assert list(tmp_path.iterdir()) == []  # nothing was opened or made

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.family import Family, Health, PositionStream, State
+from motorbus.core.family import Family, Health, Identity, PositionStream, State
 from motorbus.core.request import Effect, Request
 from motorbus.core.steps import Runnable, catch, gather
 from motorbus.errors import LimitExceeded, NoReply, RequestError
@@ -50,8 +50,8 @@ def test_capabilities_are_those_of_the_contract_and_are_called_as_it_says(subjec
         inspect.signature(function).bind(*order, **dict.fromkeys(named))
 
 
-def test_what_is_no_model_has_no_axis(subject: Family) -> None:
-    assert not subject.open().axis("no such model").names | subject.open().axis("").names
+def test_without_a_known_register_map_there_is_no_axis(subject: Family) -> None:
+    assert not subject.open().axis(Identity(1, "no such model", "", "")).names
 
 
 def test_a_model_that_is_led_tells_its_position_and_its_limits_and_can_be_stopped(leader: Family) -> None:

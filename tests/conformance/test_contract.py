@@ -211,12 +211,11 @@ def test_a_stop_says_what_it_promises(family: Family, nodes: tuple[int, ...]) ->
             assert exchange.lane == lane_of(family, exchange.expected[0].node)
 
 
-def test_capabilities_belong_to_a_model(subject: Family) -> None:
+def test_capabilities_belong_to_an_identity(subject: Family) -> None:
     with world(subject) as there:
-        model = there.bus.run(subject.open().identify(IDS[0])).model
-    capabilities = subject.open().axis(model)
+        identity = there.bus.run(subject.open().identify(IDS[0]))
+    capabilities = subject.open().axis(identity)
     assert all(callable(getattr(capabilities, name)) for name in capabilities.names)
-    assert not subject.open().axis("no such model").names
 
 
 def test_both_faces_have_the_same_verbs(family: Family) -> None:

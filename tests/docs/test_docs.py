@@ -15,7 +15,7 @@ from tests.docs.test_readme import LINES as README
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("changelog.d/*.md")])
 WITHOUT_HARDWARE = re.compile(
-    r"(feetech|kst|stepper):sim|^motorbus decode|^motorbus ports|^motorbus kst eds$"
+    r"(feetech|kst|stepper):sim|^motorbus decode|^motorbus ports"
     r"|^motorbus feetech (registers|models)|^motorbus stepper \w+ \S+\.toml$"
 )
 

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import motorbus
 from motorbus import MotorbusError
+from motorbus.core.family import State
 
 DEVICE = {"feetech": "Servo", "kst": "Servo", "stepper": "Controller"}
 """Family -> its public device class."""
@@ -183,6 +184,8 @@ def field_names(value: Any) -> Sequence[str] | None:
     fields: Sequence[str] | None = getattr(value, "_fields", None) or getattr(
         value, "__struct_fields__", None
     )
+    if isinstance(value, State) and not value.refused:
+        return [name for name in State._fields if name != "refused"]
     return fields
 
 

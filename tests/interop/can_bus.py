@@ -12,7 +12,6 @@ from typing import NamedTuple
 from tests.support.processes import Simulated
 
 RATE = 500_000
-WAYS = ("slcan", "socketcand")
 
 
 class Way(NamedTuple):
@@ -24,19 +23,15 @@ class Way(NamedTuple):
 
 
 class CanBus:
-    """A bus that is served by slcan on a pseudo-terminal and by socketcand at once."""
+    """A bus that is served by slcan on a pseudo-terminal."""
 
     def __init__(self, simulated: Simulated, folder: Path) -> None:
         self.simulated = simulated
         self._folder = folder
 
-    def way(self, interface: str, rate: int = RATE) -> Way:
-        """How to reach it; socketcand knows no bit rate."""
-        if interface == "slcan":
-            return Way("slcan", str(self._folder / "can"), {"bitrate": rate, "sleep_after_open": 0})
-        address = self.simulated.buses[1].removeprefix("kst:can://socketcand/").split("/")[0]
-        host, _, port = address.rpartition(":")
-        return Way("socketcand", "can0", {"host": host, "port": int(port)})
+    def way(self, rate: int = RATE) -> Way:
+        """How python-can reaches it."""
+        return Way("slcan", str(self._folder / "can"), {"bitrate": rate, "sleep_after_open": 0})
 
     def order(self, text: str) -> str:
         """What the control socket answers to this."""
@@ -56,6 +51,6 @@ class CanBus:
 def can_bus(folder: Path, ids: str = "0x25", **flags: str) -> Iterator[CanBus]:
     """A bus with these servos; its link and its control socket stand in this folder."""
     control, link = folder / "control", folder / "can"
-    flags = {"socketcand": "0", "control": str(control), **flags}
+    flags = {"control": str(control), **flags}
     with Simulated("kst", ids=ids, link=link, tcp="", pace=False, **flags) as simulated:
         yield CanBus(simulated, folder)

@@ -48,15 +48,6 @@ def script(name: str, *arguments: str) -> list[str]:
     return [sys.executable, "-S", str(HERE / name), *arguments]
 
 
-def describe(*files: Path) -> dict[str, Any]:
-    """What it makes of these EDS files: see canopen_describe.py. It may not warn of anything."""
-    command = script("canopen_describe.py", *map(str, files))
-    done = subprocess.run(command, env=environment(), capture_output=True, text=True, timeout=60)
-    assert (done.returncode, done.stderr) == (0, "")
-    answer: dict[str, Any] = json.loads(done.stdout)
-    return answer
-
-
 class Canopen:
     """The library at work in its own process: `peer.read("node_id")`; what can be asked stands in canopen_client.py."""
 

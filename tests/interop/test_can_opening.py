@@ -24,7 +24,7 @@ ROUNDS = 50
 
 @contextmanager
 def by_port(place: int, folder: Path) -> Iterator[str]:
-    with Simulated("kst", ids="0x25", link=folder / "can", tcp="0", socketcand="0") as simulated:
+    with Simulated("kst", ids="0x25", link=folder / "can", tcp="0") as simulated:
         yield simulated.buses[place]
 
 
@@ -37,7 +37,6 @@ def by_virtual(folder: Path) -> Iterator[str]:
 WAYS: dict[str, Callable[[Path], AbstractContextManager[str]]] = {
     "slcan on a pseudo-terminal": lambda folder: by_port(0, folder),
     "slcan on TCP": lambda folder: by_port(1, folder),
-    "socketcand": lambda folder: by_port(2, folder),
     "virtual": by_virtual,
 }
 

@@ -1,7 +1,7 @@
-"""python-canopen, unmodified, works with our simulated servos through the EDS files that we write.
+"""python-canopen, unmodified, works with our simulated servos.
 
 It knows neither these servos nor us: objects, sizes and units come from the file, replies from the simulator in
-another process, by slcan and by socketcand.
+another process, by slcan.
 """
 
 from __future__ import annotations
@@ -11,11 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from motorbus.core.register import Register
+from motorbus.core.register import Coding, Register
 from motorbus.core.request import Effect
-from motorbus.families.kst.eds import eds
 from motorbus.families.kst.profiles import PROFILES, Profile
-from tests.interop.can_bus import WAYS, Way, can_bus
+from tests.interop.can_bus import Way, can_bus
 from tests.interop.canopen_peer import Canopen, CanopenError
 
 NODE = 0x25
@@ -24,16 +23,29 @@ PATIENCE = 10.0
 READ_ONLY, TOO_HIGH, NO_OBJECT = 0x06010002, 0x06090031, 0x06020000
 
 
-@pytest.fixture(params=WAYS)
-def interface(request: pytest.FixtureRequest) -> str:
-    """By which of python-can's back ends."""
-    return str(request.param)
+TYPES = {(1, False): 5, (2, False): 6, (4, False): 7, (2, True): 3}
+VISIBLE_STRING = 9
+
+
+def dictionary(profile: Profile) -> str:
+    """The readable objects of this profile as python-canopen loads them (CiA 306); angles in degrees."""
+    rows = [row for row in profile.table.values() if row.readable]
+    listed = [f"{number}=0x{row.address:04X}" for number, row in enumerate(rows, 1)]
+    lines = ["[DeviceInfo]", "[OptionalObjects]", f"SupportedObjects={len(rows)}", *listed]
+    for row in rows:
+        is_text, signed = row in profile.version_rows, row.coding is Coding.TWOS_COMPLEMENT
+        kind = VISIBLE_STRING if is_text else TYPES[row.size, signed]
+        lines += [f"[{row.address:04X}]", f"ParameterName={row.name}", "ObjectType=0x7", "PDOMapping=0"]
+        lines += [f"DataType=0x{kind:04X}", f"AccessType={'rw' if row.writable else 'ro'}"]
+        if row.unit == "rad":
+            lines += [f"Factor={1 / profile.counts_per_degree}", "Unit=deg"]
+    return "\n".join(lines) + "\n"
 
 
 def canopen(way: Way, profile: Profile, folder: Path) -> Canopen:
-    """The library with the data sheet of this profile."""
+    """The library with the objects of this profile."""
     file = folder / f"{profile.name}.eds"
-    file.write_text(eds(profile, node_id=NODE), encoding="ascii")
+    file.write_text(dictionary(profile), encoding="ascii")
     peer = Canopen(way.interface, way.channel, way.kwargs, file, NODE)
     peer.timeout(PATIENCE)
     return peer
@@ -52,10 +64,10 @@ def numbers(profile: Profile) -> list[Register]:
 
 
 @pytest.mark.parametrize("profile", PROFILES.values(), ids=list(PROFILES))
-def test_reads_and_writes_every_object_by_its_name(interface: str, profile: Profile, tmp_path: Path) -> None:
+def test_reads_and_writes_every_object_by_its_name(profile: Profile, tmp_path: Path) -> None:
     with (
         can_bus(tmp_path, "0x25", profile=profile.name) as bus,
-        canopen(bus.way(interface), profile, tmp_path) as peer,
+        canopen(bus.way(), profile, tmp_path) as peer,
     ):
         for row in profile.table.values():
             if row.readable:
@@ -69,9 +81,9 @@ def test_reads_and_writes_every_object_by_its_name(interface: str, profile: Prof
             assert peer.read(row.name) == value, row.name
 
 
-def test_moves_a_servo_in_degrees(interface: str, tmp_path: Path) -> None:
+def test_moves_a_servo_in_degrees(tmp_path: Path) -> None:
     profile = PROFILES["kst"]
-    with can_bus(tmp_path) as bus, canopen(bus.way(interface), profile, tmp_path) as peer:
+    with can_bus(tmp_path) as bus, canopen(bus.way(), profile, tmp_path) as peer:
         peer.write_phys("goal_position", 10.9)
         while peer.read("present_position") != 109:
             pass
@@ -79,9 +91,9 @@ def test_moves_a_servo_in_degrees(interface: str, tmp_path: Path) -> None:
         assert [node["raw_position"] for node in bus.nodes()] == [109]
 
 
-def test_is_refused_as_cia_301_says(interface: str, tmp_path: Path) -> None:
+def test_is_refused_as_cia_301_says(tmp_path: Path) -> None:
     profile = PROFILES["kst"]
-    with can_bus(tmp_path) as bus, canopen(bus.way(interface), profile, tmp_path) as peer:
+    with can_bus(tmp_path) as bus, canopen(bus.way(), profile, tmp_path) as peer:
         for request, code in (
             (partial(peer.write, "present_position", 0), READ_ONLY),
             (partial(peer.write, "goal_position", 2000), TOO_HIGH),
@@ -93,18 +105,18 @@ def test_is_refused_as_cia_301_says(interface: str, tmp_path: Path) -> None:
         assert peer.read("node_id") == NODE
 
 
-def test_reads_a_version_in_segments(interface: str, tmp_path: Path) -> None:
+def test_reads_a_version_in_segments(tmp_path: Path) -> None:
     with (
         can_bus(tmp_path, firmware="1.00 of today") as bus,
-        canopen(bus.way(interface), PROFILES["kst"], tmp_path) as peer,
+        canopen(bus.way(), PROFILES["kst"], tmp_path) as peer,
     ):
         assert peer.read("firmware_version") == "1.00 of today"
 
 
-def test_its_scanner_finds_the_nodes(interface: str, tmp_path: Path) -> None:
+def test_its_scanner_finds_the_nodes(tmp_path: Path) -> None:
     with (
         can_bus(tmp_path, ids="1,0x25,0x26,127") as bus,
-        canopen(bus.way(interface), PROFILES["kst"], tmp_path) as peer,
+        canopen(bus.way(), PROFILES["kst"], tmp_path) as peer,
     ):
         found: list[int] = []
         while found != [

@@ -1,6 +1,6 @@
 """python-can, which knows nothing of us, sends what the KST manual prints and gets what it prints, byte for byte.
 
-The simulator is another process; between the two are only the slcan and the socketcand protocol. The frames are those
+The simulator is another process; between the two are only the slcan protocol. The frames are those
 of tests/vectors/kst, which were written from the manual without this project.
 """
 
@@ -14,11 +14,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Self
 
-import pytest
-
 import motorbus
 from motorbus import kst
-from tests.interop.can_bus import WAYS, CanBus, Way, can_bus
+from tests.interop.can_bus import CanBus, Way, can_bus
 from tests.interop.canopen_peer import MODULES
 from tests.protocol.kst.vectors import MANUAL
 
@@ -98,12 +96,6 @@ class PythonCan:
         self._process.wait(10)
 
 
-@pytest.fixture(params=WAYS)
-def interface(request: pytest.FixtureRequest) -> str:
-    """By which of python-can's back ends."""
-    return str(request.param)
-
-
 def test_every_frame_the_manual_prints_is_sent_or_awaited_here() -> None:
     moved = [name for place in POSITIONS for name in (f"set-position-{place}", f"position-{place}")]
     single = ["save", "read-status", "status", "position-set"]
@@ -112,45 +104,45 @@ def test_every_frame_the_manual_prints_is_sent_or_awaited_here() -> None:
     assert {name for name in FRAMES.keys() - used if not name.startswith("abort-")} == set()
 
 
-def test_each_request_of_the_manual_has_the_reply_of_the_manual(interface: str, tmp_path: Path) -> None:
+def test_each_request_of_the_manual_has_the_reply_of_the_manual(tmp_path: Path) -> None:
     with (
         can_bus(tmp_path, firmware="V1.2", pending_id="active") as bus,
-        PythonCan(bus.way(interface)) as peer,
+        PythonCan(bus.way()) as peer,
     ):
         heard = {name: peer.ask(FRAMES[name]) for name in EXCHANGES}
         assert heard == {name: [FRAMES[reply]] for name, reply in EXCHANGES.items()}
 
 
-def test_each_column_of_the_position_table(interface: str, tmp_path: Path) -> None:
-    with can_bus(tmp_path) as bus, PythonCan(bus.way(interface)) as peer:
+def test_each_column_of_the_position_table(tmp_path: Path) -> None:
+    with can_bus(tmp_path) as bus, PythonCan(bus.way()) as peer:
         for place in POSITIONS:
             assert peer.ask(FRAMES[f"set-position-{place}"]) == [FRAMES["position-set"]]
             reached = FRAMES[f"position-{place}"]
             assert peer.await_(FRAMES["read-position"], reached)[-1] == reached
 
 
-def test_the_status_by_the_very_frame_that_reads_a_position(interface: str, tmp_path: Path) -> None:
+def test_the_status_by_the_very_frame_that_reads_a_position(tmp_path: Path) -> None:
     flags = {"status_6002": "x1x2", "x1": "0x40", "x2": "1"}
-    with can_bus(tmp_path, "0x25", **flags) as bus, PythonCan(bus.way(interface)) as peer:
+    with can_bus(tmp_path, "0x25", **flags) as bus, PythonCan(bus.way()) as peer:
         assert peer.ask(FRAMES["read-status"]) == [FRAMES["status"]]
 
 
-def test_refusals_in_the_bytes_of_the_manual(interface: str, tmp_path: Path) -> None:
-    with can_bus(tmp_path) as bus, PythonCan(bus.way(interface)) as peer:
+def test_refusals_in_the_bytes_of_the_manual(tmp_path: Path) -> None:
+    with can_bus(tmp_path) as bus, PythonCan(bus.way()) as peer:
         heard = {request: peer.ask(request) for request in REFUSED}
         assert heard == {request: [FRAMES[reply]] for request, reply in REFUSED.items()}
 
 
-def test_a_save_is_not_answered(interface: str, tmp_path: Path) -> None:
-    with can_bus(tmp_path) as bus, PythonCan(bus.way(interface)) as peer:
+def test_a_save_is_not_answered(tmp_path: Path) -> None:
+    with can_bus(tmp_path) as bus, PythonCan(bus.way()) as peer:
         assert peer.ask(FRAMES["save"], 0) == []
         assert peer.listen(SILENCE) == []
         assert peer.ask(FRAMES["read-node-id"]) == [FRAMES["node-id"]]
         assert [node["saved"] for node in bus.nodes()] == [True]
 
 
-def test_29_bit_requests_are_answered_in_29_bits(interface: str, tmp_path: Path) -> None:
-    with can_bus(tmp_path) as bus, PythonCan(bus.way(interface)) as peer:
+def test_29_bit_requests_are_answered_in_29_bits(tmp_path: Path) -> None:
+    with can_bus(tmp_path) as bus, PythonCan(bus.way()) as peer:
         assert peer.ask("00000625#4002600000000000") == ["000005A5#4B02600000000000"]
 
 
@@ -171,7 +163,7 @@ def power_cycled(bus: CanBus) -> None:
 
 
 def test_without_a_save_a_power_cycle_loses_node_id_and_bit_rate(tmp_path: Path) -> None:
-    with can_bus(tmp_path) as bus, PythonCan(bus.way("slcan")) as peer:
+    with can_bus(tmp_path) as bus, PythonCan(bus.way()) as peer:
         written(peer)
         power_cycled(bus)
         assert peer.ask(READ_ID_26, 0) + peer.listen(SILENCE) == []
@@ -180,7 +172,7 @@ def test_without_a_save_a_power_cycle_loses_node_id_and_bit_rate(tmp_path: Path)
 
 def test_with_a_save_node_id_and_bit_rate_count_after_the_power_cycle_only(tmp_path: Path) -> None:
     with can_bus(tmp_path, pending_id="active") as bus:
-        with PythonCan(bus.way("slcan")) as peer:
+        with PythonCan(bus.way()) as peer:
             written(peer)
             assert peer.ask(FRAMES["save"], 0) + peer.listen(SILENCE) == []
             assert peer.ask(READ_ID_26, 0) + peer.listen(SILENCE) == []
@@ -188,7 +180,7 @@ def test_with_a_save_node_id_and_bit_rate_count_after_the_power_cycle_only(tmp_p
             power_cycled(bus)
             for request in (FRAMES["read-node-id"], READ_ID_26):
                 assert peer.ask(request, 0) + peer.listen(SILENCE) == []
-        with PythonCan(bus.way("slcan", 250_000)) as peer:
+        with PythonCan(bus.way(250_000)) as peer:
             assert peer.ask(READ_ID_26) == [ID_26]
             assert peer.ask(FRAMES["read-node-id"], 0) + peer.listen(SILENCE) == []
 

@@ -12,13 +12,12 @@ from select import select
 from threading import Event, Thread
 from typing import Protocol
 
-from motorbus.core.can_frame import REMOTE_FLAG, CanFrame
+from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
 from motorbus.core.request import Data
 from motorbus.link.can import CanLink
 from motorbus.simulation.adapter import Adapter
 from motorbus.simulation.pty import PtyMaster
 from motorbus.simulation.slcan import SlcanAdapter
-from motorbus.simulation.socketcand import SocketcandAdapter
 
 PING = CanFrame(0x625, bytes.fromhex("40 02 60 00 00 00 00 00"))
 PONG = PING._replace(id=0x626)
@@ -55,6 +54,37 @@ class Picky(SlcanAdapter):
     def take(self) -> bytes:
         refusals, self.refusals = self.refusals, b""
         return super().take() + refusals
+
+
+class SocketcandServer(SlcanAdapter):
+    """A server of socketcand in raw mode: standard data frames and error frames."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.answer = b""
+
+    def feed(self, data: bytes, at: float = 0.0) -> list[CanFrame]:
+        frames = []
+        for words in (element.split() for element in data.decode().replace("<", "").split(">")):
+            if words[:1] == ["send"]:
+                frames.append(
+                    CanFrame(
+                        int(words[1], 16), bytes(int(word, 16) for word in words[3:]), len(words[1]) == 8
+                    )
+                )
+            elif words:
+                self.answer += b"< ok >"
+        return frames
+
+    def take(self) -> bytes:
+        answer, self.answer = self.answer, b""
+        return answer
+
+    def deliver(self, frame: CanFrame, at: float) -> bytes:
+        if frame.id & ERROR_FLAG:
+            return f"< error {frame.id & ~ERROR_FLAG:X} {at:.6f} >".encode()
+        number = f"{frame.id:0{8 if frame.extended else 3}X}"
+        return f"< frame {number} {at:.6f} {frame.data.hex()} >".encode()
 
 
 class Peer:
@@ -139,7 +169,8 @@ def on_socket(make: Callable[[], Adapter], url: str) -> Iterator[Peer]:
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             peer.adapter = make()
             peer.write = connection.sendall
-            peer.write(peer.adapter.greet())
+            if isinstance(peer.adapter, SocketcandServer):
+                peer.write(b"< hi >")
             ends.enter_context(serving(connection, lambda: _receive(peer, connection)))
             return True
 
@@ -167,7 +198,7 @@ def slcan_server() -> Iterator[Peer]:
 
 @contextlib.contextmanager
 def socketcand_server() -> Iterator[Peer]:
-    with on_socket(SocketcandAdapter, "can://socketcand/127.0.0.1:{}/can0") as peer:
+    with on_socket(SocketcandServer, "can://socketcand/127.0.0.1:{}/can0") as peer:
         yield peer
 
 

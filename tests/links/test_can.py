@@ -166,7 +166,6 @@ def test_remote_error_and_fd_frames() -> None:
     ("url", "error", "words"),
     [
         ("can://slcan/dev/no-such-adapter", PortNotFound, "there is no such port"),
-        ("can://socketcand/127.0.0.1:1/can0", PortNotFound, "cannot be reached"),
         ("can://socketcand/127.0.0.1", RequestError, "HOST:PORT/CHANNEL"),
         ("can://pcan/PCAN_USBBUS1", LinkError, "driver of pcan is missing"),
         ("can://gs_usb/0", LinkError, r'pip install "python-can\[gs-usb\]"'),

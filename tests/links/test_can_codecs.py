@@ -1,4 +1,4 @@
-"""Text of slcan and socketcand, whole, damaged and cut anywhere: a decoder returns frames that were sent, or none."""
+"""Text of slcan, whole, damaged and cut anywhere: a decoder returns frames that were sent, or none."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ from hypothesis import strategies as st
 
 from motorbus.core.can_frame import CanFrame
 from motorbus.link.slcan import SlcanCodec
-from motorbus.link.socketcand import SocketcandCodec
 from motorbus.simulation.slcan import SlcanAdapter
-from motorbus.simulation.socketcand import SocketcandAdapter
 from tests.links.can_peer import LONG_PING, PING, remote
 
 SOME = b"t62584002600000000000\r"
@@ -40,19 +38,6 @@ def test_lines_of_slcan(frame: CanFrame, line: bytes) -> None:
     assert SlcanCodec().feed(line) == [frame]
 
 
-@pytest.mark.parametrize(
-    ("frame", "element"),
-    [
-        (CanFrame(0x123, bytes([1, 0xAB])), b"< send 123 2 01 AB >"),
-        (CanFrame(0x123, b""), b"< send 123 0 >"),
-        (LONG_PING, b"< send 00000625 1 01 >"),
-        (remote(0x12, 3), b"< sendrtr 012 3 >"),
-    ],
-)
-def test_elements_of_socketcand(frame: CanFrame, element: bytes) -> None:
-    assert SocketcandCodec().encode(frame) == element
-
-
 @given(frame=frames(), cut=st.integers(0, 40))
 def test_what_an_slcan_adapter_writes_is_read(frame: CanFrame, cut: int) -> None:
     adapter, reader = SlcanAdapter(), SlcanCodec()
@@ -62,20 +47,11 @@ def test_what_an_slcan_adapter_writes_is_read(frame: CanFrame, cut: int) -> None
     assert adapter.feed(SlcanCodec().encode(frame)) == [frame]
 
 
-@given(frame=frames(), cut=st.integers(0, 60))
-def test_what_a_socketcand_server_writes_is_read(frame: CanFrame, cut: int) -> None:
-    server, reader = SocketcandAdapter(), SocketcandCodec()
-    server.feed(b"< open can0 >< rawmode >")
-    text = server.deliver(frame, 1.0)
-    assert reader.feed(text[:cut]) + reader.feed(text[cut:]) == [frame]
-    assert server.feed(SocketcandCodec().encode(frame)) == [frame]
-
-
 @given(data=st.binary(max_size=80))
 def test_no_data_makes_a_decoder_raise(data: bytes) -> None:
-    for reader, good in ((SlcanCodec(), b"\r" + SOME), (SocketcandCodec(), b">< frame 625 1.0 40 >")):
-        reader.feed(data)
-        assert reader.feed(good)[-1:], "the next good frame is read"
+    reader = SlcanCodec()
+    reader.feed(data)
+    assert reader.feed(b"\r" + SOME)[-1:], "the next good frame is read"
 
 
 @pytest.mark.parametrize(
@@ -107,23 +83,6 @@ def test_the_first_reply_counts() -> None:
     assert (reader.refused, reader.reply) == (1, False)
     reader.forget()
     assert reader.reply is None
-
-
-@pytest.mark.parametrize(
-    "element",
-    [
-        b"< frame 625 x 40 >",
-        b"< frame 625 >",
-        b"< frame 825 1.0 40 >",
-        b"< frame 625 1.0 4 >",
-        b"< rtr 625 1.0 9 >",
-        b"junk ",
-    ],
-)
-def test_an_element_that_is_no_frame_is_counted(element: bytes) -> None:
-    reader = SocketcandCodec()
-    assert reader.feed(element + b"< frame 625 1.0  >") == [CanFrame(0x625, b"")]
-    assert reader.damaged == 1
 
 
 def test_timestamps_are_known_by_two_in_a_row() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from motorbus.errors import PortBusy
+from motorbus.errors import LinkError, PortBusy
 from motorbus.link.lock import PortLock, holders, is_simulated, program_name, state_folder
 from tests.links.other import other_process, run
 
@@ -112,3 +112,14 @@ def test_a_forked_child_leaves_the_lock_to_its_parent() -> None:
 def test_the_state_folder_is_closed_to_others(state_home: Path) -> None:
     (state_home / "motorbus").mkdir(mode=0o755)
     assert mode(state_folder()) == 0o700
+
+
+def test_d9_a_link_of_another_user_changes_no_mode(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    mine = tmp_path / "mine"
+    mine.mkdir(mode=0o755)
+    (tmp_path / "motorbus").symlink_to(mine)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    monkeypatch.setattr(os, "getuid", lambda: (tmp_path / "motorbus").lstat().st_uid + 1)
+    with pytest.raises(LinkError, match="belongs to another user"):
+        state_folder()
+    assert mode(mine) == 0o755

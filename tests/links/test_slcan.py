@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from motorbus.errors import LinkError, LinkLost
+from motorbus.errors import LinkError, LinkLost, RequestError
 from motorbus.link import slcan
 from tests.links.can_peer import PING, PONG, Mute, Picky, on_terminal, open_can, some
 
@@ -100,3 +100,10 @@ def test_an_unplugged_adapter_is_a_lost_link() -> None:
     with pytest.raises(LinkLost):
         link.write(PING)
     link.close()
+
+
+@pytest.mark.parametrize(("at", "options"), [("@abc", {}), ("", {"tty_baudrate": "fast"}), ("@0", {})])
+def test_a_rate_that_is_no_number_is_refused_in_words(at: str, options: dict[str, Any]) -> None:
+    with on_terminal() as peer, pytest.raises(RequestError, match="not a rate of the serial line") as caught:
+        open_can(f"{peer.url}{at}", **options)
+    assert "tty_baudrate=1000000" in str(caught.value)

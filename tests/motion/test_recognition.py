@@ -261,3 +261,12 @@ def test_a_servo_of_many_turns_has_limits_of_many_turns() -> None:
         with Robot.of(made) as robot:
             assert robot["a1"].model == "STS3215"
         assert sims["arm"][1].memory["max_position_limit"] == 0
+
+
+def test_a1_a_servo_with_a_known_map_and_an_unknown_model_number_moves_by_name() -> None:
+    with machine(arm="1") as (made, sims):
+        sims["arm"][1].memory["model_minor"] = 27
+        with Robot.of(made) as robot:
+            assert robot["a1"].model == "unknown model 9.27"
+            robot.move({"a1": 0.2})
+            assert robot.positions()["a1"] == pytest.approx(0.2, abs=0.01)

@@ -1,4 +1,4 @@
-"""A simulated CAN bus on real ports: slcan on a pseudo-terminal and on TCP, socketcand, and several at once."""
+"""A simulated CAN bus on real ports: slcan on a pseudo-terminal and on TCP, and several at once."""
 
 from __future__ import annotations
 
@@ -9,14 +9,12 @@ import tty
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 
-from motorbus.core.can_frame import CanFrame
 from motorbus.link.base import Line
 from motorbus.simulation.clients import CanClient, Door
 from motorbus.simulation.listener import TcpPort
 from motorbus.simulation.mount import Mount
 from motorbus.simulation.pty import PtyMaster
 from motorbus.simulation.slcan import SlcanAdapter
-from motorbus.simulation.socketcand import SocketcandAdapter
 from tests.simulation.parrots import Parrots
 from tests.support.mounts import PATIENCE, served
 from tests.support.noisy_line import NoisyLine
@@ -49,13 +47,6 @@ class Program:
         """As an slcan host."""
         self.say(b"C\rS" + rate + b"\rO\r")
         self.hears(b"\r\r\r")
-
-    def enters(self) -> None:
-        """As a socketcand host."""
-        self.hears(b"< hi >")
-        for word in (b"< open can0 >", b"< rawmode >"):
-            self.say(word)
-            self.hears(b"< ok >")
 
 
 @contextmanager
@@ -102,31 +93,18 @@ def test_slcan_on_tcp() -> None:
         assert program.hears(b"z\r" + ANSWER)
 
 
-def test_socketcand() -> None:
-    bus = Parrots()
-    door = Door(TcpPort(), SocketcandAdapter)
-    with closing(door), served(Mount(bus, door)), caller(door) as program:
-        program.enters()
-        program.say(b"< send 601 2 1 2 >< echo >")
-        assert program.hears(b"< echo >< frame 681 ")
-        assert bus.heard[0][1] == CanFrame(0x601, b"\1\2")
-
-
 def test_everyone_on_the_bus_hears_everyone_but_himself() -> None:
-    door = Door(TcpPort(), SocketcandAdapter)
+    door = Door(TcpPort(), SlcanAdapter)
     with closing(PtyMaster()) as master, closing(door):
         mount = Mount(Parrots(), CanClient(master, SlcanAdapter()), door)
         with served(mount), terminal(master) as one, caller(door) as other, caller(door) as third:
-            one.opens()
-            for program in (other, third):
-                program.enters()
-                program.say(b"< echo >")  # it has read the answers, and misses no frame from now on
-                program.hears(b"< echo >")
+            for program in (one, other, third):
+                program.opens()
             one.say(ASK)
             assert one.hears(b"z\r" + ANSWER)
             for program in (other, third):
-                assert program.hears(b"< frame 601 ")
-            other.say(b"< send 123 1 FF >")
+                assert program.hears(ASK + ANSWER)
+            other.say(b"t1231FF\r")
             assert one.hears(b"t1231FF\rt1A31FF\r")
 
 

@@ -30,7 +30,7 @@ def opened(**options: bool) -> SlcanAdapter:
 
 def test_it_is_an_adapter() -> None:
     adapter: Adapter = SlcanAdapter()
-    assert (adapter.open, adapter.bitrate, adapter.finished, adapter.greet()) == (False, None, False, b"")
+    assert (adapter.open, adapter.bitrate) == (False, None)
 
 
 # The bit rate.

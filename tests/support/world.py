@@ -263,7 +263,7 @@ def abilities(family: Family) -> AxisDriver:
 @cache
 def _abilities(family: Any) -> AxisDriver:
     with world(family) as there:
-        found: AxisDriver = family.open().axis(there.device(there.ids[0]).identify().model)
+        found: AxisDriver = family.open().axis(there.device(there.ids[0]).identify())
         return found
 
 

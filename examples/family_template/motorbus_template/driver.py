@@ -295,8 +295,8 @@ class MetronomeDriver(HalfDuplexSerial):
     async def identify(self, node: int) -> Identity:
         return await identify(Node(node))
 
-    def axis(self, model: str) -> AxisDriver:
-        return _AXIS if model == TABLE.name else AxisDriver()
+    def axis(self, identity: Identity) -> AxisDriver:
+        return _AXIS if identity.table == TABLE.name else AxisDriver()
 
     def decode(self, data: bytes) -> list[Explanation]:
         return protocol.decode(data)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from motorbus.core.family import Family, Identity
     from motorbus.core.register import Register, RegisterMap
+    from motorbus.errors import DeviceError
 
 _OPEN: Final = (
     "note: its EEPROM lock is open, so every write to EEPROM is for good: "
@@ -66,10 +67,12 @@ def info(
         table = table_of(one)
         entries = _entries(table, everything=registers)
         lock = [table["lock"]] if "lock" in table else []
-        values = one.read(*dict.fromkeys(entry.name for entry in (*entries, *lock)))
+        wanted = [*dict.fromkeys(entry.name for entry in (*entries, *lock))]
+        values, refused = table_rows.read_each(one, wanted)
+        entries = [entry for entry in entries if entry.name in values]
         told = alarms.in_words(one)
-    locked = {entry.name: _word(entry, int(values[entry.name])) for entry in lock}
-    _show(identity, family, table_rows.facts(one, entries, values), registers, output, told, locked)
+    locked = {entry.name: _word(entry, int(values[entry.name])) for entry in lock if entry.name in values}
+    _show(identity, family, table_rows.facts(one, entries, values), registers, output, told, locked, refused)
     if axis := axes_called((device_,)).get((bus, node)):
         output.note(f"note: all of it is what the device of {axis} tells, in its own angles")
     return Exit.OK
@@ -98,16 +101,21 @@ def _show(
     output: Output,
     told: Sequence[str] = (),
     locked: Mapping[str, str] | None = None,
+    refused: Mapping[str, DeviceError] | None = None,
 ) -> None:
     known = {"id": identity.node, "model": identity.model, "firmware": identity.firmware}
     named = {**known, "table": identity.table, **identity.details, **(locked or {})}
     title = "registers" if registers else "limits"
-    output.document("motorbus.info/1", {**named, title: rows, "alarms": list(told)})
+    output.document(
+        "motorbus.info/1", {**named, title: rows, "alarms": list(told), **table_rows.refusals(refused or {})}
+    )
     table = identity.table or "unknown firmware: read only"
     words = {**named, "id": id_shown(identity.node, family), "table": table}
     output.table(identity.model, ["", ""], [*words.items(), *(("alarm", one) for one in told)])
     if rows:
         output.text("")
         table_rows.show(title.capitalize(), rows, output, full=registers)
+    for error in (refused or {}).values():
+        output.note(f"note: {error.summary}")
     if "open" in (locked or {}).values():
         output.note(_OPEN)

@@ -231,7 +231,7 @@ def _met(wanted: Wanted, output: Output) -> list[Met]:
 def _asked(bus: Bus, found: Found, output: Output) -> Met | None:
     """What an axis needs to know of a device; None, with a note, for one that cannot be an axis."""
     identity = found.identity
-    able = bus.driver.axis(identity.model) if identity is not None and identity.table else AxisDriver()
+    able = bus.driver.axis(identity) if identity is not None and identity.table else AxisDriver()
     if identity is None or not able.names:
         what = f"{identity.model} with firmware {identity.firmware}" if identity is not None else "a device"
         output.note(f"note: #{found.node} is {what} of which nobody has said how it moves: it is left out")

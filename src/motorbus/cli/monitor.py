@@ -15,7 +15,7 @@ from motorbus.cli.rates import check_rate
 from motorbus.cli.read import Told, own_position, sampled, state_facts
 from motorbus.cli.target import able, everyone, face, gathered, opened, target
 from motorbus.core.steps import Sleep
-from motorbus.errors import LinkError, LinkLost, MotorbusError, NoReply, RequestError
+from motorbus.errors import DeviceError, LinkError, LinkLost, MotorbusError, NoReply, RequestError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -142,7 +142,7 @@ def _watch(
     try:
         while True:
             sample = {key: _sample(one) for key, one in watched.items()}
-            heard |= {key for key, state in sample.items() if not isinstance(state, MotorbusError)}
+            heard |= {key for key, state in sample.items() if _has_answered(state)}
             show(sample)
             done += 1
             passed = bus.link.now() - began
@@ -154,6 +154,11 @@ def _watch(
         pass  # the usual way to end it
     _say_rate(done, bus.link.now() - began, 1 / period, output)
     return _verdict(set(watched), heard)
+
+
+def _has_answered(state: State | Told | MotorbusError) -> bool:
+    """A refusal is an answer too."""
+    return isinstance(state, DeviceError) or not isinstance(state, MotorbusError)
 
 
 def _say_rate(samples: int, seconds: float, wanted: float, output: Output) -> None:
@@ -317,7 +322,12 @@ def _row(
         return (node, *("" for _ in (*names, *others)), state.summary)
     if isinstance(state, dict):
         return (node, *("" for _ in names), *(_word(state.get(name)) for name in others), "")
-    return (node, *(_told(state, name) for name in names), *("" for _ in others), ", ".join(state.alarm))
+    return (
+        node,
+        *(_told(state, name) for name in names),
+        *("" for _ in others),
+        ", ".join((*state.alarm, *state.refused)),
+    )
 
 
 def _word(value: object) -> object:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from cyclopts import App, Parameter
 
 from motorbus.cli import faces, quantity, registers
-from motorbus.cli.exits import Exit
+from motorbus.cli.exits import Exit, Partial
 from motorbus.cli.machine import axes_called, machine
 from motorbus.cli.output import Output
 from motorbus.cli.target import able, check_names, device, face, opened, table_of
@@ -66,10 +66,16 @@ def read(
 def _registers(one: Any, names: tuple[str, ...], axis: str, output: Output) -> None:
     table = table_of(one)
     entries = [table[name] for name in names]
-    rows = registers.facts(one, entries, one.read(*names))
+    values, refused = registers.read_each(one, names)
+    if len(refused) == len(names):
+        raise refused[names[0]]
+    rows = registers.facts(one, [entry for entry in entries if entry.name in values], values)
     named = {"axis": axis} if axis else {}
-    output.document("motorbus.read/1", {"id": one.node, **named, "registers": rows})
+    document = {"id": one.node, **named, "registers": rows, **registers.refusals(refused)}
+    output.document("motorbus.read/1", document)
     registers.show(titled(one.node, axis), rows, output)
+    if refused:
+        raise Partial("; ".join(error.summary for error in refused.values()))
 
 
 def titled(node: int, axis: str) -> str:
@@ -97,7 +103,9 @@ UNITS: Final = {
 
 def state_facts(state: State) -> dict[str, object]:
     """One sample as plain data; what the device does not tell is null."""
-    return {**state._asdict(), "alarm": list(state.alarm), "quality": state.quality.value}
+    facts = {**state._asdict(), "alarm": list(state.alarm), "quality": state.quality.value}
+    refused = facts.pop("refused")
+    return {**facts, "refused": list(refused)} if refused else facts
 
 
 def sampled(one: Any) -> State | Told:
@@ -128,4 +136,5 @@ def _telemetry(one: Any, axis: str, output: Output) -> None:
     if state.moving is not None:
         rows.append(("moving", "yes" if state.moving else "no"))
     rows.append(("alarm", ", ".join(state.alarm) or "none"))
+    rows += [("refused", error) for error in state.refused]
     output.table(titled(node, axis), ["", "value"], rows)

@@ -5,15 +5,36 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from motorbus.cli import faces, quantity
+from motorbus.errors import DeviceError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from motorbus.cli.output import Output
     from motorbus.core.register import Register, Value
 
 BRIEF = ("register", "value", ">raw", "meaning")
 FULL = ("register", ">address", "value", ">raw", "meaning", "storage", "access")
+
+
+def read_each(one: Any, names: Sequence[str]) -> tuple[dict[str, Value], dict[str, DeviceError]]:
+    """These registers in API units, and the errors of those that the device refuses."""
+    try:
+        return dict(one.read(*names)), {}
+    except DeviceError:
+        values: dict[str, Value] = {}
+        refused: dict[str, DeviceError] = {}
+    for name in names:
+        try:
+            values |= one.read(name)
+        except DeviceError as error:
+            refused[name] = error
+    return values, refused
+
+
+def refusals(refused: Mapping[str, DeviceError]) -> dict[str, dict[str, str]]:
+    """What the device refused, as plain data; nothing where it answered all."""
+    return {"refused": {name: error.summary for name, error in refused.items()}} if refused else {}
 
 
 def facts(one: Any, entries: Iterable[Register], values: Mapping[str, Value]) -> list[dict[str, Any]]:

@@ -29,7 +29,6 @@ from motorbus.simulation.mount import Mount, Place
 from motorbus.simulation.pty import PtyMaster
 from motorbus.simulation.served import check_harmless, join
 from motorbus.simulation.slcan import SlcanAdapter
-from motorbus.simulation.socketcand import SocketcandAdapter
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -40,8 +39,8 @@ app = App(
     name="simulate",
     help_epilogue="""Prints one line when it is ready, then serves until Ctrl-C or SIGTERM, and
 removes its link and its control socket. Told no way to the bus, it says which
-pseudo-terminal it has made. --tcp and --socketcand without a host bind
-127.0.0.1; there is no login. The control socket takes one order a line:
+pseudo-terminal it has made. --tcp without a host binds 127.0.0.1; there is no
+login. The control socket takes one order a line:
 status, power-cycle [ID], unplug ID, plug ID, set-input ID INPUT on|off,
 faults [SCRIPT|off], help, and for the shaft of a FEETECH servo
 block ID [LOW HIGH], push ID ANGLE, load ID PERCENT, release ID (of a KST
@@ -67,7 +66,6 @@ Examples:
     motorbus simulate feetech --link /tmp/arm --control /tmp/arm.control
     motorbus simulate feetech --link /tmp/arm --broadcast-ping in_turn
     motorbus simulate kst --ids 0x25,0x26 --profile kst-ext --link /tmp/can
-    motorbus simulate kst --ids 0x25 --link /tmp/can --socketcand 29536
     motorbus simulate feetech --link /tmp/arm --faults "seed 1; 1%: delay 0.1"
     motorbus simulate stepper --link /tmp/stepper --pace --reply-fault lost""",
 )
@@ -82,7 +80,6 @@ _OWN = (
     "model",
     "link",
     "tcp",
-    "socketcand",
     "can",
     "pace",
     "baud",
@@ -99,7 +96,6 @@ class Ways(NamedTuple):
 
     link: Path | None = None
     tcp: str = ""
-    socketcand: str = ""
     can: str = ""
 
 
@@ -112,7 +108,6 @@ def simulate(
     model: Annotated[str, Parameter(help="Their model; the usual one of the family when left out.")] = "",
     link: Annotated[Path | None, Parameter(help="A symbolic link to make to the pseudo-terminal.")] = None,
     tcp: Annotated[str, Parameter(help="HOST:PORT or PORT, to serve a socket.")] = "",
-    socketcand: Annotated[str, Parameter(help="HOST:PORT or PORT, to serve socketcand (CAN).")] = "",
     can: Annotated[str, Parameter(help="INTERFACE/CHANNEL of a CAN bus to join, as socketcan/vcan0.")] = "",
     pace: Annotated[Flag, Parameter(help="Bytes and frames take their time, as on a wire.")] = False,
     baud: Annotated[str, Parameter(help="The rate of a serial line until a client sets one.")] = "",
@@ -140,7 +135,7 @@ def simulate(
         settings["baud"] = str(rate)  # these devices ship with another rate than most of their family
     with ExitStack() as stack:
         stop = stack.enter_context(_until_signalled())
-        served = _served(stack, found, Ways(link, tcp, socketcand, can), asked)
+        served = _served(stack, found, Ways(link, tcp, can), asked)
         controls = [stack.enter_context(closing(ControlSocket(control, simulator)))] if control else []
         world = World(simulator, now=time.monotonic())
         places = [place for place, _ in served]
@@ -212,7 +207,7 @@ def _served(stack: ExitStack, family: Family, ways: Ways, bitrate: int) -> list[
 
 def _bytes(stack: ExitStack, ways: Ways) -> tuple[Place, str]:
     """The open port, and what a host calls it."""
-    if ways.socketcand or ways.can:
+    if ways.can:
         raise RequestError("these devices speak on a serial line, not on CAN", expected="--link or --tcp")
     if ways.tcp and ways.link:
         raise RequestError("a serial line is served on --link or on --tcp, not on both")
@@ -239,12 +234,6 @@ def _frames(stack: ExitStack, ways: Ways, said: int, usual: int) -> Iterator[tup
         door = Door(TcpPort(*parse_endpoint(ways.tcp)), SlcanAdapter)
         stack.enter_context(served_by_simulator(f"socket://{door.port.address}"))
         yield stack.enter_context(closing(door)), f"can://slcan/socket://{door.port.address}"
-    if ways.socketcand:
-        epoch = time.time() - time.monotonic()
-        door = Door(TcpPort(*parse_endpoint(ways.socketcand)), lambda: SocketcandAdapter(epoch=epoch))
-        url = f"can://socketcand/{door.port.address}/can0"
-        stack.enter_context(served_by_simulator(url))
-        yield stack.enter_context(closing(door)), url
     if ways.can:
         yield stack.enter_context(closing(join(f"can://{ways.can}", said, usual))), f"can://{ways.can}"
 

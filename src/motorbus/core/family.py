@@ -96,6 +96,7 @@ class State(NamedTuple):
     moving: bool | None = None
     alarm: tuple[str, ...] = ()  # names of the alarm bits that are set
     quality: Quality = Quality.FRESH
+    refused: tuple[str, ...] = ()  # errors of values that the device refused; they are None
 
 
 class Health(NamedTuple):
@@ -365,8 +366,8 @@ class BusDriver(Protocol):
         """
 
     @abstractmethod
-    def axis(self, model: str) -> AxisDriver:
-        """What devices of this model can do; an empty one for an unknown model."""
+    def axis(self, identity: Identity) -> AxisDriver:
+        """What the device with this identity can do; an empty one where its register map is unknown."""
 
     @abstractmethod
     def decode(self, data: bytes) -> list[Explanation]:

@@ -69,7 +69,7 @@ def count(wanted: Wanted, *, turnaround: float = 0.0) -> Counted | None:
 def _train(bus: Bus, nodes: Sequence[int], rate: int) -> PositionStream | None:
     """The devices with these ids, as they would be led in a loop at this rate of the bus (bit/s)."""
     devices = [bus.family.devices.blocking(bus, node) for node in nodes]
-    able = bus.driver.axis(devices[0].identify().model)
+    able = bus.driver.axis(devices[0].identify())
     return bus.run(able.stream(devices, rate=rate)) if "stream" in able else None
 
 
@@ -78,7 +78,7 @@ def _angles(bus: Bus, train: PositionStream) -> dict[int, float]:
     found = {}
     for node in train.nodes:
         device = bus.family.devices.blocking(bus, node)
-        able = bus.driver.axis(device.identify().model)
+        able = bus.driver.axis(device.identify())
         low, high = bus.run(able.limits(device)) if "limits" in able else (-inf, inf)
         found[node] = min(max(0.0, low), high)
     return found

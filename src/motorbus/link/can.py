@@ -1,7 +1,7 @@
 """CAN channels: `can://INTERFACE/CHANNEL`.
 
-Every interface of python-can works, with its configuration files and CAN_* variables; slcan and socketcand are read
-by our own code. Where python-can would silently take another bit rate, ignore an option or wait without end, this link
+Every interface of python-can works, with its configuration files and CAN_* variables; slcan is read by our own
+code. Where python-can would silently take another bit rate, ignore an option or wait without end, this link
 raises an error. python-can is imported here only, when a port is opened.
 """
 
@@ -14,6 +14,7 @@ import time
 import warnings
 from collections.abc import Mapping
 from contextlib import nullcontext
+from math import inf
 from pathlib import Path
 from threading import Lock
 from types import ModuleType
@@ -24,16 +25,16 @@ from motorbus.core.request import Data
 from motorbus.errors import LinkError, LinkFull, LinkLost, MotorbusError, PortNotFound, RequestError
 from motorbus.link import usb_adapters
 from motorbus.link.can_options import SHARED, CanOptions, check_rate, kernel_rate, read_options
-from motorbus.link.can_text import TextChannel
 from motorbus.link.errors import busy, lost
 from motorbus.link.lock import PortLock, opening
 from motorbus.link.serial import NO_DEVICE
 from motorbus.link.slcan import SlcanChannel
-from motorbus.link.socketcand import open_socketcand
 
 BUS_OFF: Final = 0x40  # CAN_ERR_BUSOFF in the identifier of an error frame, linux/can/error.h
 SLICE: Final = 0.02  # s of one wait inside python-can
-MOST_FRAMES: Final = 256  # taken from python-can by one read
+AT_ONCE: Final = 0.001  # s; a read that has a frame waits no longer for a second one
+WAITING: Final = 0.005  # s; a back end whose recv(0) takes longer waits for its serial port
+SERIAL_WAIT: Final = 0.1  # s; time-out of the serial port in python-can's back ends
 _IDENTIFIER: Final = ERROR_FLAG - 1
 _FULL: Final = (errno.ENOBUFS, errno.EAGAIN)
 _FULL_TEXTS: Final = ("full", "overflow", "could not send message to one or more")
@@ -141,12 +142,10 @@ class CanLink:
             return (f"the bit rate is set at the server; whether that is {rate} bit/s cannot be checked",)
         return ()
 
-    def _open(self, connect_time: float | None) -> TextChannel | BusChannel:
-        channel: TextChannel | BusChannel
+    def _open(self, connect_time: float | None) -> SlcanChannel | BusChannel:
+        channel: SlcanChannel | BusChannel
         if self._options.interface == "slcan":
             channel = SlcanChannel(self._options, connect_time)
-        elif self._options.interface == "socketcand":
-            channel = open_socketcand(self._options, connect_time)
         else:
             channel = BusChannel(self._options)
         try:
@@ -227,6 +226,8 @@ class BusChannel:
         self._bus: Any = None
         self._descriptor: int | None = None
         self._access = Lock()
+        self._waits = False
+        """recv(0) waits, so a read takes one frame."""
 
     def configure(self, rate: int, listen_only: bool) -> None:
         """Open the bus again, at this rate in bit/s. Raises LinkError, or RequestError for what it refuses."""
@@ -245,8 +246,28 @@ class BusChannel:
                 self._bus = can.Bus(options.channel, options.interface, ignore_config=True, **settings)
             if options.interface in _FRAME_DESCRIPTOR:
                 self._descriptor = self._bus.fileno()
+            else:
+                self._measure()
         except Exception as error:  # each back end has its own types
             raise open_error(options, error) from error
+
+    def _measure(self) -> None:
+        """Find out whether recv(0) waits; twice, as another program may have had the processor."""
+        with contextlib.suppress(Exception):  # a damaged frame, say
+            wait = min(self._time_receive(), self._time_receive())
+            if wait > WAITING and not self._waits:
+                wait = max(wait, SERIAL_WAIT)
+                self._waits = True
+                self.latency += wait
+                interface = self._options.interface
+                self.warnings = (
+                    f"python-can's {interface} waits up to {1000 * wait:.0f} ms for a frame, so requests are slow",
+                )
+
+    def _time_receive(self) -> float:
+        begin = time.monotonic()
+        self._bus.recv(0.0)
+        return time.monotonic() - begin
 
     def read(self, until: float) -> list[Data]:
         frames: list[Data] = []
@@ -261,13 +282,15 @@ class BusChannel:
     def _receive(self, pause: float) -> list[Data]:
         """The frames that are there; waits so long (s) for the first."""
         frames: list[Data] = []
+        end = inf
         if self._bus is None:
             raise lost(self.name, "it is closed")
         try:
-            while len(frames) < MOST_FRAMES and (message := self._bus.recv(pause)) is not None:
+            while time.monotonic() < end and (message := self._bus.recv(pause)) is not None:
                 pause = 0.0
                 if (frame := frame_of(message)) is not None:
                     frames.append(frame)
+                    end = 0.0 if self._waits else min(end, time.monotonic() + AT_ONCE)
         except Exception as error:  # each back end has its own types
             raise lost(self.name, error) from error
         return frames

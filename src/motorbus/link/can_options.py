@@ -29,8 +29,7 @@ SHARED: Final = ("virtual", "udp_multicast")
 SERIAL_PORTS: Final = ("slcan", "serial", "robotell", "seeedstudio")
 """Interfaces whose channel is a serial port."""
 EXAMPLES: Final = "can://slcan/dev/ttyACM0, can://socketcan/can0, can://socketcand/localhost/can0"
-TEXT_OPTIONS: Final = {"slcan": {"tty_baudrate", "timing"}, "socketcand": {"host", "port"}}
-"""Options of the interfaces that go over our own links."""
+SLCAN_OPTIONS: Final = {"tty_baudrate", "timing"}
 _TIMING: Final = ("f_clock", "brp", "tseg1", "tseg2", "sjw", "nof_samples")
 """The bit timing of python-can: controller clock (Hz), prescaler, two segments, jump width, samples."""
 _LINK_OPTIONS: Final = {"bitrate", "config_context", "listen_only"}
@@ -55,7 +54,7 @@ class CanOptions(NamedTuple):
 
     `rate`      bit/s from the user, a configuration or a bit timing; 0 when not given
     `settings`  constructor arguments of the back end besides channel and bit rate
-    `back_end`  the class of python-can; None for a text protocol, or when its driver is missing
+    `back_end`  the class of python-can; None for slcan, or when its driver is missing
     """
 
     name: str
@@ -106,6 +105,11 @@ def parse_port(port: str) -> tuple[str, dict[str, Any]]:
     if interface == "socketcand" and channel:
         host, _, channel = channel.partition("/")
         host, _, number = host.partition(":")
+        if not channel:
+            raise RequestError(
+                f"{port!r} does not name a channel of a server",
+                expected="can://socketcand/HOST:PORT/CHANNEL, as can://socketcand/localhost:29536/can0",
+            )
         return interface, {"channel": channel, "host": host, "port": number or SOCKETCAND_PORT}
     has_name = channel.startswith("/") or "://" in channel or re.fullmatch(r"COM\d+(@\d+)?", channel)
     if interface in SERIAL_PORTS and channel and not has_name and os.name != "nt":
@@ -135,8 +139,8 @@ def read_options(can: Any, port: str, rate: int, options: Mapping[str, object]) 
         raise RequestError(f"python-can's configuration says bitrate={bitrate}", expected="a rate in bit/s")
     if listen_only not in (True, False):
         raise RequestError(f"listen_only={listen_only}: neither yes nor no", expected="yes or no")
-    back_end, names = None, TEXT_OPTIONS.get(interface)
-    if names is None:
+    back_end, names = None, SLCAN_OPTIONS
+    if interface != "slcan":
         names = {*merged}
         with contextlib.suppress(can.CanInterfaceNotImplementedError):  # opening says what is missing
             back_end = can.interface._get_class_for_interface(interface)

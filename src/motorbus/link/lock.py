@@ -46,7 +46,10 @@ def _make_private(folder: Path) -> Path:
     """Make this folder with mode 0700. Raises LinkError, also when it belongs to another user."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        folder.chmod(0o700)
+        if not hasattr(os, "getuid") or folder.lstat().st_uid == os.getuid():
+            folder.chmod(0o700)  # a link of another user could lead to a folder of ours
+        elif os.getuid():
+            raise PermissionError(f"{folder} belongs to another user")
     except OSError as error:
         raise LinkError(
             f"no folder for the locks of ports: {error}",

@@ -11,8 +11,9 @@ import re
 import time
 from typing import Final
 
+from motorbus.core import units
 from motorbus.core.can_frame import REMOTE_FLAG, CanFrame
-from motorbus.errors import LinkError
+from motorbus.errors import LinkError, RequestError
 from motorbus.link.can_options import SLCAN_RATES, CanOptions
 from motorbus.link.can_text import TextChannel, TextCodec
 from motorbus.link.lock import PortLock
@@ -98,6 +99,18 @@ class SlcanCodec(TextCodec):
         return CanFrame(identifier, bytes.fromhex(digits[: 2 * size].decode()), extended is not None)
 
 
+def _baud(name: str, said: object) -> int:
+    """The rate of the serial line, bit/s. Raises RequestError."""
+    try:
+        return units.rate(said)
+    except RequestError as refusal:
+        raise RequestError(
+            f"{name}: {said} is not a rate of the serial line in bit/s",
+            expected=refusal.expected,
+            advice="write can://slcan/dev/ttyACM0@1000000, or tty_baudrate=1000000",
+        ) from None
+
+
 class SlcanChannel(TextChannel):
     """An slcan adapter on its port; `configure` opens its channel. Errors as for `open_stream`.
 
@@ -109,7 +122,7 @@ class SlcanChannel(TextChannel):
 
     def __init__(self, options: CanOptions, connect_time: float | None) -> None:
         port, _, baud = str(options.channel).partition("@")
-        rate = int(baud or options.settings.get("tty_baudrate", DEFAULT_BAUD))
+        rate = _baud(options.name, baud or options.settings.get("tty_baudrate", DEFAULT_BAUD))
         lock = PortLock(port)  # the caller has locked it
         link = open_stream(port, rate=rate, lock=lock, connect_time=connect_time)
         super().__init__(options.name, link, SlcanCodec())

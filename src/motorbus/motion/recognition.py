@@ -55,7 +55,7 @@ class Asked(NamedTuple):
 async def _asked(axis: AxisVerbs) -> Asked:
     identify: Runnable[Identity] = type(axis.device).identify.function(axis.device)
     identity = await identify
-    able = axis.bus.driver.axis(identity.model)
+    able = axis.bus.driver.axis(identity)
     travel: Device = None
     if axis.spec.device_limits is not None and "travel" in able:
         travel = await able.travel(axis.device)
@@ -88,7 +88,7 @@ def _judged(axis: AxisVerbs, told: Any) -> MotorbusError | None:
     if isinstance(told, MotorbusError):
         return told
     model = told.identity.model
-    axis.recognised(axis.bus.driver.axis(model), model)
+    axis.recognised(axis.bus.driver.axis(told.identity), model)
     if not axis.able.names:
         return RequestError(
             f"{axis.spec.device} is {model}, of which nobody has said what it can do",

@@ -8,23 +8,18 @@ from motorbus.core.can_frame import CanFrame
 
 
 class Adapter(Protocol):
-    """The adapter's side of a protocol that carries CAN frames over bytes (slcan, socketcand), for simulated buses.
+    """The adapter's side of a protocol that carries CAN frames over bytes (slcan), for simulated buses.
 
     It does no I/O and has no clock. Nothing that a host sends makes it raise, or keep more than a few KiB.
 
     `open`         the host has opened the channel: frames pass
     `listen_only`  the host gets frames and may send none
     `bitrate`      bit/s that the host has set; None when it did not, or cannot with this protocol
-    `finished`     it hangs up as soon as its answer has been sent
     """
 
     open: bool
     listen_only: bool
     bitrate: int | None
-    finished: bool
-
-    def greet(self) -> bytes:
-        """A host has come: what it is told unasked."""
 
     def feed(self, data: bytes, at: float = 0.0) -> list[CanFrame]:
         """Bytes of the host, cut anywhere, at this moment (s): the frames that it sends with them."""

@@ -143,7 +143,7 @@ class CanClient(Participant):
         self._rate: int | None = None
         self._stuck = False
         self._as_new = deepcopy(adapter)
-        self._out = bytearray(adapter.greet())
+        self._out = bytearray()
 
     @property
     def fixed(self) -> str:
@@ -156,7 +156,7 @@ class CanClient(Participant):
         _pullable(self._endpoint).plug()
         self.adapter = deepcopy(self._as_new)
         self._rate, self._stuck = None, False
-        self._out = bytearray(self.adapter.greet())
+        self._out = bytearray()
 
     def fileno(self) -> int:
         return self._endpoint.fileno()
@@ -191,8 +191,7 @@ class CanClient(Participant):
         return self._stuck
 
     def is_gone(self) -> bool:
-        gone = isinstance(self._endpoint, TcpClient) and self._endpoint.gone
-        return gone or (self.adapter.finished and not self._stuck)
+        return isinstance(self._endpoint, TcpClient) and self._endpoint.gone
 
     def close(self) -> None:
         if isinstance(self._endpoint, TcpClient):

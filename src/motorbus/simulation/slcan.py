@@ -45,8 +45,6 @@ class SlcanAdapter:
     forgiving.
     """
 
-    finished = False
-
     def __init__(self, *, strict: bool = False) -> None:
         self.strict = strict
         self.open = False
@@ -60,10 +58,6 @@ class SlcanAdapter:
         self._stamps = False
         self._status = 0
         self._filter = Filter()
-
-    def greet(self) -> bytes:
-        """An adapter says nothing by itself."""
-        return b""
 
     def feed(self, data: bytes, at: float = 0.0) -> list[CanFrame]:
         """Bytes of the host, cut anywhere: the frames it sends with them. Never raises."""

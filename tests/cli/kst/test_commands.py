@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from math import radians
-from pathlib import Path
 
 import pytest
 
 import motorbus
-from motorbus.families.kst.eds import eds
-from motorbus.families.kst.profiles import PROFILES
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
 
@@ -150,16 +147,3 @@ def test_dry_run_shows_the_frames_of_the_manual_and_sends_none(
     ran = run(*words.replace("BUS", f"{servos.url}#37").split(), "--dry-run", "--json")
     assert [one["frame"] for one in ran.document["withheld"]] == frames
     assert dict(servos[37].memory) == before
-
-
-def test_eds_is_printed_or_written_to_a_file(run: Run, tmp_path: Path) -> None:
-    assert run("kst", "eds").out.split() == eds(PROFILES["kst"]).split()
-    file = tmp_path / "servo.eds"
-    words = ["--profile", "xqpower", "--with-mandatory", "--node", "0x10", "--output", str(file)]
-    document = run("kst", "eds", *words, "--json").document
-    assert document == {"schema": "motorbus.kst.eds/1", "profile": "xqpower", "file": str(file)}
-    expected = eds(PROFILES["xqpower"], node_id=16, with_mandatory=True, file_name="servo.eds")
-    assert file.read_bytes().decode("ascii") == expected.replace("\n", "\r\n")
-    ran = run("kst", "eds", "--output", str(tmp_path / "none" / "servo.eds"))
-    assert (ran.code, ran.out) == (2, "")
-    assert "servo.eds cannot be written: no such file or directory" in ran.err

@@ -46,7 +46,6 @@ READS = ("#40", "#60", "#70")
         ("kst limits EXT#37 -1 --yes", 2, "one limit alone"),
         ("kst reverse EXT#37 on", 8, "--yes"),
         ("kst mid-point EXT#37", 8, "--yes"),
-        ("kst eds --profile acme", 2, "no profile 'acme'"),
         ("read BUS#37 status --profile kst-ext", 7, "does not exist"),
         ("move BUS#37+38=200deg --yes", 8, "out of range"),
         ("write BUS#37 present_position=1", 2, "present_position"),
@@ -68,3 +67,28 @@ def test_refused_request_writes_nothing(
     sent = [line for line in ran.err.splitlines() if " tx " in line]
     assert [line for line in sent if not any(read in line for read in READS)] == []
     assert (dict(servos[37].memory), dict(newer[37].memory)) == before
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "shown", "refused"),
+    [
+        ("read BUS#37", 0, "position", "status"),
+        ("read BUS#37 present_position status", 6, "present_position", "status"),
+        ("monitor BUS#37 --count 1", 0, "0.0000", "status"),
+        ("info BUS#37", 0, "firmware", "negative_limit"),
+    ],
+)
+def test_f5_a_refused_object_costs_itself_only(
+    words: str, code: int, shown: str, refused: str, servos: Simulation, run: Run
+) -> None:
+    ran = run(*words.replace("BUS", servos.url).split(), "--profile", "kst-ext")
+    assert ran.code == code
+    assert shown in ran.out
+    assert f"refused {refused}" in " ".join((ran.out + ran.err).split())
+    assert "no answer" not in ran.err
+
+
+def test_f5_a_report_interval_that_is_refused_is_left_out(servos: Simulation, run: Run) -> None:
+    ran = run("kst", "reports", "on", f"{servos.url}#37", "--profile", "xqpower", "--interval", "20ms")
+    assert "leave out the interval" in ran.err
+    assert "another profile" not in ran.err

@@ -9,11 +9,11 @@ import pytest
 
 import motorbus
 from motorbus import families
-from motorbus.core.family import Family
+from motorbus.core.family import AxisDriver, Family, Identity
 from motorbus.core.request import Expected, Reply, TimeoutClass
 from motorbus.families import feetech
 from motorbus.families.feetech import FAMILY, AsyncServo, Servo
-from motorbus.families.feetech.table import MODELS
+from motorbus.families.feetech.table import TABLES
 from tests.families.feetech.driver_script import packet, play, reads
 
 
@@ -73,48 +73,31 @@ def test_what_explains_a_frame_is_the_family_s() -> None:
     assert explanation.fault == ""
 
 
-@pytest.mark.parametrize("model", sorted({known.name for known in MODELS.values()} | {"sts3215", "scs0009"}))
-def test_every_known_model_is_an_axis(model: str) -> None:
-    axis = FAMILY.open().axis(model)
+def axis(table: str, model: str = "unknown model 10.27") -> AxisDriver:
+    return FAMILY.open().axis(Identity(1, model, "3.10", table))
+
+
+@pytest.mark.parametrize("table", sorted(TABLES))
+def test_a1_every_servo_with_a_known_map_is_an_axis(table: str) -> None:
     everyone = {"position", "move", "stop", "state", "enable_torque", "disable_torque", "limits", "stream"}
-    assert everyone <= axis.names
+    assert everyone <= axis(table).names
 
 
-def test_a_model_whose_map_tells_no_current_lacks_that() -> None:
-    assert "current" in FAMILY.open().axis("STS3215")
-    assert "current" in FAMILY.open().axis("SCS15-2")
-    assert "current" not in FAMILY.open().axis("SCS0009")
+def test_a_map_that_tells_no_current_lacks_that() -> None:
+    assert "current" in axis("sts")
+    assert "current" in axis("scs2")
+    assert "current" not in axis("scs")
 
 
-@pytest.mark.parametrize("model", sorted({known.name for known in MODELS.values()}))
-def test_caps_are_there_where_every_map_that_the_model_can_have_has_a_register_in_ram(model: str) -> None:
-    maps = {name for known in MODELS.values() if known.name == model for name in known.maps}
-    axis = FAMILY.open().axis(model)
-    assert ("cap_torque" in axis) == (maps <= {"sts", "smbl", "hls"})
-    assert ("cap_current" in axis) == (maps == {"hls"})
-
-
-@pytest.mark.parametrize(
-    ("model", "caps"),
-    [
-        ("STS3215", {"cap_torque"}),
-        ("HLS3606", {"cap_torque", "cap_current"}),
-        ("SM85BLHV", {"cap_torque"}),
-        (
-            "SM100-360M",
-            set(),
-        ),  # of one major it has either of two maps, and in one of them EEPROM alone bounds it
-        ("SCS0009", set()),
-        ("SCS15-2", set()),
-    ],
-)
-def test_caps_of_a_model_of_each_map(model: str, caps: set[str]) -> None:
-    assert {name for name in FAMILY.open().axis(model).names if name.startswith("cap_")} == caps
+@pytest.mark.parametrize("table", sorted(TABLES))
+def test_caps_are_there_where_the_map_has_a_register_in_ram(table: str) -> None:
+    assert ("cap_torque" in axis(table)) == (table in {"sts", "smbl", "hls"})
+    assert ("cap_current" in axis(table)) == (table == "hls")
 
 
 @pytest.mark.parametrize("model", ["unknown model 9.99", "STS9999", ""])
-def test_other_models_have_no_axis(model: str) -> None:
-    assert not FAMILY.open().axis(model).names
+def test_without_map_and_model_there_is_no_axis(model: str) -> None:
+    assert not axis("", model).names
 
 
 def test_the_simulator_is_a_bus_of_the_usual_model() -> None:

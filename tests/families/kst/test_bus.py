@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from motorbus.core.family import Identity
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.families.kst import FAMILY, KstDriver, Servo
 from motorbus.families.kst.profiles import PROFILES, RATES
@@ -39,12 +40,12 @@ def test_each_bus_has_settings_and_state_of_its_own() -> None:
 @pytest.mark.parametrize("profile", PROFILES)
 def test_capabilities_belong_to_the_profile(profile: str) -> None:
     with Bench(profile=profile) as bench:
-        axis = FAMILY.open().axis(bench.servo().identify().model)
-    assert axis.names == FAMILY.open().axis(profile).names
+        axis = FAMILY.open().axis(bench.servo().identify())
+    assert axis.names == FAMILY.open().axis(Identity(1, "", "", profile)).names
     assert {"state", "position", "move", "stop", "limits", "stream"} <= axis.names
     assert {"enable_torque", "cap_torque", "cap_current"}.isdisjoint(axis.names)
     assert ("current" in axis) is ("temperature" in axis) is (profile != "kst")
-    assert not FAMILY.open().axis("").names
+    assert not FAMILY.open().axis(Identity(1, "", "", "")).names
     assert not any(hasattr(Servo, name) for name in ("enable_torque", "disable_torque"))
 
 

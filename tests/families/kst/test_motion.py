@@ -7,6 +7,7 @@ from math import radians
 
 import pytest
 
+from motorbus.core.family import Identity
 from motorbus.errors import LimitExceeded, MotionError, Stalled
 from motorbus.families.kst import FAMILY, Promise, Started
 from tests.families.kst.bench import Answers, Bench, abort
@@ -111,7 +112,7 @@ def test_estop_holds_each_known_servo_also_outside_the_range() -> None:
 def test_health_is_one_read_and_counts_boot_messages(has_notice: bool) -> None:
     for profile, request in (("kst", POSITION), ("kst-ext", "605#4005600000000000")):
         with Bench(profile=profile, boot_notice=has_notice) as bench:
-            health, servo = FAMILY.open().axis(profile).health, bench.servo()
+            health, servo = FAMILY.open().axis(Identity(5, "", "", profile)).health, bench.servo()
             assert bench.bus.run(health(servo)).restarts == 0
             assert bench.sent() == [request]
             bench[5].power_cycle()

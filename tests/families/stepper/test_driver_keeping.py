@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from motorbus.core.family import Identity
 from motorbus.core.steps import INTENT, OUTCOME, Procedure, Sleep, catch, gather
 from motorbus.core.timing import Turned
 from motorbus.errors import Interrupted, LinkLost, MotorbusError, NotHomed, OutcomeUnknown, RequestError
@@ -347,7 +348,7 @@ def test_with_another_reading_of_the_ramp_it_still_comes_to_its_end(ramp: dict[s
 
 
 def test_an_axis_keeps_time_homes_and_runs_programs_by_its_capabilities() -> None:
-    able = FAMILY.open().axis("stepper controller")
+    able = FAMILY.open().axis(Identity(0, "stepper controller", "", ""))
     line = paced(home_switch="wired", home_at=-1000)
     partner = Partner(1.0)
     told = line.run(

@@ -6,6 +6,7 @@ import pytest
 
 import motorbus
 from motorbus import families
+from motorbus.core.family import Identity
 from motorbus.errors import RequestError
 from motorbus.families.stepper import FAMILY, Controller, StepperDriver
 
@@ -37,9 +38,9 @@ def test_each_bus_has_a_memory_of_its_own() -> None:
 
 
 def test_it_is_an_axis_that_moves_by_and_has_no_position() -> None:
-    axis = FAMILY.open().axis("stepper controller")
+    axis = FAMILY.open().axis(Identity(0, "stepper controller", "", ""))
     assert axis.names == {"move_by", "jog", "home", "keep_time", "run", "stop"}
-    assert not FAMILY.open().axis("").names
+    assert not FAMILY.open().axis(Identity(0, "", "", "")).names
 
 
 def test_a_simulation_has_the_motor_of_its_bus() -> None:

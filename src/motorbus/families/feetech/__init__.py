@@ -145,11 +145,12 @@ class FeetechDriver(HalfDuplexSerial):
     def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Procedure[list[Found]]:
         return scan(ids, rates, polls=driver.GLANCE)
 
-    def axis(self, model: str) -> AxisDriver:
-        maps = {name for known in MODELS.values() if known.name == model.upper() for name in known.maps}
+    def axis(self, identity: Identity) -> AxisDriver:
+        maps = {identity.table} & TABLES.keys()
+        if not maps:  # a known model with firmware of an unknown map is read and stopped
+            maps = {name for known in MODELS.values() if known.name == identity.model for name in known.maps}
         lacks = {name for name, does in _ONLY_WHERE.items() if not all(map(does, maps))}
-        given = {name: getattr(_AXIS, name) for name in _AXIS.names - lacks} if maps else {}
-        return AxisDriver(**given)
+        return AxisDriver(**{name: getattr(_AXIS, name) for name in _AXIS.names - lacks if maps})
 
     def decode(self, data: bytes) -> list[Explanation]:
         from motorbus.families.feetech.explain import explain

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 from cyclopts import App, Group, Parameter
 
-from motorbus.cli import consent, dry, files, identity, quantity, several, target
-from motorbus.cli.device_command import DeviceCommand, device_command, family_command
+from motorbus.cli import consent, dry, identity, quantity, several, target
+from motorbus.cli.device_command import DeviceCommand, device_command
 from motorbus.cli.exits import Exit
-from motorbus.cli.parameters import Flag, Silent
+from motorbus.cli.parameters import Flag
 from motorbus.core import units
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import BusDriver
@@ -336,38 +335,6 @@ def reverse(run: Run, switch: Switch | None = None, /) -> Exit:
         on = switch == "on"
         run.write(lambda servo: servo.set_reversed(on), f"switch its reverse bit {switch}, and save it")
     return run.show({"reversed": on}, f"{run.label} turns {'in reverse' if on else 'as shipped'}")
-
-
-@family_command(
-    app, "eds", "", "eds --output kst.eds", "eds --profile xqpower --with-mandatory > xqpower.eds"
-)
-def eds(
-    *,
-    profile: Annotated[str, Parameter(help=f"One of {', '.join(PROFILES)}.")] = "kst",
-    node: Annotated[str, Parameter(help="The id in the sheet.")] = "0x25",
-    with_mandatory: Annotated[
-        Flag, Parameter(help="Add three objects of CiA 301 that the servos lack.")
-    ] = False,
-    output_: Annotated[Path | None, Parameter(help="File to write; without it, stdout.")] = None,
-    output: Silent,
-) -> Exit:
-    """Write an electronic data sheet (CiA 306) for CANopen tools."""
-    from motorbus.families.kst import eds as sheets
-
-    if profile not in PROFILES:
-        raise RequestError(f"there is no profile {profile!r}", expected=f"one of {', '.join(PROFILES)}")
-    number = checked_id(identity.id_said(node))
-    name = output_.name if output_ else ""
-    text = sheets.eds(PROFILES[profile], node_id=number, with_mandatory=with_mandatory, file_name=name)
-    if output_ is None:
-        output.document("motorbus.kst.eds/1", {"profile": profile, "file": None, "eds": text})
-        output.text(text.rstrip("\n"))
-        return Exit.OK
-    with files.usable(output_, "written"):
-        output_.write_text(text, encoding="ascii", newline="\r\n")
-    output.document("motorbus.kst.eds/1", {"profile": profile, "file": str(output_)})
-    output.text(f"written: {output_}")
-    return Exit.OK
 
 
 # -- what the commands of all families (motorbus scan, read, move, budget, ...) use of this family ---------------------

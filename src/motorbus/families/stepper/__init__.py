@@ -168,8 +168,8 @@ class StepperDriver:
     def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Procedure[list[Found]]:
         return driver.scan(ids, rates, self.motor)
 
-    def axis(self, model: str) -> AxisDriver:
-        return _AXIS if model == presence.MODEL else AxisDriver()
+    def axis(self, identity: Identity) -> AxisDriver:
+        return _AXIS if identity.model == presence.MODEL else AxisDriver()
 
     def decode(self, data: bytes) -> list[Explanation]:
         from motorbus.families.stepper.explain import explain

@@ -36,5 +36,5 @@ def on_a_wire(port: str) -> RequestError:
         f"{port}: faults are refused on a CAN bus that may have real devices; nothing was changed",
         expected="a bus of programs alone: can://virtual, can://udp_multicast, or can://socketcan/vcan0 (vxcan0)",
         cause="what is done to frames there, other devices suffer or obey too",
-        advice="serve the devices by --link, --tcp or --socketcand, or on can://socketcan/vcan0",
+        advice="serve the devices by --link or --tcp, or on can://socketcan/vcan0",
     )

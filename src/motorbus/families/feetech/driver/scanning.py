@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 from motorbus.core.family import Found, Identity
 from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate, Sleep, catch, with_cleanup
-from motorbus.errors import LinkLost, MotorbusError, NoReply, WireError
+from motorbus.errors import LinkLost, MotorbusError, NoReply, UnexpectedReply, WireError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.identity import identify, ping_exchange
 from motorbus.families.feetech.driver.node import Node, as_nodes
@@ -23,6 +23,9 @@ DRAIN: Final = 0.02
 """s of quiet at a new rate: one that was busy may answer what it has buffered in a burst. Source: feetech-cli."""
 GLANCE: Final = 8
 """Reads that show two servos on one id in passing, where 4 of 10 are garbled (servolab): 98 times of 100."""
+
+CHATTER: Final = 8
+"""Ids that are answered in garbled bytes, and none in order: the line carries something else."""
 
 
 class Skipped(NamedTuple):
@@ -39,6 +42,7 @@ async def scan(ids: Sequence[int] = (), rates: Sequence[int] = (), *, polls: int
     (its identity is asked afterwards), `Progress`, a `ScanWarning` where two servos seem to share an id, and `Skipped`
     for a rate that the link does not have. Each that is found is asked `polls` times whether it is alone; one whose
     answers are garbled in any case, and it counts as found, without an identity, when they stay so. Writes nothing.
+    Raises UnexpectedReply when the first ids are all answered in garbled bytes.
     """
     asked = [node.node for node in as_nodes(ids or range(wire.MAX_ID + 1))]
     present = await SetBitrate(0)
@@ -71,6 +75,12 @@ async def _at_one_rate(ids: Sequence[int], rate: int, index: int, of: int, polls
             if id not in there and await _answers(id, garbled):
                 there.append(id)
                 await Emit(Found(id, rate, None))
+            if len(garbled) >= CHATTER and not there:
+                raise UnexpectedReply(
+                    f"the first {len(garbled)} ids at {rate} bit/s are answered in garbled bytes",
+                    cause="the line carries something else: another baud rate, another program, electrical noise",
+                    advice="check the baud rate and that no other program sends on this bus",
+                )
             await Emit(Progress(begun + done + 1, 2 * of * len(ids), f"id {id} at {rate} bit/s"))
     found: list[Found] = []
     for id in sorted({*there, *garbled}):

@@ -135,13 +135,13 @@ class KstDriver:
     def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Procedure[list[Found]]:
         return scan(self.settings, ids, rates)
 
-    def axis(self, model: str) -> AxisDriver:
-        for profile in PROFILES.values():
-            if model in (profile.name, profile.title):
-                if profile.status_row is None:
-                    return _AXIS
-                return replace(_AXIS, current=feedback.current, temperature=feedback.temperature)
-        return AxisDriver()
+    def axis(self, identity: Identity) -> AxisDriver:
+        profile = PROFILES.get(identity.table)
+        if profile is None:
+            return AxisDriver()
+        if profile.status_row is None:
+            return _AXIS
+        return replace(_AXIS, current=feedback.current, temperature=feedback.temperature)
 
     def decode(self, data: bytes) -> list[Explanation]:
         from motorbus.families.kst.decode import decode

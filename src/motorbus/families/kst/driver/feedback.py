@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 
 from motorbus.core.family import Health, State
 from motorbus.core.request import Request, Response
+from motorbus.errors import DeviceError
 from motorbus.families.kst import profiles
 from motorbus.families.kst.driver.node import Node, feature_row
 from motorbus.families.kst.driver.requests import accepted, read_register, upload
@@ -76,11 +77,17 @@ async def temperature(node: Node) -> float:
 
 
 async def telemetry(node: Node) -> State:
-    """One sample: position (rad), with newer firmware current (A) and temperature (°C), recent alarms."""
+    """One sample: position (rad), with newer firmware current (A) and temperature (°C), recent alarms.
+
+    A status object that the servo refuses is named in `refused`.
+    """
     here = await position(node)
     state = State(at=node.at, position=here)
     if node.profile.status_row is not None:
-        state = state._replace(**(await _status(node))._asdict())
+        try:
+            state = state._replace(**(await _status(node))._asdict())
+        except DeviceError as error:
+            state = state._replace(refused=(error.summary,))
     return state._replace(alarm=node.alarm)
 
 

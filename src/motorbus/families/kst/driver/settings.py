@@ -16,11 +16,11 @@ from motorbus.core import verify
 from motorbus.core.register import Register
 from motorbus.core.request import ANY, Effect, Priority, Request, Response, TimeoutClass
 from motorbus.core.steps import Exclusive, Sleep
-from motorbus.errors import RequestError, VerificationFailed
+from motorbus.errors import DeviceError, RequestError, VerificationFailed
 from motorbus.families.kst.driver.feedback import position
 from motorbus.families.kst.driver.motion import start_request
 from motorbus.families.kst.driver.node import Node, feature_row
-from motorbus.families.kst.driver.requests import decoded, read_register, refused, write_register
+from motorbus.families.kst.driver.requests import decoded, is_absent, read_register, refused, write_register
 from motorbus.families.kst.profiles import REVERSED, SAVE
 
 LISTEN: Final = 0.020
@@ -184,7 +184,12 @@ async def start_reports(node: Node, interval: float | None = None) -> None:
     """
     row = _report_row(node)
     if interval is not None:
-        await write_register(node, row, node.raw(row, interval))
+        try:
+            await write_register(node, row, node.raw(row, interval))
+        except DeviceError as error:
+            if is_absent(error):
+                error.advice = "leave out the interval: this firmware reports at its own"
+            raise
     await start_request(node, True)
 
 
