@@ -245,7 +245,7 @@ def test_a_broken_file_ends_with_2_and_one_message(
     judge(broken, command, tmp_path / "bench.toml", run)
 
 
-ALL = ("budget", "hold", "stop", "loop-stats", "park", "pose --save here", "teach --output x.csv", "safety")
+ALL = ("hold", "stop", "loop-stats", "park", "pose --save here", "teach --output x.csv", "safety")
 
 
 @pytest.mark.parametrize("command", ALL)

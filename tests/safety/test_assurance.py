@@ -6,13 +6,11 @@ from dataclasses import replace
 from math import radians
 from typing import Any
 
-import pytest
-
 from motorbus.core.family import Family
 from motorbus.core.guarantees import Level
 from motorbus.motion.machine import Machine
-from motorbus.motion.moving.stream import SHARE, USUAL
-from motorbus.motion.safety.assurance import MACHINE, NONE, SCOPE, WHOLE, assured, cycle, unbounded
+from motorbus.motion.moving.stream import USUAL
+from motorbus.motion.safety.assurance import MACHINE, NONE, SCOPE, WHOLE, assured, unbounded
 from motorbus.session import prepare
 from tests.support.machines import machine
 
@@ -38,25 +36,11 @@ def test_each_axis_is_shown_with_the_bounds_of_the_file() -> None:
     assert (found["lift"].limits, found["lift"].left, found["lift"].estop) == (NONE, WHOLE, "stop")
 
 
-@pytest.mark.parametrize("period", [0.01, 0.05])
-def test_how_far_a_led_axis_goes_on_is_one_cycle_of_its_bus(period: float) -> None:
+def test_how_far_a_led_axis_goes_on_is_one_cycle_of_the_usual_rate() -> None:
     with machine(arm="1") as (made, _):
-        (axis,) = assured(made, families(made), {"arm": period}).axes
-        spec = made.axes["a1"]
-    assert axis.left == spec.show(radians(90) * period)
-
-
-@pytest.mark.parametrize("cycles", [None, {}, {"can": 0.05}])
-def test_on_a_bus_of_which_no_cycle_is_told_it_is_the_usual_one(cycles: dict[str, float] | None) -> None:
-    with machine(arm="1") as (made, _):
-        (axis,) = assured(made, families(made), cycles).axes
+        (axis,) = assured(made, families(made)).axes
         spec = made.axes["a1"]
     assert axis.left == spec.show(radians(90) / USUAL) != spec.show(0.0)
-
-
-def test_a_cycle_is_as_long_as_axes_are_led() -> None:
-    assert cycle(1000.0) == 1 / USUAL
-    assert cycle(40.0) == pytest.approx(1 / (SHARE * 40))
 
 
 def test_each_bus_with_axes_tells_what_its_devices_give() -> None:

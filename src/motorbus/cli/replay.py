@@ -157,8 +157,8 @@ def _course(wanted: Trajectory, share: float, interpolation: Interpolation) -> P
     return course
 
 
-def _judge(course: Paced, axes: Mapping[str, AxisSpec], rate: float = 0.0) -> Trajectory:
-    """The goals of these axes as they leave at `rate` (Hz; 0: the usual one).
+def _judge(course: Paced, axes: Mapping[str, AxisSpec]) -> Trajectory:
+    """The goals of these axes as they leave at the usual rate.
 
     Raises LimitExceeded for a movement that goes beyond their limits.
     """
@@ -166,7 +166,7 @@ def _judge(course: Paced, axes: Mapping[str, AxisSpec], rate: float = 0.0) -> Tr
     from motorbus.motion.moving.stream import USUAL
 
     there = course.positions(0.0)
-    return judged(course, {name: axes[name] for name in there if name in axes}, rate or USUAL)
+    return judged(course, {name: axes[name] for name in there if name in axes}, USUAL)
 
 
 @contextmanager
@@ -203,12 +203,8 @@ def _worst(hand: InHand, moved: Moved) -> str:
 
 
 def _plan(hand: InHand, course: Paced, present: dict[str, float]) -> Exit:
-    """How it would go: no frames, for those are made on the way. Judged is each bus, at the rate that it carries."""
-    from motorbus.motion.safety.assurance import cycle
-
+    """How it would go: no frames, for those are made on the way."""
     axes = hand.robot.machine.axes
-    for bus in hand.robot.budget(axes=list(present)).buses.values():
-        _judge(course, {name: axes[name] for name in bus.axes}, 1 / cycle(bus.highest_rate))
     wanted = _judge(course, axes)
     facts = [
         {"name": name, "present": present[name], "first": places[0], "low": min(places), "high": max(places)}

@@ -16,7 +16,6 @@ from motorbus.errors import RequestError
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from motorbus.core.family import Family
     from motorbus.core.guarantees import Guarantee
     from motorbus.motion.machine import Machine
     from motorbus.motion.safety.assurance import Assured, Bounded
@@ -30,8 +29,8 @@ it may still go when the host dies while it is led, and what ends it otherwise.
 Then what its devices give by themselves, bus by bus, and what holds for the
 machine as a whole. `given` says how far one may rely on it.
 
-How far an axis goes on is counted for the rate at which axes are led when
-nobody asks for another one; `motorbus budget` says what a bus carries.
+How far an axis goes on is counted for 100 goals per second, the usual rate; at
+a lower rate it goes on for longer.
 
 motorbus is not a safety function in the sense of ISO 13849 or IEC 61508. A
 hard-wired power cut is required wherever motion can hurt.
@@ -93,7 +92,7 @@ def _show(path: str, known: Machine, output: Output) -> None:
     from motorbus.session import prepare
 
     families = {name: prepare(bus.address, {}).family for name, bus in known.buses.items()}
-    found = assured(known, families, _cycles(known, families))
+    found = assured(known, families)
     advice = unbounded(found)
     output.document("motorbus.safety/1", {"file": path, "scope": SCOPE, **_facts(found), "advice": advice})
     if output.json:
@@ -112,22 +111,6 @@ def _show(path: str, known: Machine, output: Output) -> None:
     _points(found.machine, output)
     for one in advice:
         output.note(f"note: {one}")
-
-
-def _cycles(known: Machine, families: Mapping[str, Family]) -> dict[str, float]:
-    """s from one small goal to the next, by bus, where devices are led."""
-    from motorbus.diagnose.loops import Wanted, count
-    from motorbus.motion.safety.assurance import cycle
-
-    found = {}
-    for name, bus in known.buses.items():
-        axes = {known.axes[axis].node: axis for axis in known.axes_of(name)}
-        said = families[name].safety
-        if axes and said is not None and said.led:
-            counted = count(Wanted(bus.address, axes))
-            if counted is not None:
-                found[name] = cycle(counted.budget.highest_rate)
-    return found
 
 
 def _facts(found: Assured) -> dict[str, object]:

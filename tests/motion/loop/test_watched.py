@@ -72,7 +72,7 @@ def test_a_poll_goes_where_the_wire_is_free_and_no_cycle_begins_later_for_it() -
 
 def test_without_room_it_waits_until_it_is_overdue() -> None:
     with machine(arm="1-4", exit="leave") as (made, sims), Robot.of(made) as robot:
-        rate = 0.995 * robot.budget().highest_rate
+        rate = 0.995 / 640e-6  # 20 bytes of goals, 44 of questions and replies, at 1 Mbaud
         with robot.loop(rate) as loop:
             loop.goal.update(dict.fromkeys(loop.axes, 0.01))
             cycles(loop, 2)

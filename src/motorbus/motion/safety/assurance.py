@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from motorbus.core.guarantees import Guarantee, Guarantees, Level
 from motorbus.motion.limits import shown_rate
 from motorbus.motion.machine.model import VELOCITY
-from motorbus.motion.moving.stream import SHARE, USUAL
+from motorbus.motion.moving.stream import USUAL
 from motorbus.motion.safety.guard import LATE, NEAR
 from motorbus.motion.safety.track import FRESH
 
@@ -65,20 +65,11 @@ class Assured(NamedTuple):
     machine: Mapping[str, Guarantee]
 
 
-def cycle(highest_rate: float) -> float:
-    """s from one small goal to the next on a bus that carries so many cycles per second at most, when nobody asks for
-    another rate."""
-    return 1 / min(USUAL, SHARE * highest_rate)
-
-
-def assured(
-    machine: Machine, families: Mapping[str, Family], cycles: Mapping[str, float] | None = None
-) -> Assured:
-    """What is guaranteed of this machine, and what not. `families` by the names of its buses; `cycles` are s by bus."""
+def assured(machine: Machine, families: Mapping[str, Family]) -> Assured:
+    """What is guaranteed of this machine, and what not. `families` by the names of its buses."""
     said = {bus: family.safety for bus, family in families.items()}
     axes = tuple(
-        _bounded(name, spec, families[spec.bus], said[spec.bus], (cycles or {}).get(spec.bus, 1 / USUAL))
-        for name, spec in machine.axes.items()
+        _bounded(name, spec, families[spec.bus], said[spec.bus]) for name, spec in machine.axes.items()
     )
     buses = tuple(
         Bus(name, bus.address, families[name].name, machine.axes_of(name), _points(said[name]))
@@ -92,7 +83,7 @@ def _points(said: Guarantees | None) -> dict[str, Guarantee]:
     return {} if said is None else said.points()
 
 
-def _bounded(name: str, spec: AxisSpec, family: Family, said: Guarantees | None, period: float) -> Bounded:
+def _bounded(name: str, spec: AxisSpec, family: Family, said: Guarantees | None) -> Bounded:
     stops = family.link.stops
     return Bounded(
         name,
@@ -100,7 +91,7 @@ def _bounded(name: str, spec: AxisSpec, family: Family, said: Guarantees | None,
         _limits(spec, said),
         NONE if spec.max_step is None else spec.show(spec.max_step),
         shown_rate(spec, VELOCITY, spec.max_velocity),
-        spec.show(spec.max_velocity * period) if said is not None and said.led else WHOLE,
+        spec.show(spec.max_velocity / USUAL) if said is not None and said.led else WHOLE,
         spec.exit,
         spec.estop or (stops[0] if stops else "stop"),
         "on" if spec.guard and said is not None and said.strain.given is not Level.NO else NONE,
