@@ -20,7 +20,6 @@ def test_it_reads_and_nothing_else(bench: Bench, run: Run) -> None:
     assert (told["cycles"], told["overruns"], told["skipped"]) == (201, 0, 0)
     assert (told["lost"], told["without"]) == ({}, [])
     assert told["buses"]["arm"]["axes"] == ["a1", "a2", "a3"]
-    assert 0 < told["buses"]["arm"]["load"] < 0.5
     assert told["cycle"]["mean"] > 0
     assert torques(bench) == [0, 0, 0]
 
@@ -35,16 +34,6 @@ def test_with_hold_the_axes_have_torque_and_stay(bench: Bench, run: Run) -> None
 def test_a_dry_run_of_hold_only_reads(bench: Bench, run: Run) -> None:
     assert run("loop-stats", "arm", "--rate", "100", "--seconds", "1", "--hold", "--dry-run").code == 0
     assert torques(bench) == [0, 0, 0]
-
-
-def test_without_a_rate_it_takes_most_of_what_the_slowest_bus_carries(bench: Bench, run: Run) -> None:
-    ran = run("loop-stats", "--seconds", "0.5", "--json")
-    assert ran.code == 0, ran.err
-    told = ran.document
-    highest = min(one["highest_rate"] for one in told["buses"].values())
-    assert told["rate"] == pytest.approx(0.8 * highest)
-    assert told["without"] == ["lift"]
-    assert "lift: not in a loop" in ran.err
 
 
 def test_a_person_sees_each_bus(bench: Bench, run: Run) -> None:
@@ -83,7 +72,6 @@ def test_one_that_stays_silent_ends_it_with_5(
         ("lift",),
         ("arm", "--rate", "-1"),
         ("arm", "--rate", "nan"),
-        ("arm", "--rate", "5000"),
         ("arm", "--seconds", "0"),
         ("arm", "--seconds", "long"),
     ],

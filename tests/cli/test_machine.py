@@ -245,7 +245,7 @@ def test_a_broken_file_ends_with_2_and_one_message(
     judge(broken, command, tmp_path / "bench.toml", run)
 
 
-ALL = ("budget", "hold", "stop", "loop-stats", "park", "pose --save here", "teach --output x.csv")
+ALL = ("hold", "stop", "loop-stats", "park", "pose --save here", "teach --output x.csv")
 
 
 @pytest.mark.parametrize("command", ALL)

@@ -41,7 +41,7 @@ PORTS = {
     "kst": (re.compile(r"kst:can://slcan/dev/ttyACM\d"), "0x25"),
     "stepper": (re.compile(r"stepper:/dev/ttyUSB0"), "1"),
 }
-NAMED = re.compile(r"^motorbus (pose|park|teach|replay|follow|loop-stats|budget arm|move shoulder)")
+NAMED = re.compile(r"^motorbus (pose|park|teach|replay|follow|loop-stats|move shoulder)")
 """Commands that go by names of a machine file."""
 FOR_EVER = re.compile(r"^motorbus simulate ")
 WITH_HANDS = re.compile(r"^motorbus kst provision ")

@@ -44,7 +44,6 @@ _COMMANDS: Final[Mapping[Group, Mapping[str, str]]] = {
         "read": "Read registers, or the telemetry, of a device.",
         "monitor": "Watch devices: position, velocity, load, current, voltage, temperature, alarms.",
         "decode": "Explain the bytes of frames, and why a bad one is bad.",
-        "budget": "Say what a control loop would load a bus with, and how fast it can be.",
         "loop-stats": "Measure how well a loop over axes keeps its rate; nothing moves.",
     },
     Group("Act", sort_key=2): {

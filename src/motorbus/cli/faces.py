@@ -7,9 +7,6 @@ common commands it may offer
                                                                family can; when one device is lost the others stop
     disable_torque_everyone()                                  the request that does it on a whole bus in one broadcast
     ping_everyone(bus)                                         the nodes that answer one broadcast
-    budget_frames(driver, node)                                what a loop says to a node ("read", "write"): for each
-                                                               frame of that exchange all that it may be
-    report_frames(driver, node)                                all that a report of a node may be
     say(event)                                                 what an event of its operations says, "" if nothing
     sample(one)                                                what there is to watch of a device without telemetry:
                                                                words by name

@@ -84,7 +84,7 @@ def follow(
     span = None if seconds is None else time_of(seconds)
     check_rate(rate)
     with robot([*pairs, *pairs.values()], options, output) as hand:
-        _judge(hand, pairs, rate)
+        _judge(hand, pairs)
         present = {name: at for name, at in hand.robot.positions().items() if at is not None}
         if dry_run:
             return _plan(hand, pairs, present)
@@ -111,13 +111,11 @@ def _pairs(leader: str, follower: str) -> dict[str, str]:
     return dict(zip(leaders, followers, strict=True))
 
 
-def _judge(hand: InHand, pairs: Mapping[str, str], rate: float) -> None:
-    """Raise RequestError for pairs and a rate that cannot be, before it is said that torque goes off."""
-    from motorbus.motion.budget import refuse_above
+def _judge(hand: InHand, pairs: Mapping[str, str]) -> None:
+    """Raise RequestError for pairs that cannot be, before it is said that torque goes off."""
     from motorbus.motion.follow import check_pairs
 
     check_pairs(hand.robot, pairs)
-    refuse_above(hand.robot.budget(rate, [*pairs, *pairs.values()]))
 
 
 def _warn(hand: InHand, pairs: Mapping[str, str]) -> None:

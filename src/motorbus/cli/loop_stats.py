@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
@@ -16,11 +16,10 @@ from motorbus.core.steps import Progress
 from motorbus.errors import RequestError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from motorbus.cli.output import Output
     from motorbus.cli.robot import InHand
-    from motorbus.motion.budget import RobotBudget
     from motorbus.motion.loop.grid import Statistics, Took
 
 app = App(
@@ -33,9 +32,8 @@ a loop that controls does: so they stay where they are.
 
 An overrun is a cycle that was not over when the next one was due; a slot of
 the grid that went by as a whole is skipped. Neither is ever made up for. Late
-is a cycle by the time from its slot to its first byte. Without --rate the loop
-is as quick as 80% of what the slowest bus allows; `motorbus budget` says what
-that is. Ends with exit code 6 when readings were lost.
+is a cycle by the time from its slot to its first byte. Ends with exit code 6
+when readings were lost.
 
 Examples:
 
@@ -44,14 +42,12 @@ Examples:
     motorbus loop-stats shoulder elbow --rate 100 --hold
     motorbus loop-stats arm --rate 200 --json""",
 )
-USUAL: Final = 0.8
-"""Of the highest rate: a loop that leaves the host some air."""
 
 
 @app.default
 def loop_stats(
     *names: Annotated[str, Parameter(name="NAME")],
-    rate: float | None = None,
+    rate: float = 100.0,
     seconds: str = "5",
     hold: Flag = False,
     dry_run: DryRun = False,
@@ -65,7 +61,7 @@ def loop_stats(
     names
         Axes, groups or buses of the machine file; all axes when left out.
     rate
-        Cycles per second; 80% of the highest possible rate when left out.
+        Cycles per second.
     seconds
         For how long, in s or as 500ms; Enter or Ctrl-C end it earlier.
     hold
@@ -74,8 +70,7 @@ def loop_stats(
         Any option of the buses, as a flag.
     """
     axes, span = axes_named(names), time_of(seconds, advice="leave it out for 5 s")
-    if rate is not None:
-        check_rate(rate)
+    check_rate(rate)
     if dry_run and not hold:
         raise RequestError(
             "without --hold it changes nothing, so there is nothing to rehearse",
@@ -86,10 +81,10 @@ def loop_stats(
         if dry_run:
             rehearse(hand, axes, lambda axis: axis.hold())
             return Exit.OK
-        budget = hand.robot.budget(rate or 0.0, axes)
-        chosen = rate or (USUAL * budget.highest_rate if budget.buses else 1.0)
-        took, without, found = _run(hand, axes, chosen, span, hold=hold)
-    _tell(took, without, found, budget, output)
+        took, without, found = _run(hand, axes, rate, span, hold=hold)
+        specs = hand.robot.machine.axes
+    there = {bus: [name for name in found.lost if specs[name].bus == bus] for bus in found.buses}
+    _tell(took, without, found, there, output)
     return Exit.OK
 
 
@@ -115,35 +110,17 @@ def _run(
 
 
 def _tell(
-    took: float, without: Sequence[str], found: Statistics, budget: RobotBudget, output: Output
+    took: float, without: Sequence[str], found: Statistics, axes: Mapping[str, list[str]], output: Output
 ) -> None:
     achieved = (found.cycles - 1) / took if took > 0 else 0.0
     lost = {name: count for name, count in found.lost.items() if count}
-    buses = {
-        name: {
-            "axes": list(budget.buses[name].axes),
-            "load": budget.buses[name].load(found.rate),
-            "highest_rate": budget.buses[name].highest_rate,
-            "cycle": _took(one),
-        }
-        for name, one in found.buses.items()
-    }
+    buses = {name: {"axes": axes[name], "cycle": _took(one)} for name, one in found.buses.items()}
     facts: dict[str, object] = {"rate": found.rate, "achieved_rate": achieved, "seconds": took}
     facts |= {"cycles": found.cycles, "overruns": found.overruns, "skipped": found.skipped}
     facts |= {"lateness": _took(found.lateness), "cycle": _took(found.cycle), "buses": buses}
     output.document("motorbus.loop-stats/1", {**facts, "lost": lost, "without": list(without)})
-    rows = [
-        (
-            name,
-            len(budget.buses[name].axes),
-            f"{100 * budget.buses[name].load(found.rate):.1f}",
-            f"{budget.buses[name].highest_rate:.1f}",
-            _ms(one.mean),
-            _ms(one.most),
-        )
-        for name, one in found.buses.items()
-    ]
-    columns = ["bus", ">axes", ">load %", ">highest rate, Hz", ">cycle ms", ">longest ms"]
+    rows = [(name, len(axes[name]), _ms(one.mean), _ms(one.most)) for name, one in found.buses.items()]
+    columns = ["bus", ">axes", ">cycle ms", ">longest ms"]
     output.table("", columns, rows)
     output.text(
         f"{achieved:.1f} of {found.rate:g} cycles per second, {found.cycles} in {took:.2f} s: "

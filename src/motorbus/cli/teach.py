@@ -91,7 +91,7 @@ def teach(
     with robot(axes, options, output) as hand:
         if dry_run:
             return _plan(hand, axes, limp=limp)
-        _judge(hand, axes, rate, named=bool(names), limp=limp)
+        _judge(hand, axes, named=bool(names), limp=limp)
         with hand.working("recording"), asked_to_end(also=END) as ended, _rescued(smooth, output_):
             until = counted(hand, "recording", ended, rate, span)
             taught = hand.robot.teach(
@@ -103,12 +103,11 @@ def teach(
     return Exit.OK
 
 
-def _judge(hand: InHand, axes: list[str], rate: float, *, named: bool, limp: bool) -> None:
-    """Say that torque goes off. Raises RequestError before, for who cannot be taught, and for too high a rate."""
-    from motorbus.motion.budget import refuse_above
+def _judge(hand: InHand, axes: list[str], *, named: bool, limp: bool) -> None:
+    """Say that torque goes off. Raises RequestError before, for who cannot be taught."""
     from motorbus.motion.teach import taught
 
-    refuse_above(hand.robot.budget(rate, taught(hand.robot, axes if named else None, limp=limp)))
+    taught(hand.robot, axes if named else None, limp=limp)
     if limp:
         hand.output.note("the torque goes off now, and stays off: hold what could sag")
 

@@ -9,8 +9,8 @@ from motorbus.core.family import Quality
 from motorbus.errors import MotionError, MotorbusError, RequestError
 from motorbus.motion import group
 from motorbus.motion.body import Body
-from motorbus.motion.budget import divided
 from motorbus.motion.follow import Ending, check_able, check_seconds
+from motorbus.motion.loop.cycle import divided
 from motorbus.motion.loop.faces import Errand, LoopFace
 from motorbus.motion.loop.readings import LoopState
 from motorbus.motion.profile.shapes import NOTHING

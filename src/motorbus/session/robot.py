@@ -31,7 +31,6 @@ from motorbus.link.memory import MemoryLink, share_clock
 from motorbus.motion import group
 from motorbus.motion.axis import AsyncAxis, Axis
 from motorbus.motion.body import Body
-from motorbus.motion.budget import budget
 from motorbus.motion.conductor import Conductor, LoopConductor
 from motorbus.motion.follow import follow
 from motorbus.motion.leaving import Leaving
@@ -82,7 +81,6 @@ class RobotVerbs(Leased):
     replay = together(moving.replay)
     follow = looped(follow)
     teach = looped(teach)
-    budget = together(budget)
 
     when_left: Left | None = None
     """Called once each axis was left as the file says and while the ports are still open: with what became of that, and

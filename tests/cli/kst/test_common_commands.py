@@ -1,4 +1,4 @@
-"""Common commands on CAN servos: emergency stop, scan, budget, and what they show of this family."""
+"""Common commands on CAN servos: emergency stop, scan, and what they show of this family."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ from pathlib import Path
 import pytest
 
 import motorbus
-from motorbus import families
-from motorbus.cli import faces
 from motorbus.errors import LinkError, OutcomeUnknown
 from motorbus.families.kst.cli import move_together
 from motorbus.simulation.named import Simulation
@@ -78,20 +76,6 @@ def test_read_shows_versions_and_status_in_words(servos: Simulation, newer: Simu
     assert [(row["name"], row["meaning"]) for row in rows] == [("firmware_version", "1.00"), ("node_id", "")]
     (row,) = run("read", f"{newer.url}#37", "status", "--json").document["registers"]
     assert row["meaning"] == "0.000 A, 25 °C"
-
-
-def test_budget_counts_every_position_in_the_form_of_the_bus() -> None:
-    family = families.load("kst").open(profile="kst-ext")
-    frames = faces.offer("kst", "budget_frames")(family, 0x25)
-    (goals, acknowledgements), (requests, replies) = frames["write"], frames["read"]
-    assert [str(goals[0]), str(goals[-1])] == ["625#2203600018FC0000", "625#22036000E8030000"]
-    assert [str(acknowledgements[0]), str(requests[0])] == ["5A5#6003600000000000", "625#4002600000000000"]
-    assert (len(goals), len(replies), str(replies[1000])) == (2001, 2001, "5A5#4B02600000000000")
-    reports = faces.offer("kst", "report_frames")(family, 0x25)
-    assert {(one.id, len(one.data)) for one in reports} == {(0x5A5, 4)}
-    extended = families.load("kst").open(id_format="ext", sized="yes")
-    goals, _ = faces.offer("kst", "budget_frames")(extended, 1)["write"]
-    assert str(goals[0]) == "00000601#2B0360007CFC0000"
 
 
 def test_move_of_several_stops_all_when_the_first_does_not_answer() -> None:

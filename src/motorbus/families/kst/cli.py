@@ -13,18 +13,14 @@ from motorbus.cli.device_command import DeviceCommand, device_command
 from motorbus.cli.exits import Exit
 from motorbus.cli.parameters import Flag
 from motorbus.core import units
-from motorbus.core.can_frame import CanFrame
-from motorbus.core.family import BusDriver
 from motorbus.core.interrupted import Moving, stopped_if_interrupted
 from motorbus.core.register import Register
 from motorbus.core.scan import Skipped
 from motorbus.core.setpoint import Setpoint
 from motorbus.core.steps import Progress, gather
 from motorbus.errors import RequestError
-from motorbus.families.kst import notifications, sdo
 from motorbus.families.kst.driver import feedback, motion, provisioning
 from motorbus.families.kst.driver.broadcast import broadcast_read
-from motorbus.families.kst.driver.bus import KstDriver
 from motorbus.families.kst.driver.node import checked_id
 from motorbus.families.kst.driver.scan import ScanWarning, scan_bit_rates
 from motorbus.families.kst.driver.servo import Servo, settings_of
@@ -337,7 +333,7 @@ def reverse(run: Run, switch: Switch | None = None, /) -> Exit:
     return run.show({"reversed": on}, f"{run.label} turns {'in reverse' if on else 'as shipped'}")
 
 
-# -- what the commands of all families (motorbus scan, read, move, budget, ...) use of this family ---------------------
+# -- what the commands of all families (motorbus scan, read, move, ...) use of this family ---------------------
 # `motorbus.cli.faces` finds it by name.
 
 COMMANDS: Final = {
@@ -408,34 +404,6 @@ def detect_bit_rate(
     found = bus.run(scan_bit_rates(settings_of(bus), seconds=seconds), report=take)
     activity = skipped | {rate: one.value for rate, one in found.activity.items()}
     return found.rate, {rate: activity[rate] for rate in bus.family.link.rates if rate in activity}
-
-
-def budget_frames(driver: BusDriver, node: int) -> Mapping[str, tuple[Sequence[CanFrame], ...]]:
-    """For `motorbus budget`: the requests and replies of a control loop, with every position that they may carry.
-
-    "write" sends a target and receives its acknowledgement, "read" receives the position.
-    """
-    assert isinstance(driver, KstDriver)
-    settings = driver.settings
-    goal, present = (settings.profile.table[name] for name in ("goal_position", "present_position"))
-    raws = range(goal.low, goal.high + 1)
-    targets = [settings.download(node, goal, raw) for raw in raws]
-    acknowledgement = sdo.encode_download_reply(node, goal.address, 0)
-    positions = [sdo.encode_upload_reply(node, present.address, 0, present.encode(raw)) for raw in raws]
-    return {
-        "write": (targets, [settings.format(acknowledgement)]),
-        "read": ([settings.upload(node, present)], list(map(settings.format, positions))),
-    }
-
-
-def report_frames(driver: BusDriver, node: int) -> list[CanFrame]:
-    """For `motorbus budget`: a report of every position."""
-    assert isinstance(driver, KstDriver)
-    settings = driver.settings
-    profile = settings.profile
-    form = profile.report_forms[0] if profile.report_forms else "sdo"
-    positions = range(-profile.limit, profile.limit + 1)
-    return [settings.format(notifications.encode_report(node, raw, form=form)) for raw in positions]
 
 
 def move_together(bus: Any, goals: Mapping[int, float], *, wait: bool = True) -> None:

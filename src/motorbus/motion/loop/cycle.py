@@ -367,6 +367,12 @@ async def _begun(train: PositionStream, command: Command, watch: Watch | None) -
         raise
 
 
+def divided(axes: Mapping[str, AxisVerbs]) -> tuple[dict[str, AxisVerbs], tuple[str, ...]]:
+    """Those that can be led in a loop, and the names of those that cannot."""
+    led = {name: axis for name, axis in axes.items() if "stream" in axis.able}
+    return led, tuple(name for name in axes if name not in led)
+
+
 async def train_of(bus: BaseBus, axes: Sequence[AxisVerbs]) -> PositionStream:
     """These axes of one bus, ready to be asked and told in a loop; nothing is written."""
     train: PositionStream = await axes[0].able.stream([axis.device for axis in axes], rate=bus.rate)

@@ -21,7 +21,7 @@ def check_loop(rate: float) -> None:
         raise RequestError(
             f"rate is {shown(rate)}",
             expected=f"cycles per second: {MIN_RATE:g} to {MAX_RATE:g}",
-            advice="choose such a rate; budget() tells the highest that the buses carry; nothing was sent",
+            advice="choose such a rate; nothing was sent",
         )
 
 

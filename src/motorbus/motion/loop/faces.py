@@ -33,7 +33,6 @@ from motorbus.bus.blocking import Bus
 from motorbus.core.device import MethodDescriptor
 from motorbus.errors import MotorbusError
 from motorbus.motion.body import Body
-from motorbus.motion.budget import RobotBudget
 from motorbus.motion.clamping import Policy
 from motorbus.motion.loop.grid import Statistics
 from motorbus.motion.loop.readings import LoopState
@@ -124,19 +123,14 @@ class LoopFace:
         """What became of it so far: cycles, overruns, slots that were skipped, readings that were lost, times."""
         return self._rounds.statistics
 
-    @property
-    def budget(self) -> RobotBudget | None:
-        """What it loads each bus with; None before it is entered."""
-        return self._rounds.budget
-
 
 class Loop(LoopFace):
     """A loop of a `Robot`; use it in a `with`, and in a `for` inside it. Never ends by itself.
 
-    Raises RequestError on entering for a rate that a bus cannot carry, NoReply when an axis is silent too long,
-    LimitExceeded for a goal that must not be sent (nothing was sent then, and the loop can go on) or for an axis that
-    is held back (it stays, the others go on), Interrupted when an axis was stopped from elsewhere, Faulted when one has
-    lost its torque or restarted, Overloaded when one pushes too hard for too long or is too hot; see `Rounds`.
+    Raises NoReply when an axis is silent too long, LimitExceeded for a goal that must not be sent (nothing was sent
+    then, and the loop can go on) or for an axis that is held back (it stays, the others go on), Interrupted when an
+    axis was stopped from elsewhere, Faulted when one has lost its torque or restarted, Overloaded when one pushes too
+    hard for too long or is too hot; see `Rounds`.
     """
 
     def __init__(

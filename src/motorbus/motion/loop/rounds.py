@@ -20,13 +20,12 @@ from motorbus.core.steps import Emit
 from motorbus.errors import Faulted, Interrupted, LinkLost, MotorbusError, Overloaded, RequestError
 from motorbus.motion import limits
 from motorbus.motion.body import Body
-from motorbus.motion.budget import RobotBudget, bus_budget, divided, refuse_above
 from motorbus.motion.capabilities import AxisVerbs
 from motorbus.motion.clamping import Clamped, Policy, Tidings, check_policy
 from motorbus.motion.command import Command
 from motorbus.motion.limits import Device
 from motorbus.motion.loop.braking import braked, latest, refusals
-from motorbus.motion.loop.cycle import Part, train_of
+from motorbus.motion.loop.cycle import Part, divided, train_of
 from motorbus.motion.loop.errors import as_number, check_loop, silence, stopped
 from motorbus.motion.loop.grid import Grid, Statistics
 from motorbus.motion.loop.place import CATCH_UP, Place
@@ -72,7 +71,6 @@ class Rounds:
         self.places: dict[str, Place] = {}
         self.parts: dict[str, Part] = {}
         self.statistics: Final = Statistics.of(rate, led, body.by_bus(led))
-        self.budget: RobotBudget | None = None
         self._body = body
         self._led = led
         self._direct = direct
@@ -98,16 +96,14 @@ class Rounds:
     # -- entering ------------------------------------------------------------------------------------------------------
 
     async def entering(self) -> None:
-        """Ask what must be known, refuse a rate that cannot be, and see where everybody is."""
+        """Ask what must be known, and see where everybody is."""
         if self._entered:
             raise RequestError(
                 "the loop was entered before", expected="a new one for each `with`", advice="nothing was sent"
             )
         parts = self._body.by_bus(self._led)
         opened = await Parallel({bus: self._opening(bus, there) for bus, there in parts.items()}, settled)
-        self.budget = RobotBudget(self.rate, {bus: found[2] for bus, found in opened.items()}, self.without)
-        refuse_above(self.budget)
-        for bus, (train, devices, _) in opened.items():
+        for bus, (train, devices) in opened.items():
             there = [self._place(axis, devices[axis.name]) for axis in parts[bus]]
             face = self._body.buses[bus]
             watch = Watch(face, parts[bus]) if self._watch else None
@@ -130,12 +126,8 @@ class Rounds:
     async def _opened(self, bus: str, there: list[AxisVerbs]) -> Any:
         face = self._body.buses[bus]
         train = await train_of(face, there)
-        devices: dict[str, Device] = {}
-        angles: dict[int, float] = {}
-        for axis in there:
-            device = devices[axis.name] = await limits.of_device(axis)
-            angles[axis.spec.node] = 0.0 if device is None else min(max(0.0, device[0]), device[1])
-        return train, devices, bus_budget(face, train, [axis.name for axis in there], angles)
+        devices: dict[str, Device] = {axis.name: await limits.of_device(axis) for axis in there}
+        return train, devices
 
     def _place(self, axis: AxisVerbs, device: Device) -> Place:
         place = Place(axis, device, 1 / self.rate, self._direct, self._policy)
