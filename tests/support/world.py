@@ -135,6 +135,7 @@ class Tries:
         """The answer, None where it failed, and the kind of failure of what is missing: `silence`, `checksum` …"""
         attempt = Attempt(request)
         self.engine.begin(attempt, 0.0)
+        self.engine.written()
         self.engine.feed(data, self.SOON)
         self.engine.expire(attempt.deadline)
         return None if attempt.fault else attempt.answer(self.SOON), attempt.failure()

@@ -62,6 +62,7 @@ class Unforeseeable(errors.MotorbusError):
 CODES: Final[Mapping[type[BaseException], Exit]] = {
     errors.MotorbusError: Exit.FAILURE,
     errors.LinkError: Exit.FAILURE,
+    errors.LinkFull: Exit.FAILURE,
     errors.PortNotFound: Exit.PORT_NOT_FOUND,
     errors.PortBusy: Exit.PORT_BUSY,
     errors.LinkLost: Exit.PORT_NOT_FOUND,

@@ -90,27 +90,3 @@ def test_the_supply_fails_in_the_middle_of_a_save(save_cut: str, image: bytes, t
         assert any(status["saving"] == 1 for status in stati)  # it has read it, and the save takes an hour
         assert ordered(lines, "power-cycle") == "ok"
         assert asked(port.fileno(), frame(READ, 1).hex(), 226) == (DUMP_A[:6] + image).hex(" ").upper()
-        assert "has cut the saving of project 1" in ordered(lines, "log")
-
-
-def test_faults_come_and_go_on_a_terminal(tmp_path: Path) -> None:
-    bus = simulate((1,))
-    with (
-        closing(PtyMaster()) as master,
-        closing(ControlSocket(tmp_path / "control", bus)) as control,
-        served(Mount(bus, master, attendants=[control])),
-        closing(socket.socket(socket.AF_UNIX)) as client,
-        open(master.slave_name, "r+b", buffering=0) as port,
-    ):
-        tty.setraw(port.fileno())
-        client.settimeout(10.0)
-        client.connect(os.fspath(tmp_path / "control"))
-        lines = client.makefile("rw")
-        read = frame(0, 0x0B, 2).hex()
-        assert ordered(lines, "fault 1 reply_fault=doubled") == "ok"
-        assert asked(port.fileno(), read, 12) == "FF AA 00 0B 02 00 FF AA 00 0B 02 00"
-        assert ordered(lines, "fault 1 reply_fault=none") == "ok"
-        assert ordered(lines, "set-input 1 2 on") == "ok"
-        assert asked(port.fileno(), read, 6) == "FF AA 00 0B 02 01"
-        assert ordered(lines, "notice 1") == "ok"
-        assert asked(port.fileno(), "", 2) == "EE DD"
