@@ -9,9 +9,6 @@ from typing import Any, NamedTuple
 
 from motorbus.families.feetech import wire
 
-Frame = tuple[int, bytes]
-"""Identifier and data of a CAN frame."""
-
 
 class Request(NamedTuple):
     """A FEETECH request: `kind` is ping, read, write, reg_write, sync_read, sync_write or action."""
@@ -65,36 +62,6 @@ class Case(NamedTuple):
             "data": request.data.hex(),
             "nodes": list(request.nodes),
             "stream": self.stream.hex(),
-        }
-
-
-class SdoRequest(NamedTuple):
-    """An upload, or a download of `data`."""
-
-    kind: str
-    node: int
-    index: int  # type: ignore[assignment]  # hides tuple.index, which nobody needs here
-    subindex: int
-    data: bytes = b""
-
-
-class SdoCase(NamedTuple):
-    """A request, the frames that come back for each frame that the client sends, and what was done to them."""
-
-    request: SdoRequest
-    steps: tuple[tuple[Frame, ...], ...]
-    change: str
-
-    def line(self) -> dict[str, Any]:
-        """As the decoder of python-canopen takes it."""
-        node = self.request
-        return {
-            "kind": node.kind,
-            "node": node.node,
-            "index": node.index,
-            "subindex": node.subindex,
-            "data": node.data.hex(),
-            "steps": [[[identifier, data.hex()] for identifier, data in step] for step in self.steps],
         }
 
 

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from random import Random
-from typing import Any, Final
+from typing import Final
 
 from motorbus.families.feetech import wire
-from motorbus.families.kst import sdo
-from tests.interop.differential.cases import Case, Request, SdoCase, SdoRequest
+from tests.interop.differential.cases import Case, Request
 from tests.interop.differential.judging import UNEXPLAINED
 from tests.interop.differential.outside import Decoder
-from tests.interop.differential.sdo_streams import NODE, packet
 
 SDK_LONGEST: Final = 250
 
@@ -59,37 +57,3 @@ def classes(decoder: Decoder, case: Case, sent: str) -> set[str]:
     if not sent and len(ours) > SDK_LONGEST:
         return {"frame-of-250"}
     return {UNEXPLAINED}
-
-
-def sdo_requests(seed: int, count: int) -> Iterator[SdoCase]:
-    """Uploads and downloads of any object, acknowledged; every tenth is not answered at all."""
-    random = Random(seed)
-    for _ in range(count):
-        index, subindex = random.randrange(0x10000), random.randrange(256)
-        data = random.randbytes(random.randrange(1, 5))
-        if random.random() < 0.5:
-            request = SdoRequest("upload", NODE, index, subindex)
-            frame = sdo.encode_upload_reply(NODE, index, subindex, data)
-        else:
-            request = SdoRequest("download", NODE, index, subindex, data)
-            frame = sdo.encode_download_reply(NODE, index, subindex)
-        silent = random.random() < 0.1
-        yield SdoCase(request, () if silent else (((frame.id, frame.data),),), "a request")
-
-
-def sdo_classes(case: SdoCase, sent: list[Any]) -> set[str]:
-    """Why these are not our frames; empty where they are."""
-    ours = packet(case.request)
-    first, *rest = ((identifier, bytes.fromhex(data)) for identifier, data in sent)
-    if first != (ours.id, ours.data):
-        return {UNEXPLAINED}
-    names = set()
-    if case.request.kind == "download":
-        names.add("length-stated")
-        plain = sdo.encode_download(NODE, case.request.index, case.request.subindex, case.request.data)
-        if (plain.id, plain.data[1:]) != (first[0], first[1][1:]):
-            return {UNEXPLAINED}
-    if rest:
-        abort = sdo.encode_abort(NODE, 0, 0, 0x0504_0000)
-        names.add("abort-of-silence" if not case.steps and rest == [(abort.id, abort.data)] else UNEXPLAINED)
-    return names

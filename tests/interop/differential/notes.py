@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from tests.interop.differential.outside import CANOPEN, FEETECH, NEW, OLD, RUST, Decoder
+from tests.interop.differential.outside import FEETECH, NEW, OLD, RUST, Decoder
 
 STREAMS: Final[dict[str, tuple[Decoder, ...]]] = {
     "more-than-the-answer": FEETECH,  # bytes behind an answer: one of two is not to this question
@@ -18,16 +18,6 @@ STREAMS: Final[dict[str, tuple[Decoder, ...]]] = {
     "all-or-none": (RUST,),  # each silent servo is reported, the others have values
     "counted-bytes": (NEW,),  # a packet is found by its contents, not its place
 }
-SDO: Final = {
-    "more-than-the-frame",  # two answers to one question: neither is believed
-    "first-frame-counts",  # an answer is known by kind, index, sub-index and length
-    "short-frame",  # an SDO frame has eight bytes (CiA 301)
-    "abort-of-another",  # an abort that names another object answers another request
-    "acknowledgement-of-another",  # index and sub-index of an acknowledgement are compared
-    "announced-size",  # a text must have the announced length
-}
 REQUESTS: Final[dict[str, tuple[Decoder, ...]]] = {
     "frame-of-250": (OLD, NEW),  # the length byte allows 259 bytes
-    "length-stated": (CANOPEN,),  # the manual has specifier 0x22, which states no length
-    "abort-of-silence": (CANOPEN,),  # after silence nothing is sent
 }

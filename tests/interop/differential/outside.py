@@ -10,8 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from tests.interop import canopen_peer
-from tests.interop.differential.cases import Case, Outcome, SdoCase
+from tests.interop.differential.cases import Case, Outcome
 from tests.interop.feetech.peer import NEW_SDK, OLD_SDK, PEERS, RUSTYPOT, PeerError
 
 AT_EASE: Final = 1.0
@@ -36,7 +35,6 @@ NEW: Final = Decoder(NEW_SDK.name, ("sdk_decoder.py", "new"), NEW_SDK.folders, _
 RUST: Final = Decoder(
     RUSTYPOT.name, ("rustypot_decoder.py",), RUSTYPOT.folders, _SDK_KINDS - {"reg_write", "action"}
 )
-CANOPEN: Final = Decoder("python-canopen", ("canopen_decoder.py",), (), frozenset({"upload", "download"}))
 FEETECH: Final = (OLD, NEW, RUST)
 
 
@@ -47,7 +45,7 @@ class Heard(NamedTuple):
     sent: Any
 
 
-def heard(decoder: Decoder, cases: Sequence[Case | SdoCase], **more: Any) -> list[Heard]:
+def heard(decoder: Decoder, cases: Sequence[Case], **more: Any) -> list[Heard]:
     """What it makes of each. Raises PeerError when the library is missing or its process fails."""
     lines = "".join(json.dumps({**case.line(), **more}) + "\n" for case in cases)
     script, *arguments = decoder.command
@@ -80,8 +78,6 @@ def heard_patiently(decoder: Decoder, cases: Sequence[Case], wanted: Sequence[bo
 
 
 def _environment(decoder: Decoder) -> Mapping[str, str]:
-    if decoder is CANOPEN:
-        return canopen_peer.environment()
     missing = [name for name in decoder.folders if not (PEERS / name).is_dir()]
     if missing:
         raise PeerError(

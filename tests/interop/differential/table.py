@@ -6,9 +6,9 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from tests.interop.differential import encoders, judging, ours, outside, sdo_judging, sdo_streams, streams
-from tests.interop.differential.cases import Case, Outcome, SdoCase
-from tests.interop.differential.outside import CANOPEN, FEETECH, RUST, Decoder
+from tests.interop.differential import encoders, judging, ours, outside, streams
+from tests.interop.differential.cases import Case, Outcome
+from tests.interop.differential.outside import RUST, Decoder
 
 SHOWN: Final = 5
 
@@ -38,20 +38,8 @@ def _names(decoder: Decoder, case: Case, made: Outcome, heard: outside.Heard) ->
     return judging.classes(decoder, case, made, heard.outcome) | encoders.classes(decoder, case, heard.sent)
 
 
-def sdo(cases: Sequence[SdoCase]) -> Found:
-    """These streams, through python-canopen and through ours."""
-    made = [ours.sdo_decoded(case) for case in cases]
-    heard = [one.outcome for one in outside.heard(CANOPEN, cases)]
-    names = [sdo_judging.classes(*each) for each in zip(cases, made, heard, strict=True)]
-    return _found(cases, made, heard, names)
-
-
 def requests(decoder: Decoder, seed: int, count: int) -> Found:
     """So many requests by lot: the bytes that they send and ours."""
-    if decoder is CANOPEN:
-        frames = list(encoders.sdo_requests(seed, count))
-        said = [one.sent for one in outside.heard(decoder, frames)]
-        return _sent(frames, [encoders.sdo_classes(*each) for each in zip(frames, said, strict=True)])
     cases = [case for case in encoders.requests(seed, count) if case.request.kind in decoder.kinds]
     sent = [one.sent for one in outside.heard(decoder, cases)]
     return _sent(cases, [encoders.classes(decoder, *each) for each in zip(cases, sent, strict=True)])
@@ -62,16 +50,8 @@ def usual(seed: int, count: int) -> list[Case]:
     return [*streams.systematic(streams.recorded()[:10]), *streams.recorded(), *streams.drawn(seed, count)]
 
 
-def usual_sdo(seed: int, count: int) -> list[SdoCase]:
-    """What was recorded, then so many by lot."""
-    return list(sdo_streams.drawn(seed, count))
-
-
-DECODERS: Final = (*FEETECH, CANOPEN)
-
-
 def _found(
-    cases: Sequence[Case | SdoCase],
+    cases: Sequence[Case],
     made: Sequence[Outcome],
     heard: Sequence[Outcome],
     names: Sequence[set[str]],
@@ -85,6 +65,6 @@ def _found(
     return Found(counts, unexplained, len(cases))
 
 
-def _sent(cases: Sequence[Case | SdoCase], names: Sequence[set[str]]) -> Found:
+def _sent(cases: Sequence[Case], names: Sequence[set[str]]) -> Found:
     nothing = [Outcome(None)] * len(cases)
     return _found(cases, nothing, nothing, names)
