@@ -23,7 +23,7 @@ from motorbus.core.request import Data
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Bench, Run
-from tests.support.processes import Simulated
+from tests.support.processes import LATENCY, Simulated
 
 LOOPING = """
 import sys, motorbus
@@ -226,7 +226,7 @@ def test_without_a_bus_real_ports_and_the_machine_file_are_stopped_and_the_other
         of_file, link, socket = (stack.enter_context(serving(name)) for name in ("file", "link", "tcp"))
         here(f'format = 1\n[bus.arm]\naddress = "{of_file.bus}"\n', tmp_path, monkeypatch)
         buses = [one.bus for one in (real, of_file, link, socket)]
-        holders = [stack.enter_context(program(WATCHING, bus)) for bus in buses]
+        holders = [stack.enter_context(program(WATCHING, bus + LATENCY)) for bus in buses]
         ran = run("estop", *["--all"] * everything, "--json")
         text = run("estop", *["--all"] * everything)
     stopped = {one["by"].split()[1] for one in ran.document["buses"] if one["acknowledged"]}
