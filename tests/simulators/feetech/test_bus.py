@@ -181,7 +181,6 @@ def test_an_eeprom_write_is_acknowledged_late_when_it_is_stored() -> None:
 def test_an_address_without_a_datum() -> None:
     for instruction in (WRITE, REG_WRITE):
         assert Host().say(packet(1, instruction, 42)) == ["FF FF 01 02 00 FC"]
-        assert Host(empty_write="silent").say(packet(1, instruction, 42)) == []
     host = Host()
     host.say(packet(1, REG_WRITE, 42))
     assert host.read(1, 64, 1) == 0
@@ -264,14 +263,6 @@ def test_sync_read_honours_each_return_delay() -> None:
 def test_sync_read_with_one_missing(switch: str, times: list[float]) -> None:
     host = Host((1, 3), sync_read_missing=switch)
     assert [at for at, _ in host.timed(packet(ALL, SYNC_READ, 56, 2, 1, 2, 3))] == times
-
-
-def test_sync_read_at_status_return_level_0_is_a_read_or_is_not() -> None:
-    for switch, told in (("answer", 2), ("silent", 1)):
-        host = Host((1, 2), sync_read_level=switch)
-        host.bus.nodes[2].memory["status_return_level"] = 0
-        assert len(host.say(packet(ALL, SYNC_READ, 56, 2, 1, 2))) == told
-        assert len(host.say(packet(2, READ, 56, 2))) == 1
 
 
 def test_sync_write_reaches_those_who_are_there() -> None:

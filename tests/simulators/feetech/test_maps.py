@@ -130,34 +130,6 @@ def test_0x06_brings_back_what_was_shipped(name: str) -> None:
     assert bytes(servo.memory.stored) == shipped
 
 
-@pytest.mark.parametrize(("name", "bit"), [("sts", 32), ("smbl", 32), ("scs", 64), ("scs2", 64), ("hls", 32)])
-def test_the_phase_of_another_board_may_cost_the_servo_its_voltage(name: str, bit: int) -> None:
-    for switch, alarm in (("harmless", 0), ("blind", 1)):
-        host = host_of(name, wrong_bridge=switch)
-        shipped = host.read(1, 18, 1)
-        host.write(1, 18, shipped ^ bit)
-        assert (host.read(1, 65, 1), host.read(1, 62, 1) == 0) == (alarm, bool(alarm))
-        host.write(1, 18, shipped)
-        assert host.read(1, 65, 1) == 0
-
-
-def test_a_servo_that_is_blind_for_its_phase_stays_so_through_a_factory_restore() -> None:
-    """As users found (iotdesignshop/Feetech-tuna#2); its own phase, written by the vendor's tool, brought it back."""
-    host = host_of("sts", wrong_bridge="blind")
-    servo = host.bus.nodes[1]
-    shipped = host.read(1, 18, 1)
-    host.write(1, LOCK["sts"], 0)
-    host.write(1, 13, 60)
-    host.write(1, 18, shipped ^ 32)
-    host.wait(0.1).say(packet(1, 0x06))
-    host.wait(2.0)
-    assert host.read(1, 13, 1) == 70
-    servo.power_cycle()
-    assert (host.read(1, 18, 1), host.read(1, 62, 1), host.read(1, 65, 1)) == (shipped ^ 32, 0, 1)
-    host.write(1, 18, shipped)
-    assert (host.read(1, 62, 1), host.read(1, 65, 1)) == (74, 0)
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_whatever_is_written_and_done_to_it_a_mixed_bus_goes_on(seed: int) -> None:
     dice = random.Random(seed)

@@ -222,27 +222,6 @@ def test_after_it_a_torque_off_is_obeyed_and_a_goal_with_a_fifth_of_the_speed() 
     assert not servo.motion.moving(host.now)
 
 
-def test_by_duty_a_motor_that_runs_free_trips_as_well() -> None:
-    for switch, tripped in (("duty", True), ("torque", False)):
-        host = Host(overload_of=switch)
-        host.write(1, 33, 1)
-        host.write(1, TORQUE, 1)
-        host.write(1, 46, *word(3400))
-        # 80 % of 3400 are passed after 2720/25400 s
-        host.wait(2720 / 25_400 + 1.9999)
-        assert not host.bus.nodes[1].tripped
-        host.wait(0.001)
-        assert host.bus.nodes[1].tripped is tripped
-
-
-def test_by_duty_a_way_that_is_short_enough_does_not() -> None:
-    host = Host(overload_of="duty", position=0)
-    for goal in (4000, 0, 4000, 0):
-        host.write(1, POSITION, *word(goal))
-        host.wait(1.5)
-    assert not host.bus.nodes[1].tripped
-
-
 def test_over_current_by_hand() -> None:
     # more than 250 units, 1.625 A, for 2 s; 0.6 of 3.25 A are 1.95 A
     host, servo = holding(0.6)

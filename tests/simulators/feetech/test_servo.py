@@ -186,13 +186,12 @@ def test_reg_write_waits_for_action() -> None:
     assert (host.read(1, 64, 1), host.read(1, GOAL), host.read(1, TORQUE, 1)) == (0, 1000, 1)
 
 
-@pytest.mark.parametrize(("switch", "goal"), [("replace", 2000), ("refuse", 1000)])
-def test_a_second_reg_write(switch: str, goal: int) -> None:
-    host = Host(reg_write_again=switch)
+def test_a_second_reg_write_replaces_the_first() -> None:
+    host = Host()
     for place in (1000, 2000):
         assert host.say(packet(1, REG_WRITE, GOAL, *word(place))) == ["FF FF 01 02 00 FC"]
     host.say(packet(1, ACTION))
-    assert host.read(1, GOAL) == goal
+    assert host.read(1, GOAL) == 2000
 
 
 def test_a_power_cycle_forgets_the_reg_write() -> None:

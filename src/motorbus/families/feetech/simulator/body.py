@@ -55,7 +55,7 @@ class Body(ABC):
         flash = Flash(layout.factory, clock=now, time=switches.store_time, torn=switches.torn)
         self.model = model
         self.switches = switches
-        self.memory = Memory(layout, flash, lock_drops=switches.lock_drops)
+        self.memory = Memory(layout, flash)
         self.motion = rest(now(), position)
         self.push: float | None = None
         self.plugged = True
@@ -246,7 +246,7 @@ class Body(ABC):
             calm = (
                 not self._given
                 or (not motion.phases and not motion.cruise)
-                or self.protection.lets_run(motion, drive)
+                or self.protection.lets_run(drive)
             )
         self.protection.changed(at, None if calm else loads(motion, push, world, self._given, drive, at))
         self._tell()

@@ -91,7 +91,7 @@ class FeetechBus:
         self._by_second: dict[int, list[Servo]] = {}
         self._random = Random(self.switches.seed)
         self._jitter = self.switches.reply_jitter
-        self._read_by_map = self.switches.sync_read == "by_map" and self.switches.sync_read_level != "silent"
+        self._read_by_map = self.switches.sync_read == "by_map"
         self._sight = Sight()
         numbers = list(ids)
         kinds = [model] * len(numbers) if isinstance(model, Model) else list(model)
@@ -282,8 +282,6 @@ class FeetechBus:
         if self._read_by_map:
             return servo.model.control.sync_read
         wish = self.switches.sync_read
-        if self.switches.sync_read_level == "silent" and servo.memory["status_return_level"] == 0:
-            return False
         return servo.model.control.sync_read if wish == "by_map" else wish == "yes"
 
     def _in_turn(self, speaking: list[tuple[Servo, Answer]], at: float) -> None:

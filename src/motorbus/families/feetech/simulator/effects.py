@@ -57,9 +57,8 @@ def write(servo: Servo, address: int, data: bytes, at: float) -> float:
 
 
 def reg_write(servo: Servo, address: int, data: bytes) -> None:
-    """Keep a write for `action`. A power cycle forgets it."""
-    if servo.pending is None or servo.switches.reg_write_again == "replace":
-        servo.pending = address, data
+    """Keep a write for `action`. A second one replaces the first; a power cycle forgets it."""
+    servo.pending = address, data
 
 
 def action(servo: Servo, at: float) -> float:
@@ -132,10 +131,6 @@ def clear_turns(servo: Servo, at: float) -> None:
 def restore_factory(servo: Servo, at: float) -> None:
     """0x06: as shipped, offset 0, the id kept (servolab, STS3215 firmware 3.10); then it starts again."""
     kept = {"id", "second_id"} if servo.switches.restore_id == "keep" else set()
-    if servo.switches.wrong_bridge == "blind":
-        kept.add(
-            "phase"
-        )  # or it would heal what no factory restore has healed (iotdesignshop/Feetech-tuna#2)
     servo.memory.restore_factory(frozenset(kept), servo.switches.restore_time)
     servo.stores()
     servo.power_up(at, cut=False)

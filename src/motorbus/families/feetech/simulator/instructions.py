@@ -64,7 +64,7 @@ def _reg_write(servo: Servo, parameters: bytes, at: float) -> Answer | None:
 
 
 def _empty(servo: Servo, parameters: bytes) -> Answer | None:
-    return Answer() if parameters and servo.switches.empty_write == "ack" else None
+    return Answer() if parameters else None
 
 
 def _action(servo: Servo, parameters: bytes, at: float) -> Answer | None:

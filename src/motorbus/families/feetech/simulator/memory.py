@@ -115,17 +115,15 @@ class Memory:
 
     `flash`        the cells of the EEPROM; without one of them storing takes no time
     `settled`      nothing but feedback has changed since whoever works with the registers has set this
-    `lock_drops`   closing the lock drops what is not committed yet; else it is finished, since it was accepted
     """
 
     # With "__dict__", which costs nothing until then, a test may put a method of its own in.
-    __slots__ = ("__dict__", "flash", "layout", "live", "lock_drops", "settled")
+    __slots__ = ("__dict__", "flash", "layout", "live", "settled")
 
-    def __init__(self, layout: Layout, flash: Flash | None = None, *, lock_drops: bool = False) -> None:
+    def __init__(self, layout: Layout, flash: Flash | None = None) -> None:
         self.layout = layout
         self.live = bytearray(layout.factory)
         self.flash = flash or Flash(layout.factory)
-        self.lock_drops = lock_drops
         self.settled = False
 
     @property
@@ -192,8 +190,6 @@ class Memory:
         stored = bool(span.cells) and not locked
         if stored:
             self.flash.program([(cell, live[cell]) for cell in span.cells])
-        if self.lock_drops:
-            self._close(span.lives.names)
         return span.keeps if stored else span.lives
 
     def _write_fitting(self, address: int, data: bytes, locked: bool) -> Written:
@@ -209,14 +205,7 @@ class Memory:
                 cells += changed
         if cells:
             self.flash.program(cells)
-        if self.lock_drops:
-            self._close(frozenset(names))
         return Written(frozenset(names), bool(cells))
-
-    def _close(self, names: frozenset[str]) -> None:
-        """A lock that was closed by a write of these drops what is not committed yet."""
-        if "lock" in names and self["lock"]:
-            self.flash.drop()
 
     def store(self, name: str) -> None:
         """Make the live value of a row survive a power cycle."""

@@ -33,7 +33,6 @@ class Personality:
     `heeds_time`      whether the time of the way counts when the velocity is 0
     `calibrates`      whether 0x0B is known to be obeyed
     `turns_cleared`   whether every model obeys 0x0A; else only those whose name ends in BL, if the map knows it at all
-    `bridge_bit`      phase bit that tells how the supply is sampled, which is a property of the board
     `reversed_by`     phase bits that reverse drive and feedback; where both are one bit, it reverses the two together
     """
 
@@ -48,7 +47,6 @@ class Personality:
     calibrates: bool = False
     turns_cleared: bool = False
     reversed_by: tuple[int, int] | None = None
-    bridge_bit: int | None = None
 
 
 _STS: Final = Drive(top_speed=3400.0, idle_current=0.15, stall_current=3.25)
@@ -91,7 +89,6 @@ PERSONALITIES: Final[Mapping[str, Personality]] = MappingProxyType(
             goal_enables=True,  # feetech-cli, measured on STS3215
             calibrates=True,  # 0x0B is in the dispatcher of firmware 3.10 (kuterd/feetech-fw-util)
             reversed_by=(0, 7),
-            bridge_bit=5,
         ),
         "smbl": Personality(
             firmware=(2, 45),
@@ -101,7 +98,6 @@ PERSONALITIES: Final[Mapping[str, Personality]] = MappingProxyType(
             shipped={**_SMS, **_LEROBOT, "phase": 12, "torque_limit": 1000},
             least_delay=_LEAST_SMS,
             reversed_by=(0, 7),
-            bridge_bit=5,
         ),
         "smcl": Personality(
             firmware=(1, 10), voltage=12.0, drive=_STS, shipped={**_OLD_SMS, "phase": 0}, least_delay=_LEAST_SMS
@@ -113,7 +109,6 @@ PERSONALITIES: Final[Mapping[str, Personality]] = MappingProxyType(
             shipped={"baud_rate": 0},  # 1000000 or 500000 by model
             heeds_time=True,
             reversed_by=(0, 0),
-            bridge_bit=6,
         ),
         "scs2": Personality(
             firmware=(3, 25),
@@ -122,7 +117,6 @@ PERSONALITIES: Final[Mapping[str, Personality]] = MappingProxyType(
             shipped={**_LIKE_SCS, "baud_rate": 0},
             heeds_time=True,  # taken from SCS
             reversed_by=(0, 0),
-            bridge_bit=6,
         ),
         "hls": Personality(
             firmware=(3, 43),  # met on HLS3955 and HLS3915
@@ -136,7 +130,6 @@ PERSONALITIES: Final[Mapping[str, Personality]] = MappingProxyType(
             turns_cleared=True,  # FTServo_Python, hls/reset.py
             # Bit 0 is ignored from firmware 3.42 on, so bit 7 is taken to reverse drive and feedback together.
             reversed_by=(7, 7),
-            bridge_bit=5,
         ),
     }
 )  # fmt: skip

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Iterator
 from math import inf
 from typing import Final
 
-from motorbus.core.plant import Drive, Motion
+from motorbus.core.plant import Drive
 from motorbus.families.feetech.simulator import thermal
 from motorbus.families.feetech.simulator.effort import Load
 from motorbus.families.feetech.simulator.memory import Memory
@@ -99,7 +99,7 @@ class Protection:
     __slots__ = (
         "__dict__",  # costs nothing until a test puts a method of its own in
         *("error", "next", "_memory", "_switches", "_ambient", "_degrees", "_start", "_loads", "_quiet"),
-        *("_by_duty", "_watches", "_has"),
+        *("_watches", "_has"),
     )
 
     def __init__(self, memory: Memory, switches: Switches) -> None:
@@ -112,7 +112,6 @@ class Protection:
         self._start = 0.0
         self._loads: list[Load] = []
         self._quiet = True
-        self._by_duty = switches.overload_of == "duty"
         table = memory.layout.table
         self._watches = {OVERLOAD: Watch(), CURRENT: Watch()}
         self._has = {
@@ -189,14 +188,11 @@ class Protection:
         if self._heat(at) <= at + _SOON:
             self._tell(HEAT, not self.error & HEAT)
 
-    def lets_run(self, motion: Motion, drive: Drive) -> bool:
+    def lets_run(self, drive: Drive) -> bool:
         """Whether a motor that moves so without a burden could trip over nothing."""
-        if self._has[CURRENT] and 0 < self._memory["protection_current"] < drive.idle_current / AMPERE:
-            return False
-        if not self._by_duty or not self._has[OVERLOAD]:
-            return True
-        limit = self._number("overload_torque") * drive.top_speed
-        return not limit or motion.peak <= limit
+        return not (
+            self._has[CURRENT] and 0 < self._memory["protection_current"] < drive.idle_current / AMPERE
+        )
 
     def _roll(self, at: float) -> None:
         """Bring everything that has a history to this moment."""
@@ -224,8 +220,6 @@ class Protection:
         loads = [load._replace(begin=max(load.begin, self._start)) for load in self._loads]
         if bit == CURRENT:
             return list(above(loads, lambda load: (load.current, 0.0), limit))
-        if self._by_duty:
-            return list(above(self._loads, lambda load: (load.duty, load.slope), min(limit, 1.0)))
         return list(above(loads, lambda load: (load.torque, 0.0), limit))
 
     def _heat(self, at: float) -> float:

@@ -47,7 +47,7 @@ class Servo(Body):
 
     __slots__ = (
         *("lives", "pending", "zero", "facing", "fold", "deaf_until", "renamed"),
-        *("_registers", "_alarm", "_may_be_blind"),
+        *("_registers", "_alarm"),
     )
 
     def __init__(
@@ -70,7 +70,6 @@ class Servo(Body):
         self.deaf_until = -inf
         self.renamed = renamed
         self._alarm = 0
-        self._may_be_blind = switches.wrong_bridge == "blind"
         # What the second id ships as is not known: at first it is the main id, so that it changes nothing.
         for name in ("id", "second_id"):
             if name in model.table:
@@ -258,8 +257,6 @@ class Servo(Body):
     @property
     def told_voltage(self) -> int:
         """What register 62 says of its supply, in 0.1 V."""
-        if self._may_be_blind and self.asked.blind:
-            return 0
         return round(self.voltage * 10) if self._sag else self._told_voltage
 
     @property
@@ -270,8 +267,7 @@ class Servo(Body):
     def _error(self, asked: Asked) -> int:
         least, most = asked.volts
         bits = self._alarm | self.protection.error
-        plain = not self._sag and not self._may_be_blind  # most are like that
-        told = self._told_voltage if plain else self.told_voltage
+        told = self.told_voltage if self._sag else self._told_voltage
         return bits if least <= told <= most else bits | _VOLTAGE
 
     def speaks(self) -> tuple[int, int, float]:

@@ -44,7 +44,6 @@ class Asked(NamedTuple):
     `mode`      what it heeds; None for a number that no source explains
     `facing`    -1 when its feedback counts the other way than its shaft turns, else 1 (bit 7 of phase on STS)
     `fold`      counts of the encoder for one of its positions: its angular resolution (STS3215 memory table V3.6)
-    `blind`     its phase register tells of another board than it has, as after copying that of another servo
     `unit`      counts/s for one unit of its velocity registers
     `limit`     the share of the stall torque that they allow
     `settings`  all of that for its motor; what is not in registers is left as it is
@@ -58,7 +57,6 @@ class Asked(NamedTuple):
     mode: Mode | None
     facing: int
     fold: int
-    blind: bool
     unit: int
     limit: float
     settings: Settings
@@ -138,9 +136,9 @@ class Registers:
             fold=fold,
         )
         limit, volts = self._limit(mode), (memory["min_voltage"], memory["max_voltage"])
-        blind, rate, delay = self._blind(), self._rate(), self._delay()
+        rate, delay = self._rate(), self._delay()
         on, locked = memory["torque_enable"] == 1, memory["lock"] != 0
-        return Asked(mode, facing, fold, blind, unit, limit, settings, rate, delay, volts, on, locked)
+        return Asked(mode, facing, fold, unit, limit, settings, rate, delay, volts, on, locked)
 
     def _rate(self) -> int | None:
         code, known = self._memory["baud_rate"], BAUD_CODES_OF[self._model.table.name]
@@ -176,11 +174,6 @@ class Registers:
         if "angular_resolution" not in self._model.table or self._switches.angular_resolution == "ignore":
             return 1
         return self._memory["angular_resolution"] or 1
-
-    def _blind(self) -> bool:
-        bit, model = self._model.personality.bridge_bit, self._model
-        shipped = model.defaults.get("phase", model.table["phase"].default) or 0
-        return bit is not None and bool((self._memory["phase"] ^ shipped) >> bit & 1)
 
     def _limit(self, mode: Mode | None) -> float:
         """Torque limit, and where there is one the current cap.

@@ -25,15 +25,6 @@ class Switches(FaultSwitches):
         "drop",
         source="not documented; no error code for it exists",
     )
-    wrong_bridge: str = switch(
-        "harmless",
-        "a phase register copied from a servo with another board changes nothing more, or makes it read 0 V until its"
-        " own is written again; a factory restore then leaves that register alone",
-        "harmless",
-        "blind",
-        source="iotdesignshop/Feetech-tuna#2: 0.0 V, a lasting voltage alarm, no help from a factory restore, but from"
-        " the vendor's program; that this register is the cause is a guess",
-    )
     restore_id: str = switch(
         "keep",
         "a factory restore keeps the id or sets it to 1",

@@ -61,13 +61,6 @@ class BusSwitches:
         "no",
         source="lerobot and rustypot: an SCS0009 does not; of other SCS servos nobody has said",
     )
-    sync_read_level: str = switch(
-        "answer",
-        "at status return level 0 a servo answers SYNC READ, which is a read, or only PING and READ",
-        "answer",
-        "silent",
-        source="not documented: manual V1.01, which says PING and READ, knows no SYNC READ",
-    )
     sync_read_missing: str = switch(
         "wait",
         "when a listed servo is missing the next ones leave its time free, close up, or stay silent",
@@ -97,20 +90,6 @@ class BusSwitches:
     )
     seed: int = switch(
         0, "where chance begins: the same seed and the same traffic give the same bytes", source="none needed"
-    )
-    reg_write_again: str = switch(
-        "replace",
-        "a second REG WRITE before ACTION replaces the first or is dropped",
-        "replace",
-        "refuse",
-        source="not documented",
-    )
-    empty_write: str = switch(
-        "ack",
-        "a WRITE of an address without a datum is acknowledged or ignored",
-        "ack",
-        "silent",
-        source="manual V1.01, 1.3 table (one parameter) against 1.3.3 (at least two)",
     )
     id_ack: str = switch(
         "old",

@@ -31,11 +31,6 @@ class FaultSwitches(MotionSwitches):
         "answer",
         source="feetech-cli: a servo that comes back from flash work answers what was buffered in a burst",
     )
-    lock_drops: bool = switch(
-        False,
-        "closing the lock drops what is not committed yet; else it is finished, having been accepted",
-        source="not documented",
-    )
     torn: str = switch(
         "erased",
         "what an EEPROM cell holds whose commit was cut by the supply: its old value, the new one, or 255",
@@ -57,14 +52,6 @@ class FaultSwitches(MotionSwitches):
         "deliver",
         "drop",
         source="serial ports deliver it unless a program asks for marks; some adapters drop it",
-    )
-    overload_of: str = switch(
-        "torque",
-        "what the overload torque bounds: what is left of the duty for torque, or all of the duty that register 60"
-        " tells; then a motor that runs free at more than 80 % of its top speed trips as well",
-        "torque",
-        "duty",
-        source="STS3215 memory table V3.6 calls it a torque; that load is the duty was measured (STS_servos#5)",
     )
     overload_clears: str = switch(
         "power_cycle",
