@@ -75,16 +75,16 @@ def carried_out(
     if world == _NOTHING and wanted.torque >= 1:
         return Carried(planned)  # most are like that
     if wanted.torque < FEEBLE:
-        return _blocked(_let_go(planned, wanted, world, at, drive, switches), wanted, world, switches)
+        return _blocked(_let_go(planned, wanted, world, at, drive, switches), wanted, world)
     if wanted.mode is Mode.PWM and world.torque:
-        return _blocked(_driven(planned, wanted, world, at, drive, switches), wanted, world, switches)
+        return _blocked(_driven(planned, wanted, world, at, drive, switches), wanted, world)
     if wanted.mode is Mode.CURRENT:
-        return _blocked(Carried(planned), wanted, world, switches)
+        return _blocked(Carried(planned), wanted, world)
     way = planned.cruise or planned.goal - planned.position(at)
     if not way:
         held = abs(world.torque) <= wanted.torque
         carried = Carried(planned) if held else _let_go(planned, wanted, world, at, drive, switches)
-        return _blocked(carried, wanted, world, switches)
+        return _blocked(carried, wanted, world)
     spare = wanted.torque - world.torque * copysign(1.0, way)
     if spare < FEEBLE:
         carried = _let_go(planned, wanted, world, at, drive, switches, copysign(wanted.torque, way))
@@ -92,7 +92,7 @@ def carried_out(
         carried = Carried(plan(replace(drive, top_speed=spare * drive.top_speed)))
     else:
         carried = Carried(planned)
-    return _blocked(carried, wanted, world, switches)
+    return _blocked(carried, wanted, world)
 
 
 def loads(
@@ -155,7 +155,7 @@ def _driven(
     return Carried(motion, duty if spare * duty <= 0 else None)
 
 
-def _blocked(carried: Carried, wanted: Settings, world: World, switches: Switches) -> Carried:
+def _blocked(carried: Carried, wanted: Settings, world: World) -> Carried:
     """The same, ended by an obstacle if there is one on the way."""
     if world.blocked is None:
         return carried
@@ -170,18 +170,16 @@ def _blocked(carried: Carried, wanted: Settings, world: World, switches: Switche
         # So near that the clock does not show the way: it is there already, or this would happen again and again.
         met = motion if motion.done_at > motion.start else rest(motion.start, motion.goal)
         return Carried(met, None, met.done_at)
-    return Carried(motion, way * _strength(wanted, abs(carried.motion.goal - motion.goal), switches))
+    return Carried(motion, way * _strength(wanted))
 
 
-def _strength(wanted: Settings, missing: float, switches: Switches) -> float:
-    """The share of the stall torque with which it presses, so many counts off its goal."""
+def _strength(wanted: Settings) -> float:
+    """The share of the stall torque with which it presses."""
     if wanted.mode is Mode.PWM:
         return min(wanted.torque, abs(wanted.duty))
     if wanted.mode is Mode.CURRENT:
         return min(wanted.torque, abs(wanted.current))
-    if wanted.mode is Mode.VELOCITY or not switches.droop:
-        return wanted.torque
-    return min(wanted.torque, missing / switches.droop)
+    return wanted.torque
 
 
 def _fastest(motion: Motion) -> float:

@@ -100,8 +100,7 @@ def plan(settings: Settings, motion: Motion, at: float, drive: Drive, switches: 
     if settings.torque < FEEBLE or mode is None:
         return rest(at, encoder)  # limp: a gear of 1:345 holds by its friction
     if mode is Mode.POSITION:
-        place = _rests(settings, encoder, _place(settings, encoder, switches), switches)
-        return _go(settings, encoder, velocity, place, at, drive)
+        return _go(settings, encoder, velocity, _place(settings, encoder, switches), at, drive)
     if mode is Mode.STEP:
         place = motion.goal if motion.moving(at) and not motion.cruise else encoder
         return _go(settings, encoder, velocity, place, at, drive)
@@ -157,17 +156,6 @@ def _place(settings: Settings, encoder: float, switches: Switches) -> float:
         return settings.zero + goal * settings.fold
     present = reading(encoder, settings.zero, settings.told, settings.turn, settings.fold)
     return round(encoder) + (goal - present) * settings.fold
-
-
-def _rests(settings: Settings, encoder: float, place: float, switches: Switches) -> float:
-    """Where it comes to rest: short of the goal as far as gain and play let the outside push it.
-
-    Without an outside torque it stops at the near side of the play, and within the play it does not stir.
-    """
-    play = switches.backlash / 2
-    if settings.burden:
-        return place - switches.droop * settings.burden - copysign(play, settings.burden)
-    return min(max(encoder, place - play), place + play) if play else place
 
 
 def _go(settings: Settings, encoder: float, velocity: float, place: float, at: float, drive: Drive) -> Motion:

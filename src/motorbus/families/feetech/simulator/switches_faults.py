@@ -1,4 +1,4 @@
-"""What nobody has settled about how a FEETECH servo fails: cut supplies, colliding replies, overload, heat, play.
+"""What nobody has settled about how a FEETECH servo fails: cut supplies, colliding replies, overload and heat.
 
 These are the third part of `switches.Switches`, which is the one that is used. Where a figure was measured, by users
 mostly, the source gives it; the default is then still none of it, so that a simulated shaft is exact until somebody
@@ -93,14 +93,4 @@ class FaultSwitches(MotionSwitches):
         0.2,
         "how far that differs from servo to servo at most, up or down, by chance (V); the same with the same `seed`",
         source="assumed; that not all vanish at once was seen (orcahand/orca_core#89)",
-    )
-    backlash: float = switch(
-        0.0,
-        "counts of play in the gear: it comes to rest anywhere within it, at the side from which it comes or is pushed",
-        source="SO-ARM100#134: about 1° (11 counts); the vendor says 0.5° or less",
-    )
-    droop: float = switch(
-        0.0,
-        "counts that it rests off its goal when the outside takes all of its stall torque, and less for less",
-        source="SO-ARM100#134: 20 to 30 counts with 1.5 kg at 10 cm, half of the stall torque: 50",
     )
