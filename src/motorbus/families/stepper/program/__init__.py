@@ -1,4 +1,4 @@
-"""A project as a program: a file that can be read, checked, timed, planned and turned into frames, and back.
+"""A project as a program: a file that can be read, checked, timed, planned and turned into frames.
 
     program = Program.load("pick.toml")
     print(program.estimate())          # at least 41.6 s + 6 waits
@@ -6,12 +6,12 @@
         print(finding)
 
 Nothing here talks to a controller. The same numbers go three ways: the file that people write, the 220 bytes that a
-controller stores, and the command frames that carry them there; each comes back from each.
+controller stores, and the command frames that carry them there. File and bytes come back from each other.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from types import MappingProxyType
@@ -70,11 +70,6 @@ class Program:
         found = dumps.from_dump(data, order=order, strict=strict)
         project = replace(found.project, number=found.project.number or found.asked)
         return cls(project=project, name=name, raw=found.image)
-
-    @classmethod
-    def from_frames(cls, requests: Iterable[bytes], *, name: str = "") -> Program:
-        """From the requests that write it. Raises RequestError for one that writes no parameter."""
-        return cls(project=dumps.from_frames(requests), name=name)
 
     # -- what it becomes ---------------------------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""Raw dumps as files hold them, and lists of command frames, taken in and given out.
+"""Raw dumps as files hold them, taken in, and the command frames of a project, given out.
 
 A dump file is the 226 bytes that a controller sent, or the 220 of the image alone, as they are or in hexadecimal. There
 is no checksum, so what can be checked is: that the project is said twice alike, and that no number is one that no
@@ -10,7 +10,7 @@ behind, no geometry after clearing. The lint tells that.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 from motorbus.errors import RequestError
@@ -24,7 +24,6 @@ from motorbus.families.stepper.table import (
     Project,
     check,
     decode_image,
-    edited,
     edits,
     refusal,
     refusals,
@@ -33,7 +32,6 @@ from motorbus.families.stepper.table import (
 _HEX: Final = re.compile(rb"[\s0-9A-Fa-f]+")
 _HELD: Final = {**HELD, "total_steps": range(STEPS + 1)}
 """0 steps: it was cleared, and has not been selected since."""
-_AFTER: Final = frozenset({"save_project"})
 
 
 class Raw(NamedTuple):
@@ -96,24 +94,6 @@ def frames(project: Project, *, motor: int = wire.MOTOR, save: bool = True) -> l
         check(edit.command, edit.values, expert=True)
     found = [edit.frame(motor) for edit in edits(project)]
     return [*found, wire.encode("save_project", project=project.number)] if save else found
-
-
-def from_frames(requests: Iterable[bytes]) -> Project:
-    """The project that these requests write. Raises RequestError for a frame that is none, or writes nothing."""
-    project = Project()
-    for number, data in enumerate(requests, start=1):
-        request = wire.decode_request(data)
-        if request is None:
-            raise RequestError(
-                f"frame {number} is no request", sent=data, expected="11 bytes with their checksum"
-            )
-        name = request.command.name
-        if name in _AFTER:
-            continue
-        if not request.command.name.startswith(("set_", "select_")) or name == "set_output":
-            raise RequestError(f"frame {number}, {name}, writes no parameter", sent=data)
-        project = edited(project, name, request.values)
-    return project
 
 
 def _binary(data: bytes) -> bytes:
