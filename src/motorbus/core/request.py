@@ -138,7 +138,7 @@ class Step(Generic[T_co]):
 
 @dataclass(slots=True, eq=False, repr=False)
 class Request(Step[T_co]):
-    """One request and its expected replies. It is immutable, except for `prepared`, and may be sent again."""
+    """One request and its expected replies. It is immutable, except for `attempt`, and may be sent again."""
 
     wire: Final[Data]
     expected: Final[tuple[Expected, ...] | Any_] = ()
@@ -164,7 +164,7 @@ class Request(Step[T_co]):
     that a second copy of the last reply is not taken for the next one."""
     decode_exact: ExactDecoder[T_co] | None = None
     """Fast path of `decode` for a request that is kept: decodes the bytes of all expected replies at once."""
-    prepared: Any = field(default=None, init=False)  # state that a bus keeps for it
+    attempt: Any = field(default=None, init=False)  # that a bus keeps for a request with `decode_exact`
 
     group: ClassVar[Any] = None
     prechecked: ClassVar[bool] = False
@@ -177,7 +177,7 @@ class Request(Step[T_co]):
 
     def with_decoder(self, decode: Callable[[Response], T]) -> Request[T]:
         """The same request with another `decode`, without `alternate` and `decode_exact`."""
-        own = ("wire", "expected", "decode", "alternate", "decode_exact", "prepared")
+        own = ("wire", "expected", "decode", "alternate", "decode_exact", "attempt")
         rest = [name for name in Request.__slots__ if name not in own]
         return Request(self.wire, self.expected, decode, **{name: getattr(self, name) for name in rest})
 
@@ -232,7 +232,7 @@ class SetpointWrite(Request[None]):
     deferred = None  # type: ignore[misc]
     alternate = None
     decode_exact = None
-    prepared = None
+    attempt = None
 
     def __init__(self, wire: bytes, group: SetpointGroup, raws: Sequence[int]) -> None:
         self.wire = wire  # type: ignore[misc]

@@ -8,12 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from contextlib import suppress
-from functools import partial
 from threading import Event, Thread
 from typing import Any, Final
 
-from motorbus.bus.background import BackgroundTask
-from motorbus.core.steps import Sleep, catch
+from motorbus.bus.running import run_here
 from motorbus.errors import MotorbusError
 from motorbus.motion.body import Body
 from motorbus.motion.leaving import given_up, goes_on, moves, stopped_going_on
@@ -41,14 +39,10 @@ class Watchdog:
         self._posts = {name: _Post(lease.losses - lost) for name in body.buses}
 
     def start(self) -> None:
-        """Watch each bus: in a thread, in virtual time as a background task of the bus."""
+        """Watch each bus in a thread. In virtual time, which only the program itself moves, no bus is watched."""
         self._lease.watchers.append(self._wake)
         for name, bus in self._body.buses.items():
-            post = self._posts[name]
-            if bus.link.virtual:
-                post.along = BackgroundTask(bus, partial(self._watching, name))
-                post.along.along()
-            else:
+            if not bus.link.virtual:
                 Thread(target=self._watch, args=(name,), name=f"motorbus lease {name}", daemon=True).start()
 
     def end(self) -> None:
@@ -57,9 +51,6 @@ class Watchdog:
         if self._wake in self._lease.watchers:
             self._lease.watchers.remove(self._wake)
         self._wake()
-        for post in self._posts.values():
-            if post.along is not None:
-                post.along.drop()
 
     def busy(self, bus: str) -> bool:
         """Whether the lease was lost and the stop has not been sent on this bus yet."""
@@ -69,8 +60,6 @@ class Watchdog:
     def _wake(self) -> None:
         for post in self._posts.values():
             post.woken.set()
-            if post.along is not None:
-                post.along.hurry()
 
     # -- when ----------------------------------------------------------------------------------------------------------
 
@@ -97,12 +86,6 @@ class Watchdog:
 
     # -- what ----------------------------------------------------------------------------------------------------------
 
-    async def _watching(self, bus: str) -> None:
-        while not self._over.is_set():
-            if self._late(bus):
-                await self._stopping(bus)
-            await catch(Sleep(self._left(bus)))
-
     def _watch(self, bus: str) -> None:
         woken = self._posts[bus].woken
         while not self._over.is_set():
@@ -111,7 +94,7 @@ class Watchdog:
             try:
                 if self._late(bus):
                     there = self._body.buses[bus]
-                    BackgroundTask(there, partial(self._stopping, bus)).carried()
+                    run_here(there, self._stopping(bus))
                 left = self._left(bus)
             except Exception as error:  # the bus cannot be used: try again later
                 with suppress(Exception):  # this thread must not end
@@ -165,7 +148,6 @@ class _Post:
         self.failed: frozenset[str] = frozenset()
         self.again = 0.0
         self.woken = Event()
-        self.along: BackgroundTask[None] | None = None
 
     def take(self, loss: int, failed: Iterable[str], again: float) -> None:
         """The stop was sent."""
