@@ -129,17 +129,19 @@ async def _finish(calls: Iterable[Call]) -> None:
     calls = list(calls)
     try:
         while going := [call.ended for call in calls if not call.ended.done()]:
+            error: BaseException | None = None
             try:
                 await asyncio.wait(going, return_when=asyncio.FIRST_COMPLETED)
-                for call in calls:
-                    if call.ended.done() and len(calls) > 1 and (error := call.tree.foreign_error()):
-                        raise error
-            except GeneratorExit:
-                raise
-            except BaseException as error:
+            except asyncio.CancelledError as cancellation:
+                error = cancellation
+            else:
+                if len(calls) > 1:
+                    ended = [call for call in calls if call.ended in going and call.ended.done()]
+                    error = next(filter(None, (call.tree.foreign_error() for call in ended)), None)
+            if error is not None:
                 for call in calls:
                     call.ask(error)
-    except GeneratorExit:  # the coroutine was closed: nothing is sent any more
+    except BaseException:  # the coroutine was closed: nothing is sent any more
         for call in calls:
             call.ask(None)
         raise
