@@ -361,7 +361,6 @@ class SerialModel(Model):
             instruction(node, 2, bytes([mark, count])),
             [(node, node, 6 + count)],
             lambda replies: value_of(replies[0]),
-            alternate=lambda: self._read(node, 5 - count, mark, priority),
             priority=priority,
             repeatable=True,
         )

@@ -72,7 +72,7 @@ def set_rate(bus: BaseBus, rate: int) -> None:
 
 
 class Queue:
-    """Requests that wait on a bus, sent only by `turn`. `outcomes` are the value or error of each, None while it waits."""
+    """Requests that wait on a bus, sent only by `turn`. `outcomes`: value or error of each, None while it waits."""
 
     def __init__(self, bus: BaseBus, requests: Sequence[Request[Any]]) -> None:
         self.bus = bus

@@ -36,6 +36,7 @@ class Attempt(Step["Attempt | None"]):
         "fault",
         "in_flight",
         "is_probe",
+        "is_probed",
         "nodes",
         "noise",
         "orders",
@@ -53,10 +54,16 @@ class Attempt(Step["Attempt | None"]):
     )
 
     def __init__(
-        self, request: Request[Any], *, is_probe: bool = False, excluded: tuple[int, ...] = ()
+        self,
+        request: Request[Any],
+        *,
+        is_probe: bool = False,
+        is_probed: bool = False,
+        excluded: tuple[int, ...] = (),
     ) -> None:
         self.request = request
         self.is_probe = is_probe
+        self.is_probed = is_probed  # a probe has shown that there is no echo, so a reply may equal what was sent
         self.dues: tuple[Expected, ...] = () if request.expected is ANY else request.expected
         self.nodes = tuple([due.node for due in self.dues])
         self.size = sum([due.length for due in self.dues])  # bytes of all replies

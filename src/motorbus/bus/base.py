@@ -11,19 +11,18 @@ from threading import Condition
 from typing import Any
 
 from motorbus.bus import failures
+from motorbus.bus.attempt import Attempt
 from motorbus.bus.engine import Engine
 from motorbus.bus.interlock import Interlock
-from motorbus.bus.attempt import Attempt
 from motorbus.bus.nodes import Reading
 from motorbus.bus.stop import EmergencyStop
 from motorbus.bus.stop_socket import StopOutcome, asked_by
 from motorbus.bus.tasks import Notify, Pause, Tree, in_order
-from motorbus.bus.trace import TraceRecord
 from motorbus.bus.turn import Turn
 from motorbus.core.family import BusDriver, Family, IdChanged
 from motorbus.core.request import Priority, Request
 from motorbus.core.steps import JournalEntry, Runnable
-from motorbus.errors import LinkError, LinkFull, LinkLost, MotorbusError, RequestError
+from motorbus.errors import LinkError, LinkLost, MotorbusError, RequestError
 from motorbus.link.base import Link, Renewable
 from motorbus.link.memory import MemoryLink
 

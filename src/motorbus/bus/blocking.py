@@ -7,8 +7,8 @@ from math import inf
 from threading import get_ident
 from typing import Any, Self, TypeVar
 
-from motorbus.bus.base import BaseBus
 from motorbus.bus.attempt import Attempt
+from motorbus.bus.base import BaseBus
 from motorbus.bus.engine import PENDING
 from motorbus.bus.interrupts import ELSEWHERE, INTERRUPTS, MAIN, interrupts
 from motorbus.bus.nodes import GATED
@@ -83,7 +83,9 @@ class Bus(BaseBus):
                 self.turn.release()
             run_parts([part], single=True)
             values = tree.result()
-            return values if order is not None and started is None else (decode_order(order, self.now()), values)
+            return (
+                values if order is not None and started is None else (decode_order(order, self.now()), values)
+            )
         finally:
             signals.depth -= 1
             if signals.pending is not None and not signals.depth:
@@ -143,7 +145,7 @@ class Bus(BaseBus):
         engine, link, request = self.engine, self.link, attempt.request
         if attempt.in_flight:
             chunks = link.read(attempt.deadline)
-            if chunks and request.decode_exact is not None and not request.effect:
+            if chunks and request.decode_exact is not None and not request.effect and not attempt.excluded:
                 data = chunks[0]
                 if type(data) is bytes and (len(data) != attempt.size or len(chunks) > 1):
                     data = self._rest_of(attempt, chunks)

@@ -194,10 +194,11 @@ class Engine:
         """The nodes out of sync for which a group does not wait now; None if one must be probed first."""
         if not must_sync(request):
             return ()
-        nodes = self.sync.doubtful(request)
-        if nodes and (len(request.expected) == 1 or not all(self.sync.is_put_off(node, now) for node in nodes)):  # type: ignore[arg-type]
+        nodes = tuple(self.sync.doubtful(request))
+        put_off = request.expected is not ANY and len(request.expected) > 1
+        if nodes and not (put_off and all(self.sync.is_put_off(node, now) for node in nodes)):
             return None
-        return tuple(nodes)
+        return nodes
 
     def check(self, request: Request[Any], since: int, stop_since: int, now: float) -> None:
         """Raise the error that forbids sending this request now.
@@ -401,7 +402,7 @@ class Engine:
         attempt = self.in_flight.get(reply.lane)
         if attempt is None:
             self._take_unexpected(None, reply, now)
-        elif reply.data in self._wires:
+        elif reply.data in self._wires and not attempt.is_probed:
             attempt.fault = "echo"
             self.statistics.other["echo"] += 1
         elif attempt.complete:

@@ -20,10 +20,10 @@ RETRIES: Final = 2
 
 async def carry_out(engine: Engine, request: Request[Any], attempt: Attempt | None = None) -> Response:
     """The reply to this request; `attempt` is its first one, which has failed. Raises when the last one fails."""
-    tries, sent = 0, False
+    tries, sent, echoed = 0, False, False
     while True:
         if attempt is not None:
-            sent = True
+            sent, echoed = True, attempt.fault == "echo"
             if attempt.accepted is not None:
                 return attempt.accepted
             if engine.stopping and not is_read(request) and request.priority is not Priority.STOP:
@@ -41,7 +41,7 @@ async def carry_out(engine: Engine, request: Request[Any], attempt: Attempt | No
             if len(request.expected) == 1:  # type: ignore[arg-type]  # never ANY here
                 raise _error(engine, request, failed, tries, sent)
             excluded += (node,)
-        attempt = await Attempt(request, excluded=excluded)  # None: a node came out of sync before it left
+        attempt = await Attempt(request, excluded=excluded, is_probed=echoed)  # None: a node came out of sync before it left
 
 
 def _may_repeat(request: Request[Any]) -> bool:
@@ -64,7 +64,9 @@ async def _resync(engine: Engine, request: Request[Any], node: int) -> tuple[Att
     if len(request.expected) > 1 and engine.sync.is_put_off(node, await Sleep(0)):  # type: ignore[arg-type]
         return Attempt(request), 0
     for tries in range(1, RETRIES + 2):
-        while (pause := state.quiet_until - await Sleep(0)) > 0:  # another request may have moved it meanwhile
+        while (
+            pause := state.quiet_until - await Sleep(0)
+        ) > 0:  # another request may have moved it meanwhile
             await Sleep(pause)
         if node not in engine.sync.out_of_sync:  # another request has probed it meanwhile
             return None, tries - 1

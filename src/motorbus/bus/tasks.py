@@ -337,9 +337,7 @@ class Tree(Generic[T]):
             self._queue(task, step)
         elif isinstance(step, Gather):
             self._start(task, step, step.runnables)
-        elif isinstance(step, Exclusive):
-            self._start(task, step, (step.runnable,))
-        elif isinstance(step, Shielded):
+        elif isinstance(step, Exclusive | Shielded):
             self._start(task, step, (step.runnable,))
         elif isinstance(step, Emit):
             self._report(task, step.event)
