@@ -63,7 +63,9 @@ class Attempt(Step["Attempt | None"]):
     ) -> None:
         self.request = request
         self.is_probe = is_probe
-        self.is_probed = is_probed  # a probe has shown that there is no echo, so a reply may equal what was sent
+        self.is_probed = (
+            is_probed  # a probe has shown that there is no echo, so a reply may equal what was sent
+        )
         self.dues: tuple[Expected, ...] = () if request.expected is ANY else request.expected
         self.nodes = tuple([due.node for due in self.dues])
         self.size = sum([due.length for due in self.dues])  # bytes of all replies

@@ -46,8 +46,6 @@ DIRECT: Final = 0.001
 """s; a link of less latency has no adapter that holds data back."""
 STOP_DELAY: Final = 0.003
 """s that a stop waits for the turn beyond the air time of what is in flight."""
-EQUAL: Final = 64
-"""Equal replies in a row after which a node is probed: a copied reply would answer each next request unnoticed."""
 RECENT: Final = 64
 """Attempts whose nodes are doubted when unexpected data comes within the quiet time."""
 PENDING: Final = object()
@@ -553,9 +551,9 @@ class Engine:
             known.add(nodes)
         self.statistics.answered(nodes, at - attempt.sent_at)
         expected, count = self._repeats.get(request.lane, ((), 0))
-        if attempt.dues != expected:
+        if attempt.dues != expected or not self.driver.probe_after:
             self._repeats[request.lane] = attempt.dues, 1
-        elif count < EQUAL:
+        elif count < self.driver.probe_after:
             self._repeats[request.lane] = expected, count + 1
         else:
             self._repeats[request.lane] = expected, 1

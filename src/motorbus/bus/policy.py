@@ -41,7 +41,9 @@ async def carry_out(engine: Engine, request: Request[Any], attempt: Attempt | No
             if len(request.expected) == 1:  # type: ignore[arg-type]  # never ANY here
                 raise _error(engine, request, failed, tries, sent)
             excluded += (node,)
-        attempt = await Attempt(request, excluded=excluded, is_probed=echoed)  # None: a node came out of sync before it left
+        attempt = await Attempt(
+            request, excluded=excluded, is_probed=echoed
+        )  # None: a node came out of sync before it left
 
 
 def _may_repeat(request: Request[Any]) -> bool:
