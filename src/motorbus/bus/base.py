@@ -81,6 +81,8 @@ class BaseBus:
         self.engine.before_motion = self._start_stopper
         self.reconnects = isinstance(link, Renewable)
         """A lost port is opened again by the next request. May be set to False only."""
+        self.watches: list[Tree[Any]] = []
+        """Procedures that are stepped whenever the bus is used; for virtual time, which passes only then."""
         self._on_reconnect: list[Callable[[], None]] = []
         self._open = True
         if stop_socket is not None:
@@ -349,6 +351,17 @@ class BaseBus:
         """The reads that the interlock needs before it can check this request."""
         return () if self.interlock is None else self.interlock.required_reads(request)
 
+    def watch(self, procedure: Runnable[Any]) -> Tree[Any]:
+        """Step this procedure whenever the bus is used, in virtual time, until `unwatch`."""
+        tree: Tree[Any] = Tree(self.engine, procedure, now=self.now, report=self.event_sink(None))
+        self.watches.append(tree)
+        return tree
+
+    def unwatch(self, tree: Tree[Any]) -> None:
+        """End what `watch` began."""
+        self.watches.remove(tree)
+        tree.drop()
+
     def attach(self, gate: Any) -> None:
         """Let the gate see positions and stops of this bus, and ask it which reads a request requires first."""
         nodes = self.engine.nodes
@@ -363,7 +376,7 @@ class BaseBus:
     @property
     def echoes(self) -> bool:
         """The adapter echoes what is sent."""
-        return self.engine.echo.present
+        return bool(self.engine.echo.present)
 
     # -- emergency stop ----------------------------------------------------------------------------------------
 

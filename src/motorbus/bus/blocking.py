@@ -100,7 +100,7 @@ class Bus(BaseBus):
         """
         engine, link = self.engine, self.link
         now = link.now()
-        if not engine.is_free(now):
+        if self.watches or not engine.is_free(now):
             return None
         excluded = engine.put_off(request, now) if engine.sync.out_of_sync else ()
         if excluded is None:

@@ -1,7 +1,8 @@
 """Echo: some adapters return every byte that is sent.
 
-The echo of a FEETECH READ is a valid status frame. So the bus looks for an echo at open and after a reconnect only, by
-a request whose reply cannot be its echo, and from then on removes exactly the bytes that it sent.
+The first reply to a request of a bus that is opened, or open again, shows whether there is an echo; later that is
+constant. Before it is known, bytes that may be an echo are held back until the deadline: the echo of a FEETECH PING is
+a PING reply with an alarm, and the stepper controller acknowledges some commands by their first six bytes.
 """
 
 from __future__ import annotations
@@ -12,26 +13,27 @@ from motorbus.core.request import Request
 
 
 class Echo:
-    """`present`: the adapter echoes. `testing`: the reply to the next probe or `test` shows whether it does.
+    """`present` is None while unknown. `broken` is set where an echo did not come as it was sent.
 
-    `broken` is set where an echo of an adapter that echoes did not come as it was sent.
+    `test` is a request whose reply differs in length from its echo.
     """
 
     def __init__(self) -> None:
-        self.present = False
-        self.testing = True
+        self.present: bool | None = None
         self.broken = False
         self.test: Request[Any] | None = None
         self._expected = b""
         self._matched = b""
+        self._came = False
 
-    def sent(self, data: bytes, testing: bool) -> None:
-        """These bytes are sent; `testing`: the reply to them shows whether there is an echo."""
-        if self.present or (self.testing and testing):
+    def sent(self, data: bytes) -> None:
+        """These bytes are sent."""
+        if self.present is not False:
             self._expected += data
+            self._came = False
 
     def strip(self, data: bytes) -> bytes:
-        """What remains of incoming bytes without the echo; where that is broken, without what may belong to it."""
+        """What remains of incoming bytes without the echo."""
         expected = self._expected
         if not expected:
             return data
@@ -40,24 +42,24 @@ class Echo:
             return self.give_up(data)
         self._expected, self._matched = expected[count:], self._matched + data[:count]
         if not self._expected:
-            self._matched, self.present = b"", True
+            self._matched, self._came = b"", True
         return data[count:]
 
     def give_up(self, data: bytes = b"") -> bytes:
-        """The rest of an echo does not come: the bytes held back and these, if there is no echo at all."""
-        held, waited = self._matched + data, bool(self._expected)
+        """The rest of an echo does not come: the bytes held back and these, which are no echo if that is unknown."""
+        held, lacks = self._matched + data, bool(self._expected)
         self._matched = self._expected = b""
-        if self.testing:
-            self.present = False
+        if not self.present:
             return held
-        self.broken = self.broken or waited
+        self.broken = self.broken or lacks
         return b""
 
-    def end_test(self) -> None:
-        """The test was answered: after its echo, or without one."""
-        self.testing = False
+    def conclude(self, *, is_test: bool) -> None:
+        """A reply was accepted: behind a whole echo, or without one. A reply that may be an echo proves nothing."""
+        if self.present is None and (self._came or is_test):
+            self.present = self._came
 
     def reset(self) -> None:
-        """The adapter was replugged: the next probe is a test, and nothing sent before comes back."""
-        self.testing, self.broken = True, False
+        """The adapter was replugged: nothing sent before comes back."""
+        self.present, self.broken = None, False
         self._expected = self._matched = b""

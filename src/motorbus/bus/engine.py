@@ -166,7 +166,7 @@ class Engine:
             or self.stopping
             or self.listening
             or self.gone
-            or self.echo.present
+            or self.echo.present is not False
             or self.exclusive is not None
             or self.receiver.held
             or now < (self.free_at if self.paced else self.full_until)
@@ -279,7 +279,7 @@ class Engine:
             self.nodes.ordered(request)
         if type(request.wire) is bytes:
             self._wires.append(request.wire)
-            self.echo.sent(request.wire, attempt.is_probe or request is self.echo.test)
+            self.echo.sent(request.wire)
         if self.trace.subscriptions:
             self.trace.put(TraceRecord(now, "tx", request.wire))
 
@@ -518,8 +518,7 @@ class Engine:
             if request.lane == EVERY_LANE:  # the lane is the node: a stop must reach all that answered
                 self.nodes.add([reply.lane for reply in answer.replies])
             return
-        if attempt.is_probe or request is self.echo.test:
-            self.echo.end_test()
+        self.echo.conclude(is_test=attempt.is_probe or request is self.echo.test)
         nodes = attempt.nodes
         if answer.missing:
             nodes = tuple([node for node in nodes if node not in answer.missing])

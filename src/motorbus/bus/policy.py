@@ -20,10 +20,10 @@ RETRIES: Final = 2
 
 async def carry_out(engine: Engine, request: Request[Any], attempt: Attempt | None = None) -> Response:
     """The reply to this request; `attempt` is its first one, which has failed. Raises when the last one fails."""
-    tries, sent, echoed = 0, False, False
+    tries, sent = 0, False
     while True:
         if attempt is not None:
-            sent, echoed = True, attempt.fault == "echo"
+            sent = True
             if attempt.accepted is not None:
                 return attempt.accepted
             if engine.stopping and not is_read(request) and request.priority is not Priority.STOP:
@@ -33,16 +33,18 @@ async def carry_out(engine: Engine, request: Request[Any], attempt: Attempt | No
                 raise _error(engine, request, attempt, tries, sent)
             engine.statistics.retried(attempt.nodes)
         excluded: tuple[int, ...] = ()
+        is_probed = False
         for node in engine.sync.doubtful(request) if must_sync(request) else ():
             failed, probes = await _resync(engine, request, node)
             tries += probes
             if failed is None:
+                is_probed = True
                 continue
             if len(request.expected) == 1:  # type: ignore[arg-type]  # never ANY here
                 raise _error(engine, request, failed, tries, sent)
             excluded += (node,)
         attempt = await Attempt(
-            request, excluded=excluded, is_probed=echoed
+            request, excluded=excluded, is_probed=is_probed
         )  # None: a node came out of sync before it left
 
 

@@ -106,19 +106,24 @@ class Part:
         for call in self.calls:
             call.obey()
         while True:
-            for tree in self.trees:
+            for tree in self._stepped:
                 tree.advance()
             if self.finished:
                 self.release_turn()
                 return True
-            self.sends_at = self.bus.send(self.trees)
-            if not any(tree.ready for tree in self.trees):
+            self.sends_at = self.bus.send(self._stepped)
+            if not any(tree.ready for tree in self._stepped):
                 return False
+
+    @property
+    def _stepped(self) -> list[Tree[Any]]:
+        """Its procedures, and what watches the bus in virtual time."""
+        return [*self.trees, *self.bus.watches] if self.bus.watches else self.trees
 
     @property
     def is_idle(self) -> bool:
         """Nothing of it is in flight or waits to be sent."""
-        return not self.bus.engine.in_flight and not any(tree.sending for tree in self.trees)
+        return not self.bus.engine.in_flight and not any(tree.sending for tree in self._stepped)
 
     def release_turn(self) -> None:
         """Release the turn if all has ended, a stop waits for it, or the bus is idle and not exclusive.
@@ -137,14 +142,14 @@ class Part:
 
     def next_moment(self) -> float:
         """When (s) a tree can go on by itself, or more may be sent."""
-        return min([self.sends_at, *(tree.next_moment() for tree in self.trees)])
+        return min([self.sends_at, *(tree.next_moment() for tree in self._stepped)])
 
     def wait(self) -> None:
         """Wait for data, a deadline, or the next moment of a tree; without the turn sleep for at most `IDLE`."""
         bus, moment = self.bus, self.next_moment()
         if self.holds_turn:
             listens = self.is_idle and bus.engine.notification_handlers and not bus.link.virtual
-            bus.receive(min(moment, bus.link.now() + LISTEN_TIME) if listens else moment, self.trees)
+            bus.receive(min(moment, bus.link.now() + LISTEN_TIME) if listens else moment, self._stepped)
         elif not bus.waits_for_stop:
             self._sleep(min(moment - bus.link.now(), IDLE))
 
@@ -223,7 +228,7 @@ def wait_for(parts: Sequence[Part]) -> None:
         # one shared clock: read every bus up to the earliest event, first the bus that has it
         events = {part: part.bus.next_event(part.next_moment()) for part in parts}
         for part in sorted(parts, key=events.__getitem__):
-            part.bus.receive(min(events.values()), part.trees)
+            part.bus.receive(min(events.values()), part._stepped)
     else:
         _poll(parts)
 

@@ -12,6 +12,8 @@ from threading import Event, Thread
 from typing import Any, Final
 
 from motorbus.bus.running import run_here
+from motorbus.bus.tasks import Tree
+from motorbus.core.steps import Sleep, catch
 from motorbus.errors import MotorbusError
 from motorbus.motion.body import Body
 from motorbus.motion.leaving import given_up, goes_on, moves, stopped_going_on
@@ -39,10 +41,12 @@ class Watchdog:
         self._posts = {name: _Post(lease.losses - lost) for name in body.buses}
 
     def start(self) -> None:
-        """Watch each bus in a thread. In virtual time, which only the program itself moves, no bus is watched."""
+        """Watch each bus: in a thread, in virtual time beside the procedures of the program."""
         self._lease.watchers.append(self._wake)
         for name, bus in self._body.buses.items():
-            if not bus.link.virtual:
+            if bus.link.virtual:
+                self._posts[name].tree = bus.watch(self._watch_along(name))
+            else:
                 Thread(target=self._watch, args=(name,), name=f"motorbus lease {name}", daemon=True).start()
 
     def end(self) -> None:
@@ -51,6 +55,10 @@ class Watchdog:
         if self._wake in self._lease.watchers:
             self._lease.watchers.remove(self._wake)
         self._wake()
+        for name, post in self._posts.items():
+            if post.tree is not None:
+                self._body.buses[name].unwatch(post.tree)
+                post.tree = None
 
     def busy(self, bus: str) -> bool:
         """Whether the lease was lost and the stop has not been sent on this bus yet."""
@@ -60,6 +68,8 @@ class Watchdog:
     def _wake(self) -> None:
         for post in self._posts.values():
             post.woken.set()
+            if post.tree is not None:
+                post.tree.end_sleeps()
 
     # -- when ----------------------------------------------------------------------------------------------------------
 
@@ -85,6 +95,12 @@ class Watchdog:
         return [axis for axis in self._body.axes.values() if axis.spec.bus == bus]
 
     # -- what ----------------------------------------------------------------------------------------------------------
+
+    async def _watch_along(self, bus: str) -> None:
+        while True:
+            if self._late(bus):
+                await self._stopping(bus)
+            await catch(Sleep(self._left(bus)))
 
     def _watch(self, bus: str) -> None:
         woken = self._posts[bus].woken
@@ -148,6 +164,7 @@ class _Post:
         self.failed: frozenset[str] = frozenset()
         self.again = 0.0
         self.woken = Event()
+        self.tree: Tree[None] | None = None  # in virtual time
 
     def take(self, loss: int, failed: Iterable[str], again: float) -> None:
         """The stop was sent."""

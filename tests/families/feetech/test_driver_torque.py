@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from motorbus.bus.nodes import Nodes, addressed
 
 from motorbus import Robot
+from motorbus.bus.nodes import Nodes, addressed
 from motorbus.core.request import Effect, Priority
 from motorbus.core.steps import Sleep, gather
 from motorbus.errors import ChecksumError, MotorbusError, OutcomeUnknown, RequestError, VerificationFailed
