@@ -118,11 +118,6 @@ class Call:
             elif not self.tree.finished:
                 self.tree.drop()
 
-    def end(self) -> None:
-        """The procedure has ended; in the thread of the loop."""
-        if not self.ended.done():
-            self.ended.set_result(None)
-
 
 async def _finish(calls: Iterable[Call]) -> None:
     """Wait until all have ended. A cancellation, or an error that is none of ours, cancels them; they clean up."""
@@ -189,29 +184,42 @@ class _Worker:
 
 
 def _serve(inbox: deque[Call]) -> None:
-    """Run procedures of one bus until all have ended."""
-    part = Part(inbox[0].bus, inbox)
+    """Run procedures of one bus until all have ended; the last of them is reported when nothing here holds the bus."""
+    part: Part | None = Part(inbox[0].bus, inbox)
     calls: list[Call] = []
-    while inbox or calls:
+    while part is not None:
+        ended = _advance(part, inbox, calls)
+        if not calls and not inbox:
+            part = None
+        for loop, future in ended:
+            _call_in(loop, _set_result, future)
+
+
+def _advance(
+    part: Part, inbox: deque[Call], calls: list[Call]
+) -> list[tuple[asyncio.AbstractEventLoop, asyncio.Future[None]]]:
+    """Wait, then step these procedures, and those of the inbox; remove those that have ended, and give what reports their end."""
+    try:
+        if calls:
+            part.wait()
         while inbox:
             calls.append(inbox.popleft())
         part.calls, part.trees = calls, [call.tree for call in calls]
-        try:
-            part.advance(-1.0)
-            ended = [call for call in calls if call.tree.finished]
-            calls = [call for call in calls if call not in ended]
-            for call in ended:
-                _call_in(call.loop, call.end)
-            part.calls, part.trees = calls, [call.tree for call in calls]
-            part.release_turn()
-            if calls:
-                part.wait()
-        except BaseException as error:  # a fault of the bus: no call waits for ever
-            for call in calls:
-                call.tree.drop()
-                call.tree.cancellation = error
-                _call_in(call.loop, call.end)
-            calls = []
+        part.advance(-1.0)
+    except BaseException as error:  # a fault of the bus: no call waits for ever
+        for call in calls:
+            call.tree.drop()
+            call.tree.cancellation = error
+    ended = [call for call in calls if call.tree.finished]
+    calls[:] = [call for call in calls if not call.tree.finished]
+    part.trees = [call.tree for call in calls]
+    part.release_turn()
+    return [(call.loop, call.ended) for call in ended]
+
+
+def _set_result(future: asyncio.Future[None]) -> None:
+    if not future.done():
+        future.set_result(None)
 
 
 class _Pump:
@@ -244,7 +252,7 @@ class _Pump:
         finally:
             for call in self._calls:
                 call.tree.drop()
-                call.end()
+                _set_result(call.ended)
             for part in parts.values():
                 part.trees = []
                 part.release_turn()
@@ -258,7 +266,7 @@ class _Pump:
         for call in tuple(self._calls):
             if call.tree.finished:
                 self._calls.remove(call)
-                call.end()
+                _set_result(call.ended)
         if going := [part for part in parts.values() if not part.finished]:
             wait_for(going)
 
