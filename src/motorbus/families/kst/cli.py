@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Annotated, Any, Final, Literal
 
@@ -22,7 +22,7 @@ from motorbus.errors import RequestError
 from motorbus.families.kst.driver import feedback, motion, provisioning
 from motorbus.families.kst.driver.broadcast import broadcast_read
 from motorbus.families.kst.driver.node import checked_id
-from motorbus.families.kst.driver.scan import ScanWarning, scan_bit_rates
+from motorbus.families.kst.driver.scan import ScanWarning
 from motorbus.families.kst.driver.servo import Servo, settings_of
 from motorbus.families.kst.profiles import (
     PROFILES,
@@ -346,7 +346,6 @@ COMMANDS: Final = {
     "set_reversed()": "`motorbus kst reverse BUS#ID on|off`",
     "set_reversed(False)": "`motorbus kst reverse BUS#ID off`",
     "reversed()": "`motorbus kst reverse BUS#ID`",
-    "isolated=True": "`motorbus scan BUS --bitrate all`",
 }
 """A call in an error text, or its start up to the bracket for any arguments -> the command that does the same; {}
 stands for these arguments."""
@@ -383,27 +382,6 @@ def meaning(row: Register, raw: int) -> str:
 def ping_everyone(bus: Any) -> list[int]:
     """For `motorbus ping BUS`: the ids of the servos that answer one broadcast read."""
     return sorted(bus.run(broadcast_read("node_id", settings_of(bus))))
-
-
-def detect_bit_rate(
-    bus: Any, seconds: float, report: Callable[[object], None]
-) -> tuple[int | None, dict[int, str]]:
-    """For `motorbus scan --listen`: listen `seconds` at each bit rate, without sending.
-
-    Returns the rate of the bus (None: not known) and, by rate, what was received.
-
-    A rate that the adapter lacks is reported. Raises RequestError if the adapter can listen at none.
-    """
-    skipped: dict[int, str] = {}
-
-    def take(event: object) -> None:
-        if isinstance(event, Skipped):
-            skipped[event.rate] = f"not listened to: {event.why}"
-        report(event)
-
-    found = bus.run(scan_bit_rates(settings_of(bus), seconds=seconds), report=take)
-    activity = skipped | {rate: one.value for rate, one in found.activity.items()}
-    return found.rate, {rate: activity[rate] for rate in bus.family.link.rates if rate in activity}
 
 
 def move_together(bus: Any, goals: Mapping[int, float], *, wait: bool = True) -> None:
