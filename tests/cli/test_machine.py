@@ -192,11 +192,10 @@ def test_a_name_that_is_none_ends_with_one_error_and_sends_nothing(
         ("set-id a1 9 --dry-run", 0),
         ("recover arm", 0),
         ("feetech mode a1", 0),
-        ("kst status c1", 0),
-        ("kst version can#37", 0),
+        ("read can#37 node_id", 0),
         ("stepper inputs lift", 0),
         ("scan all", 2),
-        ("kst status a1", 2),
+        ("kst limits a1", 2),
     ],
 )
 def test_names_go_where_addresses_go(command: str, code: int, bench: Bench, run: Run) -> None:

@@ -52,7 +52,7 @@ def test_what_is_beyond_a_limit_is_told_with_the_file_and_its_rows(bench: Bench,
     text = "# by hand\ntime (s),a1 (deg)\n3,0\n5,0\n9,140\n12,160\n13,160\n"
     Path("far.csv").write_text(text, encoding="utf-8")
     for words in ([], ["--speed", "0.5"], ["--dry-run"]):
-        ran = run("replay", "far.csv", "--interpolation", "minimum_jerk", *words)
+        ran = run("replay", "far.csv", *words)
         assert (ran.code, ran.out) == (8, "")
         assert ran.err.startswith("error: far.csv, rows 3 to 4: a1: its position at ")
     text = "time (s),a1 (deg)\n0,0\n20,160\n21,160\n"

@@ -75,23 +75,6 @@ def test_a_scan_reports_a_duplicate_feetech_id(run: Run) -> None:
     assert "#3 at 1000000 bit/s: two servos seem to have this id" in ran.document["notes"][0]
 
 
-def test_a_rate_is_found_by_listening_alone(run: Run) -> None:
-    with motorbus.simulate("kst", ids="0x25", profile="kst-ext") as simulation:
-        with motorbus.open(simulation.url) as bus:
-            bus.family.devices.blocking(bus, 0x25).start_reports(0.1)
-        ran = run("scan", simulation.url, "--listen", "--json", "-vv")
-    assert (ran.code, ran.document["bitrate"]) == (0, 500_000)
-    assert list(ran.document["heard"])[-1] == "500000"
-    assert " tx " not in ran.err
-
-
-@pytest.mark.parametrize("words", ["feetech:sim", "kst:sim --ids 1", "kst:sim#1", "kst:sim --bitrate 1M"])
-def test_listening_asks_nobody(words: str, run: Run) -> None:
-    ran = run("scan", *words.split(), "--listen")
-    assert (ran.code, ran.out) == (2, "")
-    assert "--listen" in ran.err
-
-
 @pytest.mark.parametrize("said", ["7", "1000000,7", "2M"])
 def test_a_rate_that_no_servo_has_is_refused_and_nothing_is_asked(
     said: str, run: Run, arm: Simulation

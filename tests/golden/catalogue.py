@@ -331,8 +331,6 @@ KST: list[tuple[Call, str, tuple[Call, ...]]] = [
 ]
 KST_GROUP: list[tuple[Call, str]] = [
     (shared("scan", SETTINGS, (1, 2, 3)), "ids"),
-    (shared("scan_bit_rates", SETTINGS, rates=(500_000, 250_000)), "listen"),
-    (shared("scan_bit_rates", SETTINGS, rates=(250_000, 500_000), isolated=True), "isolated"),
     (shared("broadcast_read", "node_id", SETTINGS), ""),
     (shared("broadcast_position", 0.2, (1, 2), SETTINGS), ""),
     (shared("broadcast_save", SETTINGS), ""),

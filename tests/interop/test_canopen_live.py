@@ -105,14 +105,6 @@ def test_is_refused_as_cia_301_says(tmp_path: Path) -> None:
         assert peer.read("node_id") == NODE
 
 
-def test_reads_a_version_in_segments(tmp_path: Path) -> None:
-    with (
-        can_bus(tmp_path, firmware="1.00 of today") as bus,
-        canopen(bus.way(), PROFILES["kst"], tmp_path) as peer,
-    ):
-        assert peer.read("firmware_version") == "1.00 of today"
-
-
 def test_its_scanner_finds_the_nodes(tmp_path: Path) -> None:
     with (
         can_bus(tmp_path, ids="1,0x25,0x26,127") as bus,

@@ -169,7 +169,7 @@ def test_remote_error_and_fd_frames() -> None:
         ("can://socketcand/127.0.0.1", RequestError, "HOST:PORT/CHANNEL"),
         ("can://pcan/PCAN_USBBUS1", LinkError, "driver of pcan is missing"),
         ("can://gs_usb/0", LinkError, r'pip install "python-can\[gs-usb\]"'),
-        ("can://slcam/dev/ttyACM0", RequestError, "did you mean slcan"),
+        ("can://slcam/dev/ttyACM0", RequestError, "has no interface 'slcam'"),
         ("can:///can0", RequestError, "the interface is missing"),
     ],
 )

@@ -13,15 +13,10 @@ from typing import Any
 
 import pytest
 
-from motorbus.errors import LinkLost, PortBusy
+from motorbus.errors import LinkLost, PortBusy, PortNotFound
 from motorbus.link import usb_adapters
 from motorbus.link.lock import PortLock
-from motorbus.link.reconnect import (
-    Reconnecting,
-    find_adapter,
-    identify,
-    reconnecting,
-)
+from motorbus.link.reconnect import Reconnecting, find_adapter, list_adapters, reconnecting
 from motorbus.link.url import open_link
 from motorbus.simulation.pty import PtyMaster
 from tests.links.usb import usb_port
@@ -240,31 +235,20 @@ def test_l13_the_lock_is_kept_while_the_port_is_gone(tmp_path: Path, master: Pty
 # -- identity of an adapter ------------------------------------------------------------------------------------
 
 
-def lister(*ports: dict[str, Any]) -> Callable[[], list[Any]]:
-    return lambda: [usb_port(**{"device": port["resolved_device"], **port}) for port in ports]
+def test_without_a_serial_number_the_same_kind_under_the_same_name_counts(tmp_path: Path) -> None:
+    path = tmp_path / "ttyUSB0"
+    path.touch()
 
+    def lister(vid: int | None = 0x1A86) -> Callable[[], list[Any]]:
+        device = str(path)
+        return lambda: [
+            usb_port(device=device, resolved_device=device, vid=vid, pid=0x7523, serial_number=None)
+        ]
 
-def plugged(root: Path, name: str, where: str) -> Path:
-    """The kernel's tree, with this device at this place of the USB."""
-    interface = root / "devices" / "usb1" / where.partition(":")[0] / where
-    interface.mkdir(parents=True, exist_ok=True)
-    terminal = root / "class" / "tty" / name
-    terminal.mkdir(parents=True, exist_ok=True)
-    (terminal / "device").unlink(missing_ok=True)
-    (terminal / "device").symlink_to(interface)
-    return root
-
-
-def test_l12_without_a_serial_number_its_place_on_the_usb_counts(tmp_path: Path) -> None:
-    plugged(tmp_path, "ttyUSB0", "1-1.2:1.0")
-    nameless = {"vid": 0x1A86, "pid": 0x7523, "serial_number": None}
-    mine = identify("/dev/ttyUSB0", lister({"resolved_device": "/dev/ttyUSB0", **nameless}), tmp_path)
-    assert mine.place == "1-1.2:1.0"
-    plugged(tmp_path, "ttyUSB0", "1-1.3:1.0")
-    plugged(tmp_path, "ttyUSB1", "1-1.2:1.0")
-    both = lister(
-        {"resolved_device": "/dev/ttyUSB0", **nameless}, {"resolved_device": "/dev/ttyUSB1", **nameless}
-    )
-    assert find_adapter("bus", mine, both, tmp_path) == "/dev/ttyUSB1"
-    with pytest.raises(LinkLost, match="at the USB place 1-1.3:1.0"):
-        find_adapter("bus", mine, lister({"resolved_device": "/dev/ttyUSB0", **nameless}), tmp_path)
+    mine = list_adapters(lister())[str(path)]
+    assert find_adapter("bus", str(path), mine, lister()) == str(path)
+    with pytest.raises(LinkLost, match="the adapter 0403:7523"):
+        find_adapter("bus", str(path), mine, lister(0x0403))
+    with pytest.raises(PortNotFound):
+        find_adapter("bus", str(path), mine, list)
+    assert find_adapter("bus", str(path), None, list) == str(path)

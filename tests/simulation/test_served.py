@@ -120,8 +120,8 @@ def test_a_line_that_does_harm_is_refused_where_devices_may_be_real() -> None:
 
 def test_what_is_asked_before_a_channel_is_opened() -> None:
     for there in ("can://virtual/here", "can://socketcan/vcan0"):
-        check_harmless(there, {})
+        check_harmless(there)
     for there in ("can://socketcan/can0", "can://slcan/dev/nothing"):
         with pytest.raises(RequestError, match="faults are refused"):
-            check_harmless(there, {})
-    check_harmless("/dev/nothing", {})  # no channel: to join it is refused
+            check_harmless(there)
+    check_harmless("/dev/nothing")  # no channel: to join it is refused

@@ -24,8 +24,6 @@ common commands it may offer
                                                                for the question before it, "" if nothing
     torque_told(event)                                         what an event of `write` says of the torque after it:
                                                                {"on", "why", "text"}, None if nothing
-    detect_bit_rate(bus, seconds, report)                      the rate of a bus by listening alone, and the activity
-                                                               at each rate
     CUT_OFF                                                    what to do about a change that was cut off, where no
                                                                journal is kept
     COMMANDS                                                   what errors call -> the command that does the same

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from motorbus.motion.moving.moved import Moved
     from motorbus.motion.trajectory import Trajectory
 
-Interpolation = Literal["linear", "cubic", "spline", "minimum_jerk"]
+Interpolation = Literal["linear", "spline"]
 FASTEST: Final = 1000.0
 """How many times as fast as in the file, or as slow, at most; beyond that its samples would fall together."""
 NEAR: Final = 1e-9
@@ -46,8 +46,8 @@ go to its first point together, then along it. A way there of more than
 180 degrees needs --yes. Ctrl-C stops them.
 
 Rows are joined by a spline, without a jump of velocity; where an axis turns
-back it goes a little beyond the outermost row. cubic rests there instead,
-minimum_jerk rests at each row, and linear goes straight: its corners are hard.
+back it goes a little beyond the outermost row. linear goes straight: its
+corners are hard.
 
 What was taught by hand comes in steps, which are hard: --smooth 5 takes out
 what is quicker than 5 Hz. A stepper controller cannot be led along a file.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
@@ -14,7 +14,7 @@ from motorbus.cli.target import id_shown, nobody, opened, rate_word, target
 from motorbus.core import units
 from motorbus.core.family import Found
 from motorbus.core.steps import Progress
-from motorbus.errors import NoReply, RequestError
+from motorbus.errors import RequestError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from motorbus.cli.output import Bar
     from motorbus.cli.target import Target
     from motorbus.core.family import Family
-
-SECONDS: Final = 1.0
-"""How long to listen at each rate; traffic of 1 Hz and more is heard."""
 
 app = App(
     name="scan",
@@ -38,7 +35,6 @@ Examples:
     motorbus scan feetech:/dev/ttyACM0 --ids 1-20 --baud 1000000,500000
     motorbus scan feetech:/dev/ttyACM0 --baud all
     motorbus scan kst:can://slcan/dev/ttyACM0 --bitrate all
-    motorbus scan kst:can://slcan/dev/ttyACM0 --listen
     motorbus scan feetech:sim,ids=1-6 --ids 1-9 --json""",
 )
 
@@ -51,7 +47,6 @@ def scan(
     ids: str = "",
     baud: str = "",
     bitrate: str = "",
-    listen: Annotated[bool, Parameter(negative="")] = False,
     output: Annotated[Output, Parameter(parse=False)],
     **options: str,
 ) -> Exit:
@@ -67,8 +62,6 @@ def scan(
         Which rates to try, as 1000000,500000, or `all`; the rate of the bus when left out.
     bitrate
         The same for a CAN bus, as 500k,1M, or `all`.
-    listen
-        Find the rate of a CAN bus by listening at each, 1 s long, and send nothing.
     options
         Any option of the bus string, as a flag.
     """
@@ -77,8 +70,6 @@ def scan(
     wanted = target(bus)
     asked = session.parse_ids(ids) if ids else wanted.nodes
     tried = _tried({"baud": baud, "bitrate": bitrate}, wanted.family)
-    if listen:
-        return _rate_heard(wanted, bool(asked or tried), options, output)
     early: list[Found] = []
     found: list[Found] | None = None
     notes: list[str] = []
@@ -93,25 +84,6 @@ def scan(
             _show(wanted, early if found is None else found, notes, output)
         if not found:
             raise nobody(bus)
-    return Exit.OK
-
-
-def _rate_heard(wanted: Target, more: bool, options: Mapping[str, str], output: Output) -> Exit:
-    detect = faces.offer(wanted.family.name, "detect_bit_rate")
-    if detect is None or more:
-        why = "it asks nobody" if more else f"{wanted.family.name} buses have no such search"
-        raise RequestError(f"--listen: {why}", expected="a CAN bus, without ids and rates")
-    with opened(wanted.bus, options, output) as opening, output.progress("listening") as bar:
-        rate, told = detect(opening, SECONDS, lambda event: _heard(wanted.family.name, [], bar, [], event))
-    heard = {str(one): what for one, what in told.items()}
-    output.document("motorbus.scan.rate/1", {"bus": wanted.bus, "bitrate": rate, "heard": heard})
-    output.table("", [">bit/s", "heard"], list(heard.items()))
-    if rate is None:
-        raise NoReply(
-            f"{wanted.bus}: no traffic was heard at any rate",
-            cause="nobody speaks unless asked, or the bus has another rate",
-            advice=f"if nothing depends on this bus, `motorbus scan {wanted.bus} --bitrate all` asks at every rate",
-        )
     return Exit.OK
 
 

@@ -154,7 +154,7 @@ def _script(said: str | None, can: str, family: Family) -> Script:
     """What is to go wrong. Raises RequestError for a bad script, and for any where real devices may be."""
     script = faulty.from_option(said)
     if script.faults and can and family.link.kind == "frames":
-        check_harmless(f"can://{can}", {})
+        check_harmless(f"can://{can}")
     return script
 
 

@@ -59,7 +59,7 @@ def listen(
         raise NoReply(
             f"{bus}: nothing was heard",
             cause="nobody speaks unless asked, or at another bit rate",
-            advice="`motorbus scan BUS --listen` looks for the rate",
+            advice="`motorbus scan BUS --bitrate all` looks for the rate where nothing depends on this bus",
         )
     return Exit.OK
 

@@ -25,7 +25,7 @@ COMMANDS: Final[Mapping[str, str]] = {
     "set_baud()": "`motorbus set-baud`",
     "recover()": "`motorbus recover BUS`",
     "recover(alone=True)": "`motorbus recover BUS --alone`",
-    "scaled(2)": "`--speed 50%`",
+    "speed=0.5": "`--speed 50%`",
     "smoothed(5)": "`--smooth 5`",
 }
 """What a program would call -> what says the same in a shell; `name(` stands for any arguments, which `{}` gets."""

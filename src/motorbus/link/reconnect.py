@@ -1,8 +1,8 @@
 """Reopen a port that was lost: an adapter that was unplugged, a server that ended.
 
 A name such as /dev/ttyUSB0 goes to the first adapter that is plugged in. So an adapter is recognised by its serial
-number; without one, by vendor, product and USB socket. A pseudo-terminal is recognised by the symbolic link to it, for
-its number goes to the next terminal.
+number; one without is looked for under its old name only, and must have the same vendor and product. A pseudo-terminal
+is found when the symbolic link to it was made again.
 
 No thread waits for the port: each use of the bus tries to reopen it, soon at first and then less often, and fails at
 once in between. The lock of the port is kept until another adapter has its name (decision record 0034).
@@ -11,10 +11,8 @@ once in between. The lock of the port is kept until another adapter has its name
 from __future__ import annotations
 
 import os
-import re
 import time
 from collections.abc import Callable, Iterable, Mapping
-from pathlib import Path
 from threading import Lock
 from typing import Any, Final, NamedTuple
 
@@ -23,7 +21,7 @@ from motorbus.errors import AnotherAdapter, LinkLost, MotorbusError, PortNotFoun
 from motorbus.link import usb_adapters
 from motorbus.link.base import Link
 from motorbus.link.errors import lost
-from motorbus.link.lock import PortLock, real_name
+from motorbus.link.lock import PortLock
 from motorbus.link.serial import list_ports
 from motorbus.link.url import open_link
 
@@ -33,100 +31,74 @@ CONNECT_TIME: Final = 0.1  # s for a host of the network: the caller has other w
 RETRY_ADVICE: Final = (
     "it is looked for again whenever something is asked for; nothing of before is sent again"
 )
-_USB_SOCKET: Final = re.compile(r"\d+-\d+(\.\d+)*:\d+\.\d+")
-"""Kernel name of the interface of a USB device: bus-port.port:configuration.interface."""
 
 Lister = Callable[[], Iterable[Any]]
 """Lists the serial ports, as `serialx.list_serial_ports` does."""
 
 
-class Identity(NamedTuple):
-    """A serial port. Ports with the same `text` and `interface` are the same, or cannot be distinguished.
+class Adapter(NamedTuple):
+    """A USB adapter; `port` tells the ports of one adapter apart."""
 
-    `interface` is its number in an adapter with several ports, `place` the USB socket, "" when unknown; `device` is the
-    present name.
+    vendor: int
+    product: int
+    serial_number: str
+    port: tuple[object, ...]
+
+    def __str__(self) -> str:
+        mark = f" with the serial number {self.serial_number}" if self.serial_number else ""
+        return f"the adapter {self.vendor:04x}:{self.product:04x}{mark}"
+
+
+def list_adapters(lister: Lister) -> dict[str, Adapter]:
+    """The USB adapter of each serial port that the system lists, by its device."""
+    return {
+        os.path.realpath(port.resolved_device): Adapter(
+            port.vid, port.pid or 0, port.serial_number or "", (port.interface_num, port.port_number)
+        )
+        for port in lister()
+        if port.vid is not None
+    }
+
+
+def find_adapter(name: str, device: str, wanted: Adapter | None, lister: Lister) -> str:
+    """The present device of an adapter that was `device`; `name` is what messages call it, None: it is not on USB.
+
+    Raises PortNotFound, or AnotherAdapter when another one has taken its place.
     """
-
-    text: str
-    interface: tuple[object, ...]
-    place: str
-    device: str
-
-
-def identities(lister: Lister, sysfs: Path = Path("/sys")) -> list[Identity]:
-    """The identity of every serial port that the system lists."""
-    found = []
-    for port in lister():
-        device = port.resolved_device
-        parts = Path(os.path.realpath(sysfs / "class" / "tty" / Path(device).name / "device")).parts
-        place = next((part for part in reversed(parts) if _USB_SOCKET.fullmatch(part)), "")
-        text = f"the port {device}"
-        if port.vid is not None:
-            mark = f"at the USB place {place}" if place else f"at {device}"
-            if port.serial_number:
-                mark = f"with the serial number {port.serial_number}"
-            text = f"the adapter {port.vid:04x}:{port.pid or 0:04x} {mark}"
-        found.append(Identity(text, (port.interface_num, port.port_number), place, device))
-    return found
+    adapters = list_adapters(lister)
+    if wanted is not None and wanted.serial_number:
+        for path, adapter in adapters.items():
+            if adapter == wanted:
+                return path
+    there = adapters.get(device)
+    if there is not None and there != wanted:
+        raise AnotherAdapter(
+            f"{name} is gone, and there is another in its place: {there}",
+            expected=str(wanted or f"the port {device}"),
+            cause="another adapter was plugged in and got the name of the lost one",
+            advice="plug in the first one, or open the bus again with the right name",
+        )
+    if os.path.exists(device) and (wanted is None or there is not None):
+        return device
+    raise PortNotFound(f"{name}: {wanted or f'the port {device}'} is not there")
 
 
-def identify(device: str, lister: Lister, sysfs: Path = Path("/sys")) -> Identity:
-    """The identity of a port that is present; `device` is a path without symbolic links."""
-    found = (one for one in identities(lister, sysfs) if real_name(one.device) == real_name(device))
-    return next(found, Identity(f"the port {device}", (), "", device))
+def link_time(device: str) -> int:
+    """When the last symbolic link from this one to its terminal was made (ns)."""
+    while os.path.islink(target := os.path.join(os.path.dirname(device), os.readlink(device))):
+        device = target
+    return os.lstat(device).st_ctime_ns
 
 
-def find_adapter(name: str, wanted: Identity, lister: Lister, sysfs: Path = Path("/sys")) -> str:
-    """The present device of an adapter; `name` is what messages call it.
+def find_terminal(name: str, device: str, before: int) -> str:
+    """The address `name` of a pseudo-terminal to which the symbolic link `device` leads, made again since `before`.
 
-    Raises PortNotFound while it is absent, AnotherAdapter when its name belongs to another one, LinkLost when several
-    could be it.
-    """
-    present = identities(lister, sysfs)
-    same = [one for one in present if one[:2] == wanted[:2]]
-    if len(same) > 1:  # some makers give one number to a whole batch
-        same = [one for one in same if wanted.place and one.place == wanted.place]
-        if len(same) != 1:
-            raise LinkLost(
-                f"{name} is gone, and several adapters with one serial number could be it",
-                expected=wanted.text,
-                advice="plug it in where it was, or open the bus again with the right name",
-            )
-    if same:
-        return same[0].device
-    for other in present:
-        if real_name(other.device) == real_name(wanted.device):
-            raise AnotherAdapter(
-                f"{name} is gone, and there is another in its place: {other.text}",
-                expected=wanted.text,
-                cause="another adapter was plugged in and got the name of the lost one",
-                advice="plug in the first one, or open the bus again with the right name",
-            )
-    if not wanted.interface and os.path.exists(wanted.device):  # the system does not list it
-        return wanted.device
-    raise PortNotFound(f"{name}: {wanted.text} is not there")
-
-
-def link_times(device: str) -> tuple[int, ...]:
-    """When each symbolic link of the chain from `device` to its terminal was made (ns)."""
-    times, path = [], device
-    while os.path.islink(path):
-        times.append(os.lstat(path).st_ctime_ns)
-        path = os.path.join(os.path.dirname(path), os.readlink(path))
-    return tuple(times)
-
-
-def find_terminal(name: str, device: str, before: tuple[int, ...]) -> str:
-    """The address `name` of a pseudo-terminal to which the symbolic link `device` leads.
-
-    The link must be newer than its terminal, or made again since `before` (see `link_times`): a link that a killed
-    simulator left over leads to a terminal of another program. Raises PortNotFound.
+    An old link of a killed simulator may lead to a terminal of another program. Raises PortNotFound.
     """
     real = os.path.realpath(device)
     if not (os.path.exists(real) and real.startswith(usb_adapters.PSEUDO_TERMINALS)):
         raise PortNotFound(f"{device} leads to no pseudo-terminal")
-    times = link_times(device)
-    if times == before and max(times, default=0) < os.stat(real).st_ctime_ns:
+    if link_time(device) == before:
         raise PortNotFound(f"{device} has not been made again")
     return name
 
@@ -269,9 +241,7 @@ class Reconnecting:
         return found
 
 
-def reconnecting(
-    link: Link, *, lister: Lister = list_ports, sysfs: Path = Path("/sys"), **settings: Any
-) -> Link:
+def reconnecting(link: Link, *, lister: Lister = list_ports, **settings: Any) -> Link:
     """The same link, reopened after a loss; `settings` are those it was opened with, see `open_link`.
 
     Not for a pseudo-terminal opened by its number, which goes to the next terminal, nor for a port without a lock.
@@ -281,13 +251,13 @@ def reconnecting(
     device: str = getattr(link, "device", "" if "://" in name else name)
     real = os.path.realpath(device)
     is_terminal = real.startswith(usb_adapters.PSEUDO_TERMINALS)
-    if lock is None or not lock.held or (is_terminal and os.path.abspath(device) == real):
+    if lock is None or not lock.held or (is_terminal and not os.path.islink(device)):
         return link
     if not device:
         return Reconnecting(link, lambda: name, settings)
     if is_terminal:
-        times = link_times(device)
-        return Reconnecting(link, lambda: find_terminal(name, device, times), settings)
-    known = identify(real, lister, sysfs)
+        before = link_time(device)
+        return Reconnecting(link, lambda: find_terminal(name, device, before), settings)
+    known = list_adapters(lister).get(real)
     port_at: Callable[[str], str] = getattr(link, "port_at", str)
-    return Reconnecting(link, lambda: port_at(find_adapter(name, known, lister, sysfs)), settings)
+    return Reconnecting(link, lambda: port_at(find_adapter(name, real, known, lister)), settings)

@@ -162,6 +162,6 @@ def lock_name(address: str, options: Mapping[str, object]) -> str:
     opening = prepare(address, dict(options))
     if not opening.port.startswith(ADAPTER):
         return opening.port
-    from motorbus.link import can
+    from motorbus.link.can import read_address
 
-    return can.describe(opening.port, opening.options).lock_name
+    return read_address(opening.port).lock_name

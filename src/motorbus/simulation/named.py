@@ -198,7 +198,7 @@ class Simulation:
         with self._gate, _lock:
             self._check_free()
             if not is_calm(self._line):
-                check_harmless(port, options)
+                check_harmless(port)
             client = join(port, said, self.family.link.rate, **options)
             start = self._left_at if self.clock == "virtual" else None
             pace = rate if self.pace else None

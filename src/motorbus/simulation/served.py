@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from types import TracebackType
 from typing import TYPE_CHECKING, Final, Self
@@ -72,12 +72,12 @@ def join(port: str, rate: int = 0, default_rate: int = 0, **options: object) -> 
     return LinkClient(CanLink(port, rate=rate, default_rate=default_rate, options=options, shared=True))
 
 
-def check_harmless(port: str, options: Mapping[str, object]) -> None:
+def check_harmless(port: str) -> None:
     """Raises RequestError for a channel that may have real devices, so that no faults may be there; opens nothing."""
     if port.startswith(_CAN):
-        from motorbus.link.can import describe
+        from motorbus.link.can import read_address
 
-        if not describe(port, options).no_wire:
+        if not read_address(port).no_wire:
             raise on_a_wire(port)
 
 

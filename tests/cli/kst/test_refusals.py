@@ -16,22 +16,6 @@ READS = ("#40", "#60", "#70")
 @pytest.mark.parametrize(
     ("words", "code", "message"),
     [
-        ("kst position BUS#0 1", 2, "0 addresses all servos"),
-        ("kst position BUS#37+38 1", 2, "exactly one device"),
-        ("kst position feetech:sim#1", 2, "no kst bus"),
-        ("kst position BUS#9", 5, "did not answer"),
-        ("kst position BUS#37 90.06deg", 8, "out of range"),
-        ("kst position BUS#37 nan", 2, "not a number"),
-        ("kst position BUS#37 10kg", 2, "unit 'kg'"),
-        ("kst position BUS#37 --dry-run", 2, "only reads"),
-        ("kst node-id BUS#37 39", 8, "--yes"),
-        ("kst node-id BUS#37 38 --yes", 2, "is taken"),
-        ("kst node-id BUS#37 0 --yes", 2, "0 addresses all servos"),
-        ("kst node-id BUS#37 me --yes", 2, "not an id"),
-        ("kst bit-rate BUS#37 1M", 8, "--yes"),
-        ("kst bit-rate BUS#37 123 --yes", 2, "no rate"),
-        ("kst bit-rate BUS#37 fast --yes", 2, "not a rate"),
-        ("kst save BUS#37", 8, "--yes"),
         ("kst provision BUS#37 --yes", 2, "--new-id"),
         ("kst provision BUS#37 --new-id 39", 8, "--yes"),
         ("kst provision BUS#37 --new-id 38 --yes", 2, "is taken"),
@@ -40,8 +24,6 @@ READS = ("#40", "#60", "#70")
         ("kst limits BUS#37", 2, "profile"),
         ("kst reverse BUS#37 on --yes", 2, "profile"),
         ("kst mid-point BUS#37 --yes", 2, "profile"),
-        ("kst reports on BUS#37", 2, "profile"),
-        ("kst reports off BUS#37 --interval 10ms", 2, "no interval"),
         ("kst limits EXT#37 -1 1", 8, "--yes"),
         ("kst limits EXT#37 -1 --yes", 2, "one limit alone"),
         ("kst reverse EXT#37 on", 8, "--yes"),
@@ -49,7 +31,7 @@ READS = ("#40", "#60", "#70")
         ("read BUS#37 status --profile kst-ext", 7, "does not exist"),
         ("move BUS#37+38=200deg --yes", 8, "out of range"),
         ("write BUS#37 present_position=1", 2, "present_position"),
-        ("write BUS#37 node_id=38 --yes", 2, "motorbus kst node-id"),
+        ("write BUS#37 node_id=38 --yes", 2, "motorbus set-id"),
         ("write BUS#37 goal_position=901raw --expert", 8, "out of range"),
         ("read BUS#37 --id-format wide", 2, "id_format=wide"),
         ("scan kst:can://slcan/dev/no-such-port", 3, "no-such-port"),
@@ -86,9 +68,3 @@ def test_f5_a_refused_object_costs_itself_only(
     assert shown in ran.out
     assert f"refused {refused}" in " ".join((ran.out + ran.err).split())
     assert "no answer" not in ran.err
-
-
-def test_f5_a_report_interval_that_is_refused_is_left_out(servos: Simulation, run: Run) -> None:
-    ran = run("kst", "reports", "on", f"{servos.url}#37", "--profile", "xqpower", "--interval", "20ms")
-    assert "leave out the interval" in ran.err
-    assert "another profile" not in ran.err

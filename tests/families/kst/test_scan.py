@@ -1,4 +1,4 @@
-"""Scan of ids and search for the bit rate: what is sent, what is reported, what is left undisturbed."""
+"""Scan of ids: what is sent, what is reported, what is left undisturbed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from motorbus.core.family import Found
 from motorbus.core.steps import Progress
 from motorbus.errors import LinkError, LinkLost, RequestError
-from motorbus.families.kst import LineActivity, ScanWarning, Skipped, scan, scan_bit_rates
+from motorbus.families.kst import ScanWarning, Skipped, scan
 from motorbus.families.kst.profiles import RATES
 from motorbus.link.memory import MemoryLink
 from tests.families.kst.bench import Bench, NoErrorFrames, NoListening
@@ -77,43 +77,6 @@ def test_scan_of_a_silent_bus_loses_one_frame_at_each_named_rate() -> None:
         assert run_scan(bench, (5,), (125_000, 250_000)) == [(5, 250_000)]
 
 
-@pytest.mark.parametrize("rate", RATES)
-def test_traffic_shows_the_rate_without_a_frame_sent(rate: int) -> None:
-    with Bench(bit_rate=rate, reports_ms=100, profile="kst-ext") as bench:
-        found = bench.bus.run(scan_bit_rates(bench.settings))
-        assert (found.rate, found.activity[rate]) == (rate, LineActivity.TRAFFIC)
-        assert {found.activity[one] for one in RATES if one < rate} <= {LineActivity.ERRORS}
-        assert (bench.sent(), bench[5].status()["errors"], bench.bus.rate) == ([], 0, 500_000)
-
-
-def test_silent_bus_is_sent_to_only_where_it_is_isolated() -> None:
-    with Bench(bit_rate=125_000) as bench:
-        found = bench.bus.run(scan_bit_rates(bench.settings))
-        assert (found.rate, set(found.activity.values())) == (None, {LineActivity.SILENCE})
-        assert bench.sent() == []
-        found = bench.bus.run(scan_bit_rates(bench.settings, isolated=True))
-        assert (found.rate, [one.node for one in found.found]) == (125_000, [5])
-        assert bench.servo().ping() is False, "the bus has its rate again"
-        bench[5].unplug()
-        assert bench.bus.run(scan_bit_rates(bench.settings, rates=RATES[:2], isolated=True)).rate is None
-
-
-def test_isolated_search_sends_nothing_at_a_rate_with_errors() -> None:
-    with Bench(bit_rate=1_000_000, reports_ms=100, profile="kst-ext") as bench:
-        found = bench.bus.run(scan_bit_rates(bench.settings, rates=(500_000,), isolated=True))
-        assert (found.rate, bench.sent()) == (None, [])
-
-
-def test_adapter_that_cannot_listen_needs_an_isolated_bus() -> None:
-    with Bench(bit_rate=125_000, link=NoListening) as bench:
-        with pytest.raises(RequestError, match="cannot listen"):
-            bench.bus.run(scan_bit_rates(bench.settings))
-        assert bench.sent() == []
-        bench.events.clear()
-        assert bench.bus.run(scan_bit_rates(bench.settings, isolated=True)).rate == 125_000
-        assert bench.of(Skipped) == []
-
-
 class Without800k(MemoryLink):
     """An adapter that lacks a rate, as slcan."""
 
@@ -124,19 +87,20 @@ class Without800k(MemoryLink):
 
 
 def test_rate_that_the_adapter_lacks_is_skipped() -> None:
-    with Bench(bit_rate=1_000_000, reports_ms=10.0, link=Without800k) as bench:
-        found = bench.bus.run(scan_bit_rates(bench.settings))
-        assert (found.rate, 800_000 in found.activity) == (1_000_000, False)
+    with Bench(link=Without800k) as bench:
+        assert run_scan(bench, (5,), (800_000, 500_000)) == [(5, 500_000)]
         assert bench.of(Skipped) == [Skipped(800_000, "this adapter has no such rate")]
 
 
-def test_search_ends_with_a_lost_adapter_or_an_impossible_argument() -> None:
+def test_nothing_is_sent_at_a_rate_with_errors() -> None:
+    with Bench(bit_rate=1_000_000, reports_ms=100, profile="kst-ext") as bench:
+        assert run_scan(bench, (5,), (250_000,)) == []
+        assert bench.sent() == []
+        assert [one.rate for one in bench.of(Skipped)] == [250_000]
+
+
+def test_a_lost_adapter_ends_a_scan() -> None:
     with Bench() as bench:
-        for seconds in (0.0, -1.0, float("nan"), float("inf")):
-            with pytest.raises(RequestError, match="seconds"):
-                bench.bus.run(scan_bit_rates(bench.settings, seconds=seconds))
-        with pytest.raises(RequestError, match="no rate"):
-            bench.bus.run(scan_bit_rates(bench.settings, rates=(9600,)))
-        bench.link.unplug(0.5)
+        bench.link.unplug(0.1)
         with pytest.raises(LinkLost):
-            bench.bus.run(scan_bit_rates(bench.settings))
+            run_scan(bench, (5,), RATES)

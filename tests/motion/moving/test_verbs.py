@@ -13,7 +13,7 @@ from motorbus.core.steps import Progress
 from motorbus.errors import LimitExceeded, NotHomed, RequestError
 from motorbus.motion.moving.verbs import Crisp
 from motorbus.motion.profile import Limiting, Limits, Move, synchronised
-from motorbus.motion.trajectory import Trajectory, Waypoint, interpolated
+from motorbus.motion.trajectory import Trajectory
 from motorbus.session.robot import Robot
 from motorbus.simulation.named import Simulation
 from tests.support.machines import machine
@@ -223,13 +223,7 @@ def test_parking_goes_where_the_file_says() -> None:
 
 # -- trajectories ------------------------------------------------------------------------------------------------------
 
-WAVE = interpolated(
-    [
-        Waypoint({"a1": 0.2, "c1": 0.0}),
-        Waypoint({"a1": 0.5, "c1": 0.2}, at=1.0),
-        Waypoint({"a1": 0.1, "c1": 0.1}, at=2.0),
-    ]
-)
+WAVE = Trajectory([0.0, 1.0, 2.0], {"a1": [0.2, 0.5, 0.1], "c1": [0.0, 0.2, 0.1]})
 
 
 def test_a_trajectory_is_gone_along_from_its_first_sample_on() -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from motorbus.errors import RequestError
 from motorbus.motion.machine import AxisSpec
-from motorbus.motion.profile import Limits, Profile, cubic, line, minimum_jerk, trapezoid
+from motorbus.motion.profile import Limits, Profile, cubic, minimum_jerk, trapezoid
 
 places = st.floats(-1000, 1000)
 velocities = st.floats(0.01, 100)
@@ -217,15 +217,7 @@ def test_minimum_jerk_is_told_its_duration_once() -> None:
         minimum_jerk(0.0, 1.0, duration=1.0, velocity=1.0)
 
 
-# -- line and cubic --------------------------------------------------------------------------------------------------
-
-
-def test_a_line_has_one_velocity() -> None:
-    way = line(1.0, 0.0, duration=4.0)
-    assert [way.position(at) for at in (-1.0, 0.0, 1.0, 4.0, 9.0)] == [1.0, 1.0, 0.75, 0.0, 0.0]
-    assert [way.velocity(at) for at in (0.0, 2.0, 4.0, 4.1)] == [-0.25, -0.25, -0.25, 0.0]
-    assert (way.peak, way.acceleration(2.0)) == (0.25, 0.0)
-    assert line(1.0, 1.0, duration=0.0).velocity(0.0) == 0.0
+# -- cubic -----------------------------------------------------------------------------------------------------------
 
 
 @given(places, places, durations, st.floats(-50, 50), st.floats(-50, 50))
@@ -274,9 +266,8 @@ def test_places_are_finite(figure: float) -> None:
 
 @pytest.mark.parametrize("duration", [nan, inf, -1.0, 0.0])
 def test_a_way_needs_a_duration(duration: float) -> None:
-    for made in (minimum_jerk, line):
-        with pytest.raises(RequestError, match="^duration is "):
-            made(0.0, 1.0, duration=duration)
+    with pytest.raises(RequestError, match="^duration is "):
+        minimum_jerk(0.0, 1.0, duration=duration)
 
 
 def test_ages_are_refused() -> None:

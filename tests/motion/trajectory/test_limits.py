@@ -14,10 +14,8 @@ from motorbus.motion.profile import Kind, Limits, Move, synchronised
 from motorbus.motion.trajectory import (
     Trajectory,
     Violation,
-    Waypoint,
     check,
     first_violation,
-    interpolated,
     sampled,
 )
 
@@ -52,7 +50,9 @@ def test_what_is_planned_within_limits_passes_at_any_rate(
 @given(st.sampled_from(["trapezoid", "minimum_jerk"]), st.floats(0.2, 2), st.floats(0.5, 0.95))
 def test_what_is_made_quicker_than_its_limits_is_found(kind: Kind, way: float, factor: float) -> None:
     group = synchronised({"lift": Move(-1.0, way - 1.0, Limits.of(LIFT))}, kind=kind)
-    found = first_violation(sampled(group, 1000).scaled(factor), AXES)
+    plan = sampled(group, 1000)
+    quicker = Trajectory([at * factor for at in plan.times], plan.axes)
+    found = first_violation(quicker, AXES)
     assert found is not None
     assert found.what in ("velocity", "acceleration")
     assert abs(found.value) > found.limit
@@ -90,12 +90,12 @@ def test_it_begins_and_ends_at_rest(places: list[float], at: float) -> None:
 
 
 def test_a_corner_is_as_hard_as_the_loop_makes_it() -> None:
-    route = interpolated([Waypoint({"lift": -1.0}), Waypoint({"lift": 1.0}, 2.0)], "linear")
+    route = Trajectory([0.0, 2.0], {"lift": [-1.0, 1.0]})
     found = first_violation(sampled(route, 200), AXES)
     assert found is not None
     assert (found.what, found.at) == ("acceleration", 0.0)
     assert found.value == pytest.approx(1.0 / 0.0025)
-    check(sampled(interpolated([Waypoint({"lift": -1.0}), Waypoint({"lift": 1.0}, 2.0)]), 200), AXES)
+    check(sampled(route.joined("spline"), 200), AXES)
 
 
 def test_without_limits_of_position_any_position_passes() -> None:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-from math import inf, isclose, nan, sin
+from math import inf, nan, sin
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from motorbus.errors import RequestError
-from motorbus.motion.profile import Limits, Move, minimum_jerk, synchronised
-from motorbus.motion.trajectory import Trajectory, Waypoint, interpolated, sampled
+from motorbus.motion.profile import Limits, Move, synchronised
+from motorbus.motion.trajectory import Trajectory, sampled
 
 RAMP = Trajectory([0.0, 1.0, 3.0], {"lift": [0.0, 2.0, 1.0], "turn": [5.0, 5.0, 7.0]})
 
@@ -47,7 +47,7 @@ def test_it_is_a_value_of_its_own() -> None:
 
 @given(trajectories(), st.floats(0.5, 200))
 def test_a_loop_gets_a_sample_each_round_and_the_exact_end(one: Trajectory, rate: float) -> None:
-    plan = one.resampled(rate)
+    plan = sampled(one, rate)
     assert plan.times == tuple(number / rate for number in range(len(plan.times)))
     assert plan.duration - 1 / rate < one.duration * (1 + 1e-9)
     assert plan.duration >= one.duration * (1 - 1e-9)
@@ -61,53 +61,6 @@ def test_whatever_has_a_duration_can_be_sampled() -> None:
     plan = sampled(moves, 100)
     assert plan.positions(plan.duration) == {"lift": 1.0, "turn": 2.0}
     assert plan.axes["lift"][50] == moves.positions(0.5)["lift"]
-    route = interpolated([Waypoint({"lift": 0.0}), Waypoint({"lift": 1.0}, 1.0)], "minimum_jerk")
-    reach = minimum_jerk(0.0, 1.0, duration=1.0)
-    assert sampled(route, 10).axes["lift"] == tuple(reach.position(number / 10) for number in range(11))
-
-
-def test_resampled_by_cubics_it_rounds_the_corners() -> None:
-    coarse = Trajectory([0.0, 1.0, 2.0, 3.0], {"lift": [0.0, 1.0, 2.0, 3.0]})
-    fine = coarse.resampled(100, "cubic")
-    rates = [fine.velocities(number / 100)["lift"] for number in range(300)]
-    assert max(abs(after - before) for before, after in pairwise(rates)) < 0.05
-    assert [fine.positions(at)["lift"] for at in (1.0, 2.0, 3.0)] == pytest.approx([1.0, 2.0, 3.0])
-
-
-@given(trajectories())
-def test_there_and_back_is_where_it_was(one: Trajectory) -> None:
-    back = one.reversed()
-    assert back.axes == {name: tuple(reversed(places)) for name, places in one.axes.items()}
-    assert back.times[0] == 0.0
-    assert back.reversed().times == pytest.approx(one.times)
-    assert back.reversed().axes == one.axes
-
-
-@given(trajectories(), st.floats(0.1, 10))
-def test_scaled_it_takes_as_much_more_time(one: Trajectory, factor: float) -> None:
-    slow = one.scaled(factor)
-    assert isclose(slow.duration, one.duration * factor, rel_tol=1e-12)
-    assert slow.axes == one.axes
-
-
-@given(trajectories(), st.floats(0, 1), st.floats(0, 1))
-def test_a_part_is_where_the_whole_was(one: Trajectory, first: float, second: float) -> None:
-    begin, end = sorted((first * one.duration, second * one.duration))
-    if end - begin < 1e-6:
-        return
-    part = one.trimmed(begin, end)
-    assert isclose(part.duration, end - begin, rel_tol=1e-12)
-    for index in range(21):
-        at = part.duration * index / 20
-        assert part.positions(at) == pytest.approx(one.positions(begin + at), rel=1e-4, abs=0.05)
-    assert part.positions(0.0) == one.positions(begin)
-    assert part.positions(part.duration) == one.positions(end)
-
-
-def test_without_figures_the_part_is_the_whole() -> None:
-    assert RAMP.trimmed() == RAMP
-    assert RAMP.trimmed(end=1.0) == Trajectory([0.0, 1.0], {"lift": [0.0, 2.0], "turn": [5.0, 5.0]})
-    assert RAMP.trimmed(begin=2.0).times == (0.0, 1.0)
 
 
 def test_smoothed_it_is_gentle_and_at_the_same_time() -> None:
@@ -163,25 +116,23 @@ def test_what_does_not_fit_together_is_refused(
 
 @pytest.mark.parametrize("figure", [0.0, -1.0, nan, inf])
 def test_figures_are_finite_and_above_nothing(figure: float) -> None:
-    for made, name in (
-        (RAMP.scaled, "factor"),
-        (RAMP.smoothed, "cutoff"),
-        (RAMP.resampled, "rate"),
-    ):
-        with pytest.raises(RequestError, match=f"^{name} is "):
-            made(figure)
+    with pytest.raises(RequestError, match="^cutoff is "):
+        RAMP.smoothed(figure)
+    with pytest.raises(RequestError, match="^rate is "):
+        sampled(RAMP, figure)
 
 
-@pytest.mark.parametrize(("begin", "end"), [(-1.0, 1.0), (1.0, 1.0), (2.0, 1.0), (0.0, 3.1), (nan, 1.0)])
-def test_a_part_lies_inside(begin: float, end: float) -> None:
-    with pytest.raises(RequestError, match="no part of it"):
-        RAMP.trimmed(begin, end)
+def test_an_interpolation_is_one_of_two() -> None:
+    kind: Any = "cubic"
+    with pytest.raises(RequestError, match="'cubic' is no interpolation") as refused:
+        RAMP.joined(kind)
+    assert refused.value.expected == "one of linear, spline"
 
 
 @pytest.mark.parametrize("rate", [1e6, 99_999.0])
 def test_too_many_samples_are_refused(rate: float) -> None:
     with pytest.raises(RequestError, match="cannot be sampled"):
-        RAMP.scaled(10.0).resampled(rate)
+        sampled(Trajectory([0.0, 30.0], {"lift": [0.0, 1.0]}), rate)
 
 
 def test_what_takes_no_time_cannot_be_sampled() -> None:

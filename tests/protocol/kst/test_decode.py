@@ -72,8 +72,6 @@ TITLES = {
     "reverse": "request to node 37: write function_enable = 0x20 (reversed)",
     "sized-3": "request to node 37: write goal_position = 900 (84 03 00), but goal_position has 2 bytes",
     "segments-announced": "reply of node 3: firmware_version comes in segments, 10 bytes",
-    "segment-asked-1": "request to node 3: the next segment, toggle 1",
-    "segment-1": "reply of node 3: segment, toggle 1, 3 bytes, the last",
     "client-abort": "request to node 3: give up firmware_version: SDO protocol timed out",
     "abort-unknown-code": "reply of node 37: goal_position refused: unknown abort code 0x0F000009",
 }

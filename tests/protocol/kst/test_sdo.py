@@ -18,31 +18,27 @@ NOT_ENCODED = {"read-node-id-x", "sized-3", "upload-unsized", "reserved-bit", "r
 """Vectors that the decoders accept and no encoder makes: data in reserved places, lengths that no object has."""
 ADDRESSEES = st.sampled_from([sdo.BROADCAST, *sdo.NODES])
 INDEX, SUBINDEX, VALUE = st.integers(0, 0xFFFF), st.integers(0, 0xFF), st.binary(min_size=1, max_size=4)
-CODE, TOGGLE, YES_OR_NO = st.integers(0, 0xFFFF_FFFF), st.integers(0, 1), st.booleans()
+CODE, YES_OR_NO = st.integers(0, 0xFFFF_FFFF), st.booleans()
 
 
 def encode_request(request: sdo.SdoRequest) -> CanFrame:
     """The frame of a request with these fields."""
-    node, kind, index, subindex, data, sized, toggle, extended = request
-    frame = sdo.encode_abort(node, index, subindex, int.from_bytes(data, "little"))
+    node, kind, index, subindex, data, sized, extended = request
+    frame = CanFrame(0x600 + node, bytes((0x80, index & 0xFF, index >> 8, subindex)) + data)
     if kind == "upload":
         frame = sdo.encode_upload(node, index, subindex)
     elif kind == "download":
         frame = sdo.encode_download(node, index, subindex, data, sized=sized)
-    elif kind == "segment":
-        frame = sdo.encode_segment(node, toggle)
     return frame._replace(extended=extended)
 
 
 def encode_reply(node: int, reply: sdo.SdoReply) -> CanFrame:
     """The frame of a reply with these fields."""
-    kind, index, subindex, data, code, size, toggle, last = reply
+    kind, index, subindex, data, code, size = reply
     if kind == "upload":
         return sdo.encode_upload_reply(node, index, subindex, data)
     if kind == "upload-start":
         return sdo.encode_upload_start(node, index, subindex, size)
-    if kind == "segment":
-        return sdo.encode_segment_reply(node, toggle, data, last)
     if kind == "abort":
         return sdo.encode_abort_reply(node, index, subindex, code)
     return sdo.encode_download_reply(node, index, subindex)
@@ -72,7 +68,6 @@ def test_request_vectors_are_decoded_and_encoded(extended: bool) -> None:
             *vector.object,
             vector.payload,
             vector.id.startswith("sized"),
-            vector.expected.get("toggle", 0),
             extended,
         )
         assert sdo.decode_request(frame) == expected, vector.id
@@ -85,8 +80,6 @@ def test_reply_vectors_are_decoded_and_encoded() -> None:
         assert reply is not None, vector.id
         assert (reply.kind, reply.index, reply.subindex) == (vector.kind, *vector.object), vector.id
         assert (reply.data, reply.code) == (vector.payload, int(vector.expected.get("code", "0"), 16))
-        assert reply.toggle == vector.expected.get("toggle", 0)
-        assert reply.last is vector.expected.get("last", False)
         node = vector.expected["node"]
         assert vector.id in NOT_ENCODED or encode_reply(node, reply) == vector.frame, vector.id
 
@@ -103,34 +96,30 @@ def test_other_frames_are_no_requests() -> None:
     assert decoded == list(range(0x600, 0x680))
 
 
-@given(ADDRESSEES, INDEX, SUBINDEX, VALUE, TOGGLE, YES_OR_NO, YES_OR_NO)
+@given(ADDRESSEES, INDEX, SUBINDEX, VALUE, YES_OR_NO, YES_OR_NO)
 def test_request_is_decoded_as_encoded(
-    node: int, index: int, subindex: int, data: bytes, toggle: int, sized: bool, extended: bool
+    node: int, index: int, subindex: int, data: bytes, sized: bool, extended: bool
 ) -> None:
     whole = data.ljust(4, b"\0")
     requests = [
-        sdo.SdoRequest(node, "upload", index, subindex, b"", False, 0, extended),
-        sdo.SdoRequest(node, "download", index, subindex, data if sized else whole, sized, 0, extended),
+        sdo.SdoRequest(node, "upload", index, subindex, b"", False, extended),
+        sdo.SdoRequest(node, "download", index, subindex, data if sized else whole, sized, extended),
     ]
     if node != sdo.BROADCAST:
-        requests += [
-            sdo.SdoRequest(node, "segment", 0, 0, b"", False, toggle, extended),
-            sdo.SdoRequest(node, "abort", index, subindex, whole, False, 0, extended),
-        ]
+        requests.append(sdo.SdoRequest(node, "abort", index, subindex, whole, False, extended))
     for fields in requests:
         frame = encode_request(fields)
         assert (len(frame.data), frame.id) == (8, 0x600 + node)
         assert sdo.decode_request(frame) == fields
 
 
-@given(NODES, INDEX, SUBINDEX, VALUE, st.binary(max_size=7), CODE, TOGGLE, YES_OR_NO)
+@given(NODES, INDEX, SUBINDEX, VALUE, CODE, YES_OR_NO)
 def test_reply_is_decoded_as_encoded(
-    node: int, index: int, subindex: int, data: bytes, part: bytes, number: int, toggle: int, last: bool
+    node: int, index: int, subindex: int, data: bytes, number: int, sized: bool
 ) -> None:
     replies = [
         sdo.SdoReply("upload", index, subindex, data, size=len(data)),
-        sdo.SdoReply("upload-start", index, subindex, size=number if last else None),
-        sdo.SdoReply("segment", 0, 0, part, size=len(part), toggle=toggle, last=last),
+        sdo.SdoReply("upload-start", index, subindex, size=number if sized else None),
         sdo.SdoReply("download", index, subindex),
         sdo.SdoReply("abort", index, subindex, code=number),
     ]
@@ -141,18 +130,18 @@ def test_reply_is_decoded_as_encoded(
 
 
 def test_specifier_gives_the_kind_of_a_request_and_of_a_reply() -> None:
-    """By the bits as CiA 301 prints them; segmented downloads and block transfer are not part of this protocol."""
+    """By the bits as CiA 301 prints them; segments and block transfer are not read."""
     for specifier in range(256):
         data, bits = bytes((specifier, 3, 0x60, 0, 1, 2, 3, 4)), f"{specifier:08b}"
         request, reply = sdo.decode_request(CanFrame(0x601, data)), sdo.decode_reply(data)
         assert request is not None
-        kinds = {"001": "download" if bits[6] == "1" else "unknown", "010": "upload", "011": "segment"}
+        kinds = {"001": "download" if bits[6] == "1" else "unknown", "010": "upload"}
         assert request.kind == ("abort" if specifier == 0x80 else kinds.get(bits[:3], "unknown"))
         if request.kind == "download":
             count = 4 - int(bits[4:6], 2) if bits[7] == "1" else 4
             assert (request.sized, request.data) == (bits[7] == "1", bytes((1, 2, 3, 4))[:count])
         whole = {0x60: "download", 0x80: "abort"}.get(specifier, "")
-        parts = {"000": "segment", "010": "upload" if bits[6] == "1" else "upload-start"}
+        parts = {"010": "upload" if bits[6] == "1" else "upload-start"}
         assert (reply.kind if reply else "") == parts.get(bits[:3], whole)
 
 
@@ -166,7 +155,6 @@ EXPECTED = {
     "6002": sdo.upload_due(5, 0x6002),
     "1010:1": sdo.upload_due(5, 0x1010, 1),
     "write 6003": sdo.download_due(5, 0x6003),
-    "segment 0": sdo.segment_due(5, 0),
 }
 
 
@@ -179,14 +167,12 @@ EXPECTED = {
         ("4302600100000000", set()),
         ("6003600000000000", {"write 6003"}),
         ("6002600000000000", set()),
-        ("8002600000000206", {"6002", "segment 0"}),
-        ("8002600100000206", {"segment 0"}),
-        ("8010100100000206", {"1010:1", "segment 0"}),
-        ("8010100000000206", {"1010:1", "segment 0"}),
+        ("8002600000000206", {"6002"}),
+        ("8002600100000206", set()),
+        ("8010100100000206", {"1010:1"}),
+        ("8010100000000206", {"1010:1"}),
         ("8000000000000206", set(EXPECTED)),
-        ("80FF5F0000000206", {"segment 0"}),
-        ("0031323334353637", {"segment 0"}),
-        ("1031323334353637", set()),
+        ("80FF5F0000000206", set()),
     ],
 )
 def test_key_matches_replies_to_its_request(data: str, requests: set[str]) -> None:

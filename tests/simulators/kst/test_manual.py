@@ -108,7 +108,7 @@ def test_object_has_the_size_and_access_of_its_row(profile: str) -> None:
 
 ABORTS = {
     "E003600000000000": "8003600001000405",
-    "7003600000000000": "8000000001000405",
+    "7003600000000000": "8003600001000405",
     "4001300000000000": "8001300001000106",
     "2202600000000000": "8002600002000106",
     "4018100000000000": "8018100000000206",
@@ -125,5 +125,3 @@ ABORTS = {
 def test_servo_sends_abort_codes_of_the_list() -> None:
     assert {request: Host().ask(request)[0] for request in ABORTS} == ABORTS
     assert Host(accept_unsized="no").ask("2203600001000000") == ["8003600010000706"]
-    replies = Host(firmware="KST V1.234").ask("400A100000000000", "7000000000000000")
-    assert replies == ["410A10000A000000", "800A100000000305"]

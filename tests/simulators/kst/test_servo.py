@@ -1,4 +1,4 @@
-"""One simulated servo by its frames: writes, segments, status, settings of newer firmware, supply, reports, alarms."""
+"""One simulated servo by its frames: writes, status, settings of newer firmware, supply, reports, alarms."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ import pytest
 from tests.simulators.kst.host import MOVE, READ_ID, READ_POSITION, SAVE, SET_ID, Host
 
 READ_STATUS = "4005600000000000"
-READ_VERSION, FIRST, SECOND = "400A100000000000", "6000000000000000", "7000000000000000"
-NO_TRANSFER = "8000000001000405"
+READ_VERSION = "400A100000000000"
 START, STOP, START_STANDARD, STOP_STANDARD = "025#0100", "025#0200", "000#0125", "000#0225"
 
 
@@ -18,31 +17,10 @@ def test_write_without_length_ignores_further_bytes() -> None:
     assert host[0x25].memory["goal_position"] == 1
 
 
-def test_long_version_comes_in_segments() -> None:
+def test_a_long_version_is_announced_in_segments() -> None:
     host = Host(firmware="0123456789ABCD")
     assert host.ask(READ_VERSION) == ["410A10000E000000"]
-    assert host.ask(FIRST, SECOND) == ["0030313233343536", "1137383941424344"]
-    assert host.ask(FIRST) == [NO_TRANSFER]
-
-
-@pytest.mark.parametrize(
-    ("request_", "reply"),
-    [
-        ("6000000000000000", "800A100000000305"),
-        ("800A100000000405", ""),
-        (READ_ID, "4F00300025000000"),
-        ("restart", ""),
-    ],
-    ids=["repeated toggle", "abort of the client", "another request", "restart"],
-)
-def test_transfer_of_segments_ends(request_: str, reply: str) -> None:
-    host = Host(firmware="0123456789ABCDEFGHIJ")
-    host.ask(READ_VERSION, FIRST)
-    if request_ == "restart":
-        host.restart()
-    else:
-        assert host.ask(request_) == ([reply] if reply else [])
-    assert host.ask(SECOND) == [NO_TRANSFER]
+    assert host.ask("6000000000000000") == ["8000000001000405"]
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,6 @@ from tests.support.world import make_bus
 
 NODES = (0x25, 0x26, 0x27)
 NODE = NODES[0]
-VERSION = "KST X8 1.2.3-beta"
 MISSING = 0x5FFF
 NO_OBJECT, READ_ONLY = 0x0602_0000, 0x0601_0002
 
@@ -39,7 +38,7 @@ class KstRig:
     """A bus, the servos at its end, and a counter that makes every read have another right answer."""
 
     def __init__(self, profile: str = "kst-ext", **options: Any) -> None:
-        simulator = FAMILY.simulator(NODES, profile=profile, firmware=VERSION, **options)
+        simulator = FAMILY.simulator(NODES, profile=profile, **options)
         assert isinstance(simulator, KstBus)
         self.servos = simulator.nodes
         self.link = self.linked(simulator)
@@ -108,11 +107,6 @@ def read_4(rig: KstRig) -> None:
     rig.count += 1
     rig.servos[NODE].temperature = 20.0 + rig.count % 60
     assert rig.servo.temperature() == 20.0 + rig.count % 60
-
-
-def read_segments(rig: KstRig) -> None:
-    """A text of more than four letters; newer firmware tells it in segments."""
-    assert rig.servo.version() == VERSION
 
 
 def refused_read(rig: KstRig) -> None:
@@ -234,7 +228,6 @@ KINDS: dict[str, Kind] = {
     "read 1 byte": Kind(read_1),
     "read 2 bytes": Kind(read_2),
     "read 4 bytes": Kind(read_4),
-    "read in segments": Kind(read_segments, sure=False),
     "refused read": Kind(refused_read),
     "refused write": Kind(refused_write),
     "write 1 byte": Kind(write_1),

@@ -22,17 +22,15 @@ from motorbus.families.kst.driver.feedback import RawStatus, Status
 from motorbus.families.kst.driver.motion import Promise, Started
 from motorbus.families.kst.driver.node import ID_FORMATS, NMT, SIZED, BusSettings, Node
 from motorbus.families.kst.driver.provisioning import PowerCycleNeeded, Provisioned
-from motorbus.families.kst.driver.scan import BitRates, LineActivity, ScanWarning, scan, scan_bit_rates
+from motorbus.families.kst.driver.scan import ScanWarning, scan
 from motorbus.families.kst.driver.servo import AsyncServo, Servo, settings_of
 from motorbus.families.kst.profiles import DEFAULT_RATE, PROFILES, RATES, TABLES
 
 __all__ = [
     "FAMILY",
     "AsyncServo",
-    "BitRates",
     "BusSettings",
     "KstDriver",
-    "LineActivity",
     "Node",
     "PowerCycleNeeded",
     "Promise",
@@ -49,7 +47,6 @@ __all__ = [
     "broadcast_read",
     "broadcast_save",
     "scan",
-    "scan_bit_rates",
     "settings_of",
 ]
 

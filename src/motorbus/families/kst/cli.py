@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Annotated, Any, Final, Literal
 
@@ -11,7 +11,6 @@ from cyclopts import App, Group, Parameter
 from motorbus.cli import consent, dry, identity, quantity, several, target
 from motorbus.cli.device_command import DeviceCommand, device_command
 from motorbus.cli.exits import Exit
-from motorbus.cli.parameters import Flag
 from motorbus.core import units
 from motorbus.core.interrupted import Moving, stopped_if_interrupted
 from motorbus.core.register import Register
@@ -22,7 +21,7 @@ from motorbus.errors import RequestError
 from motorbus.families.kst.driver import feedback, motion, provisioning
 from motorbus.families.kst.driver.broadcast import broadcast_read
 from motorbus.families.kst.driver.node import checked_id
-from motorbus.families.kst.driver.scan import ScanWarning, scan_bit_rates
+from motorbus.families.kst.driver.scan import ScanWarning
 from motorbus.families.kst.driver.servo import Servo, settings_of
 from motorbus.families.kst.profiles import (
     PROFILES,
@@ -54,143 +53,11 @@ def label(node: int) -> str:
     return f"#{node} (0x{node:02X})"
 
 
-@command(
-    "position BUS#ID [VALUE]",
-    "Rounded to the servo's tenth of a degree, halves away from zero.",
-    "position kst:can://slcan/dev/ttyACM0#0x25 10.9deg",
-    "position kst:sim,ids=0x25#0x25 -30deg --wait",
-    "position kst:sim,ids=0x25#0x25 90deg --dry-run",
-    consent="a move of over 180 degrees",
-)
-def position(
-    run: Run,
-    value: Annotated[str, Parameter(name="VALUE", help="Target in rad, or as 90deg; without it, read.")] = "",
-    /,
-    *,
-    wait: Annotated[Flag, Parameter(help="Return when the servo has arrived.")] = False,
-) -> Exit:
-    """Read the position of a servo, or move it."""
-    if not value:
-        here = run.read(lambda servo: servo.position())
-        return run.show({"position": here}, units.show(here, "position"))
-    goal = units.parse(value, "position")
-    if run.dry_run:
-        run.write(lambda servo: servo.move(goal, wait=False))
-        return Exit.OK
-    with target.opened(run.bus, run.options, run.output) as bus:
-        servo = Servo(bus, run.node)
-        rehearse = partial(Servo(dry.DryBus(bus), run.node).move, goal, wait=False)
-        consent.consent_to_ways([(servo, goal)], run.output, yes=run.yes, rehearse=rehearse)
-        servo.move(goal, wait=wait)
-        here = servo.position()
-    shown = {"goal": units.show(goal, "position"), "position": units.show(here, "position")}
-    return run.show({"goal": goal, "position": here}, **shown)
-
-
-@command(
-    "status BUS#ID",
-    "By the profile `kst`, the manual, the status is two bytes without a documented\n"
-    "meaning, read by the frame that reads the position. Other profiles: current and\n"
-    "temperature.",
-    "status kst:can://slcan/dev/ttyACM0#0x25",
-    "status kst:sim,ids=0x25,profile=kst-ext#0x25",
-    consent="",
-    dry_run=False,
-)
-def status(run: Run, /) -> Exit:
-    """Read the status of a servo."""
-    found = run.read(lambda servo: servo.status())
-    if isinstance(found, feedback.RawStatus):
-        run.show(found._asdict(), X1=f"0x{found.x1:02X}", X2=f"0x{found.x2:02X}")
-        run.output.note(f"warning: {found.warning}")
-        return Exit.OK
-    celsius = units.show(found.temperature, "temperature")
-    return run.show(found._asdict(), current=units.show(found.current, "current"), temperature=celsius)
-
-
-@command(
-    "version BUS#ID",
-    "",
-    "version kst:can://slcan/dev/ttyACM0#0x25",
-    "version kst:sim,ids=0x25#0x25 --json",
-    consent="",
-    dry_run=False,
-)
-def version(run: Run, /) -> Exit:
-    """Read the firmware version of a servo."""
-    text = run.read(lambda servo: servo.version())
-    return run.show({"version": text}, text)
-
-
-@command(
-    "node-id BUS#ID [NEW]",
-    "A new id takes effect after `motorbus kst save` and a power cycle.",
-    "node-id kst:can://slcan/dev/ttyACM0#0x25",
-    "node-id kst:can://slcan/dev/ttyACM0#0x25 0x26 --yes",
-    "node-id kst:sim,ids=0x25#0x25 0x26 --dry-run",
-)
-def node_id(
-    run: Run,
-    new: Annotated[str, Parameter(name="NEW", help="New id, 1 to 127; without it, read.")] = "",
-    /,
-) -> Exit:
-    """Read the id that a servo has or will have, or write another one."""
-    if not new:
-        found = run.read(lambda servo: servo.node_id())
-        pending = "" if found == run.node else f"; it answers as {run.label} until it is restarted"
-        return run.show({"reads_back": found}, f"{label(found)}{pending}")
-    wanted = checked_id(identity.id_said(new))
-    run.write(lambda servo: servo.set_node_id(wanted), f"write the id {label(wanted)}")
-    return show_pending(run, wanted, f"the id {label(wanted)}")
-
-
-@command(
-    "bit-rate BUS#ID [RATE]",
-    "A new rate takes effect after `motorbus kst save` and a power cycle.",
-    "bit-rate kst:can://slcan/dev/ttyACM0#0x25",
-    "bit-rate kst:can://slcan/dev/ttyACM0#0x25 1000000 --yes",
-    "bit-rate kst:sim,ids=0x25#0x25 250k --dry-run",
-)
-def bit_rate(
-    run: Run,
-    rate: Annotated[str, Parameter(name="RATE", help="20k 50k 100k 125k 250k 500k 800k or 1000k")] = "",
-    /,
-) -> Exit:
-    """Read the bit rate that a servo will have, or write another one."""
-    if not rate:
-        found = run.read(lambda servo: servo.bit_rate())
-        text = f"{found} bit/s" if found is not None else "not readable: the manual has no command for it"
-        return run.show({"bitrate": found}, text)
-    wanted = parse_bit_rate(rate)
-    run.write(lambda servo: servo.set_bit_rate(wanted), f"write the bit rate {wanted} bit/s")
-    return show_pending(run, wanted, f"the bit rate {wanted} bit/s")
-
-
-def show_pending(run: Run, wanted: int, value: str) -> Exit:
-    """Show what was written and takes effect after a save and a restart."""
-    text = f"written: {run.label} has {value} after `motorbus kst save {run.address}` and a power cycle"
-    facts = {"new": wanted, "in_force": False, "next": ["save", "power-cycle"]}
-    return run.show(facts, f"{text}; without a save it is lost")
-
-
 def parse_bit_rate(text: str) -> int:
     """Parse 500000, 500k or 1M. Raises RequestError for a rate that these servos do not have."""
     rate = units.rate(text)
     bit_rate_code(rate)  # raises
     return rate
-
-
-@command(
-    "save BUS#ID",
-    "A save has no reply; only a power cycle shows what was saved.",
-    "save kst:can://slcan/dev/ttyACM0#0x25 --yes",
-    "save kst:sim,ids=0x25#0x25 --dry-run",
-)
-def save(run: Run, /) -> Exit:
-    """Save id, bit rate, limits and function bits of a servo."""
-    run.write(lambda servo: servo.save(), "save its settings")
-    text = f"sent to {run.label}; a save has no reply: only a power cycle shows what was saved"
-    return run.show({"sent": True, "confirmed": None}, text)
 
 
 @command(
@@ -249,32 +116,6 @@ def provision(
     text = f"{label(done.node)} {result}: it answers at {done.rate} bit/s, firmware {done.firmware}"
     facts = {"bitrate": done.rate, "firmware": done.firmware, "resumed": done.resumed}
     return run.show({"event": "provisioned", "from": run.node, "id": done.node, **facts}, text)
-
-
-@command(
-    "reports on|off BUS#ID",
-    "Not in the manual; a profile without it refuses. By the profile xqpower, `on`\n"
-    "also lets the servo move, and after `off` it ignores target positions.",
-    "reports on kst:can://slcan/dev/ttyACM0#1 --profile kst-ext",
-    "reports on kst:sim,profile=kst-ext#1 --interval 10ms",
-    "reports off kst:sim,profile=kst-ext#1",
-    consent="",
-)
-def reports(
-    switch: Switch,
-    run: Run,
-    /,
-    *,
-    interval: Annotated[str, Parameter(help="Time between two reports, as 10ms.")] = "",
-) -> Exit:
-    """Start or stop the position reports of a servo."""
-    on = switch == "on"
-    if interval and not on:
-        raise RequestError("reports that end have no interval", expected="--interval with `reports on` only")
-    seconds = units.parse(interval, "time") if interval else None
-    run.write(lambda servo: servo.start_reports(seconds) if on else servo.stop_reports())
-    text = f"reports of {run.label} switched {switch}; the servo does not acknowledge this"
-    return run.show({"reports": on, "interval": seconds}, text)
 
 
 @command(
@@ -337,19 +178,15 @@ def reverse(run: Run, switch: Switch | None = None, /) -> Exit:
 # `motorbus.cli.faces` finds it by name.
 
 COMMANDS: Final = {
-    "set_node_id()": "`motorbus kst node-id BUS#ID NEW`",
-    "set_node_id(": "`motorbus kst node-id BUS#ID {}`",
-    "set_bit_rate()": "`motorbus kst bit-rate BUS#ID RATE`",
+    "set_node_id()": "`motorbus set-id BUS#ID NEW`",
+    "set_bit_rate()": "`motorbus set-baud BUS#ID RATE`",
     "provision()": "`motorbus kst provision`",
-    "save()": "`motorbus kst save`",
     "set_mid_point()": "`motorbus kst mid-point`",
     "set_reversed()": "`motorbus kst reverse BUS#ID on|off`",
     "set_reversed(False)": "`motorbus kst reverse BUS#ID off`",
     "reversed()": "`motorbus kst reverse BUS#ID`",
-    "isolated=True": "`motorbus scan BUS --bitrate all`",
 }
-"""A call in an error text, or its start up to the bracket for any arguments -> the command that does the same; {}
-stands for these arguments."""
+"""A call in an error text -> the command that does the same."""
 CUT_OFF: Final = (
     "repeat `motorbus set-id`, `motorbus set-baud` or `motorbus kst provision`: it reads the state of the servo and "
     "continues; nothing was sent"
@@ -383,27 +220,6 @@ def meaning(row: Register, raw: int) -> str:
 def ping_everyone(bus: Any) -> list[int]:
     """For `motorbus ping BUS`: the ids of the servos that answer one broadcast read."""
     return sorted(bus.run(broadcast_read("node_id", settings_of(bus))))
-
-
-def detect_bit_rate(
-    bus: Any, seconds: float, report: Callable[[object], None]
-) -> tuple[int | None, dict[int, str]]:
-    """For `motorbus scan --listen`: listen `seconds` at each bit rate, without sending.
-
-    Returns the rate of the bus (None: not known) and, by rate, what was received.
-
-    A rate that the adapter lacks is reported. Raises RequestError if the adapter can listen at none.
-    """
-    skipped: dict[int, str] = {}
-
-    def take(event: object) -> None:
-        if isinstance(event, Skipped):
-            skipped[event.rate] = f"not listened to: {event.why}"
-        report(event)
-
-    found = bus.run(scan_bit_rates(settings_of(bus), seconds=seconds), report=take)
-    activity = skipped | {rate: one.value for rate, one in found.activity.items()}
-    return found.rate, {rate: activity[rate] for rate in bus.family.link.rates if rate in activity}
 
 
 def move_together(bus: Any, goals: Mapping[int, float], *, wait: bool = True) -> None:

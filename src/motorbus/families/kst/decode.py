@@ -130,10 +130,6 @@ class _Frame:
             return self._invalid("request", "8 data bytes")
         title = f"request to {who}:"
         match request.kind:
-            case "segment":
-                what = f"the next segment, toggle {request.toggle}"
-                self._specifier(what)
-                return f"{title} {what}"
             case "upload":
                 return f"{title} read {self._object('read (upload)', request)}"
             case "abort":
@@ -149,12 +145,6 @@ class _Frame:
             return self._invalid("reply", "8 data bytes (or, as a report, 4)")
         title = f"reply of node {node}:"
         match reply.kind:
-            case "segment":
-                more = "the last" if reply.last else "more follow"
-                what = f"segment, toggle {reply.toggle}, {counted(len(reply.data))}, {more}"
-                self._specifier(what)
-                self.fields.take(len(reply.data), "data", version_text(reply.data))
-                return f"{title} {what}"
             case "abort":
                 name = self._object("abort", reply)
                 return f"{title} {name} refused: {self._abort_code()}"

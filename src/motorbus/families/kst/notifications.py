@@ -196,8 +196,6 @@ class FrameReceiver:
         kind = _KEY_KINDS[data[0]]
         if not kind or (kind == "download" and data[4:] in _ABORT_CODES):
             return Noise(data, "foreign", node)
-        if kind == "segment":
-            return Reply(node, sdo.Key(kind, toggle=data[0] >> 4 & 1), data)
         return Reply(node, sdo.Key(kind, data[1] | data[2] << 8, data[3]), data)
 
     def flush(self) -> list[Event]:

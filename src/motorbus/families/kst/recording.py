@@ -37,7 +37,7 @@ def classify(frame: CanFrame) -> RecordedEvent:
     if request is not None:
         if request.kind == "unknown":
             return Noise(data, "foreign")
-        return RecordedFrame(data, "request", request.node, _code(frame.data, request.kind))
+        return RecordedFrame(data, "request", request.node, _code(frame.data))
     if (start := decode_start(frame)) is not None:
         return RecordedFrame(data, "request", start.node, 0)
     if (notification := decode_notification(frame)) is not None:
@@ -47,10 +47,9 @@ def classify(frame: CanFrame) -> RecordedEvent:
     reply = sdo.decode_reply(frame.data) if node in sdo.NODES else None
     if reply is None:
         return Noise(data, "foreign")
-    return RecordedFrame(data, "reply", node, _code(frame.data, reply.kind))
+    return RecordedFrame(data, "reply", node, _code(frame.data))
 
 
-def _code(data: bytes, kind: str) -> int:
-    """Specifier, index and sub-index as one number; of a segment the specifier alone."""
-    head = data[0] << 24
-    return head if kind == "segment" else head | data[2] << 16 | data[1] << 8 | data[3]
+def _code(data: bytes) -> int:
+    """Specifier, index and sub-index as one number."""
+    return data[0] << 24 | data[2] << 16 | data[1] << 8 | data[3]

@@ -8,8 +8,8 @@ stated, bits 3 and 2 (n): how many of the four data bytes are unused. Reserved b
 
 Encoders make frames with 11-bit identifiers; `CanFrame._replace(extended=True)` makes one of 29 bits.
 
-Source: KST CAN protocol manual, commands 1 to 9; CiA 301 for the specifier and for transfers in segments. Frames from a
-device never raise an error here. An id above 127 raises RequestError.
+Source: KST CAN protocol manual, commands 1 to 9; CiA 301 for the specifier. Segments, in which longer values
+come (CiA 301), are not read. Frames from a device never raise an error here. An id above 127 raises RequestError.
 """
 
 from __future__ import annotations
@@ -29,12 +29,10 @@ BROADCAST: Final = 0
 NODES: Final = range(1, 128)
 LENGTH: Final = 8  # data bytes of each request and reply
 EXPEDITED: Final = 4  # maximum number of value bytes in one frame
-SEGMENT_BYTES: Final = 7
 
 UPLOAD: Final = 0x40
 DOWNLOAD_UNSIZED: Final = 0x22
 DOWNLOADED: Final = 0x60
-SEGMENT: Final = 0x60
 ABORT: Final = 0x80
 _KIND: Final = 0xE0
 _E: Final = 2
@@ -42,7 +40,7 @@ _S: Final = 1
 
 
 class SdoRequest(NamedTuple):
-    """A decoded request: "upload", "download", "segment", "abort" or "unknown".
+    """A decoded request: "upload", "download", "abort" or "unknown".
 
     `data` is the value of a download (all four bytes unless `sized`), the code of an abort, else bytes 4 to 7 or empty.
     """
@@ -53,15 +51,14 @@ class SdoRequest(NamedTuple):
     subindex: int = 0
     data: bytes = b""
     sized: bool = False
-    toggle: int = 0
     extended: bool = False
 
 
 class SdoReply(NamedTuple):
-    """A decoded reply: "upload", "upload-start" (segments follow), "segment", "download" or "abort" (with `code`).
+    """A decoded reply: "upload", "upload-start" (segments follow), "download" or "abort" (with `code`).
 
     `size` is the stated length of `data`, or of the whole value at an upload-start. None: not stated, and `data` are
-    all four bytes. A segment has no index.
+    all four bytes.
     """
 
     kind: str
@@ -70,8 +67,6 @@ class SdoReply(NamedTuple):
     data: bytes = b""
     code: int = 0
     size: int | None = None
-    toggle: int = 0
-    last: bool = False
 
 
 # -- requests --------------------------------------------------------------------------------------------------
@@ -90,16 +85,6 @@ def encode_download(node: int, index: int, subindex: int, data: bytes, *, sized:
     return _frame(REQUEST, node, _head(specifier, index, subindex) + data)
 
 
-def encode_segment(node: int, toggle: int) -> CanFrame:
-    """Request the next segment of an upload; `toggle` is 0 for the first segment, then alternates."""
-    return _frame(REQUEST, node, bytes((SEGMENT | toggle << 4,)))
-
-
-def encode_abort(node: int, index: int, subindex: int, code: int) -> CanFrame:
-    """Abort a transfer as the client; it has no reply."""
-    return _frame(REQUEST, node, _head(ABORT, index, subindex) + code.to_bytes(4, "little"))
-
-
 def decode_request(frame: CanFrame) -> SdoRequest | None:
     """A request with either identifier format; None for any other frame, also for a request without 8 bytes."""
     node, data, extended = frame.id - REQUEST, frame.data, frame.extended
@@ -109,8 +94,6 @@ def decode_request(frame: CanFrame) -> SdoRequest | None:
     match specifier & _KIND:
         case 0x40:
             return SdoRequest(node, "upload", index, subindex, extended=extended)
-        case 0x60:
-            return SdoRequest(node, "segment", toggle=specifier >> 4 & 1, extended=extended)
         case 0x20 if specifier & _E:
             sized = bool(specifier & _S)
             value = rest[: _size(specifier)] if sized else rest
@@ -129,7 +112,7 @@ def reply_kind(specifier: int) -> str:
         return "upload" if specifier & _E else "upload-start"
     if specifier in (DOWNLOADED, ABORT):
         return "download" if specifier == DOWNLOADED else "abort"
-    return "" if kind else "segment"
+    return ""
 
 
 def decode_reply(data: bytes) -> SdoReply | None:
@@ -145,10 +128,6 @@ def decode_reply(data: bytes) -> SdoReply | None:
             return SdoReply(kind, index, subindex, rest[:size], size=size)
         case "upload-start":
             return SdoReply(kind, index, subindex, size=int.from_bytes(rest, "little") if stated else None)
-        case "segment":
-            size = SEGMENT_BYTES - (specifier >> 1 & 7)
-            toggle, last = specifier >> 4 & 1, bool(specifier & 1)
-            return SdoReply(kind, 0, 0, data[1 : 1 + size], size=size, toggle=toggle, last=last)
     return SdoReply(kind, index, subindex, code=int.from_bytes(rest, "little") if kind == "abort" else 0)
 
 
@@ -163,12 +142,6 @@ def encode_upload_start(node: int, index: int, subindex: int, size: int | None) 
     if size is None:
         return _frame(REPLY, node, _head(UPLOAD, index, subindex))
     return _frame(REPLY, node, _head(UPLOAD | _S, index, subindex) + size.to_bytes(4, "little"))
-
-
-def encode_segment_reply(node: int, toggle: int, data: bytes, last: bool) -> CanFrame:
-    """One segment of at most 7 bytes, with the toggle of its request."""
-    specifier = toggle << 4 | (SEGMENT_BYTES - len(data)) << 1 | last
-    return _frame(REPLY, node, bytes((specifier,)) + data)
 
 
 def encode_download_reply(node: int, index: int, subindex: int) -> CanFrame:
@@ -197,16 +170,15 @@ def _size(specifier: int) -> int:
 
 @dataclass(slots=True, eq=False)
 class Key:
-    """What a reply has in common with its request beside the node: kind, index and sub-index, or a toggle.
+    """What a reply has in common with its request beside the node: kind, index and sub-index.
 
     The manual leaves open what an abort repeats. So an abort equals requests with its index and sub-index, or with its
-    index if its sub-index is 0, or all if it says 0:0, and every segment. Equality is not transitive: one hash for all.
+    index if its sub-index is 0, or all if it says 0:0. Equality is not transitive: one hash for all.
     """
 
     kind: str
     index: int = 0
     subindex: int = 0
-    toggle: int = 0
 
     def __hash__(self) -> int:
         return REPLY
@@ -215,12 +187,11 @@ class Key:
         if not isinstance(other, Key):
             return NotImplemented
         if self.kind == other.kind:
-            same_object = self.index == other.index and self.subindex == other.subindex
-            return same_object and self.toggle == other.toggle
+            return self.index == other.index and self.subindex == other.subindex
         abort, request = (self, other) if self.kind == "abort" else (other, self)
         if abort.kind != "abort":
             return False
-        if request.kind == "segment" or (abort.index, abort.subindex) == (0, 0):
+        if (abort.index, abort.subindex) == (0, 0):
             return True
         return abort.index == request.index and abort.subindex in (0, request.subindex)
 
@@ -233,11 +204,6 @@ def upload_due(node: int, index: int, subindex: int = 0) -> Expected:
 def download_due(node: int, index: int, subindex: int = 0) -> Expected:
     """The reply to `encode_download`."""
     return Expected(node, Key("download", index, subindex), LENGTH)
-
-
-def segment_due(node: int, toggle: int) -> Expected:
-    """The reply to `encode_segment`."""
-    return Expected(node, Key("segment", toggle=toggle), LENGTH)
 
 
 # -- abort codes -----------------------------------------------------------------------------------------------

@@ -24,7 +24,7 @@ from motorbus.motion.profile import Kind, Limits, Move, Profile, Synchronised, s
 from motorbus.motion.profile.shapes import NOTHING
 from motorbus.motion.profile.together import KINDS
 from motorbus.motion.trajectory import Course, Interpolation, Trajectory
-from motorbus.motion.trajectory.waypoints import check_kind
+from motorbus.motion.trajectory.samples import check_kind
 
 if TYPE_CHECKING:
     from motorbus.motion.body import Body
@@ -172,8 +172,7 @@ def replay(
     """Go along a trajectory: first to its beginning in one movement, then as it says. Its goals leave at `rate` (Hz).
 
     `speed` (above 0) is how much faster it goes: 0.5 takes twice the time. Samples of a `Trajectory` are joined by
-    `interpolation`, see `interpolated`; a route says itself what is between. What comes back is of the trajectory,
-    without the way to its beginning.
+    `interpolation`, see `Trajectory.joined`. What comes back is of the trajectory, without the way to its beginning.
 
     Raises RequestError for an axis that cannot be led: a device that moves by a profile of its own goes from point to
     point only. Raises LimitExceeded for the first goal that would go beyond a limit; else as `move`.

@@ -18,7 +18,6 @@ from motorbus.motion.profile.shapes import (
     Profile,
     Trapezoid,
     cubic,
-    line,
     minimum_jerk,
     trapezoid,
 )
@@ -35,7 +34,6 @@ __all__ = [
     "Synchronised",
     "Trapezoid",
     "cubic",
-    "line",
     "minimum_jerk",
     "synchronised",
     "trapezoid",

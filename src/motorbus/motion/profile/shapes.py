@@ -164,7 +164,7 @@ def trapezoid(
 class Polynomial:
     """A movement whose position is a polynomial of the share of its duration that is over.
 
-    Made by `minimum_jerk`, `cubic` and `line`. `coefficients` (rad or m) begin with the constant one.
+    Made by `minimum_jerk` and `cubic`. `coefficients` (rad or m) begin with the constant one.
     """
 
     start: float
@@ -218,14 +218,6 @@ def minimum_jerk(
     _long_enough(duration, way)
     peak = PEAK * abs(way) / duration if way else 0.0
     return Polynomial(start, goal, duration, peak, (start, 0.0, 0.0, 10 * way, -15 * way, 6 * way))
-
-
-def line(start: float, goal: float, *, duration: float) -> Polynomial:
-    """At one velocity all the way, which it has from the first moment to the last. Raises RequestError."""
-    _finite(start=start, goal=goal)
-    way = goal - start
-    _long_enough(duration, way)
-    return Polynomial(start, goal, duration, abs(way) / duration if way else 0.0, (start, way))
 
 
 def cubic(start: float, goal: float, *, duration: float, first: float, last: float) -> Polynomial:

@@ -32,8 +32,8 @@ _MEASURES: Final[Mapping[What, tuple[Measure, str]]] = {
 }
 _ADVICE: Final[Mapping[What, str]] = {
     "position": "change it, or low and high of the axis",
-    "velocity": "make it slower: scaled(2) takes twice the time",
-    "acceleration": "make it slower or smoother: scaled(2), smoothed(5), or another interpolation",
+    "velocity": "make it slower: speed=0.5 takes twice the time",
+    "acceleration": "make it slower or smoother: speed=0.5, or smoothed(5)",
 }
 
 

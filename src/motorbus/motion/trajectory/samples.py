@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil, isfinite
 from os import PathLike
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Final, Literal, Protocol, TypeAlias
 
 from motorbus.errors import RequestError
 from motorbus.motion.machine import source
@@ -20,10 +20,13 @@ from motorbus.motion.machine.model import FARTHEST
 from motorbus.motion.profile.shapes import NOTHING
 from motorbus.motion.trajectory import columns
 from motorbus.motion.trajectory.smoothing import smooth
-from motorbus.motion.trajectory.waypoints import Interpolation, check_kind, joined
+from motorbus.motion.trajectory.spline import spline
 
 if TYPE_CHECKING:
     from motorbus.motion.machine import AxisSpec
+
+Interpolation: TypeAlias = Literal["linear", "spline"]
+INTERPOLATIONS: Final = ("linear", "spline")
 
 MOST: Final = columns.MOST_ROWS
 """Samples a trajectory may have; an hour at 200 Hz has 720 000."""
@@ -35,7 +38,7 @@ FASTEST: Final = 1e5
 
 
 class Course(Protocol):
-    """Whatever has a duration and says where its axes are: a trajectory, a route, moves that are synchronised."""
+    """Whatever has a duration and says where its axes are: a trajectory, a spline, moves that are synchronised."""
 
     @property
     def duration(self) -> float:
@@ -124,14 +127,10 @@ class Trajectory:
 
     # -- what can be made of it --------------------------------------------------------------------------------------
 
-    def resampled(self, rate: float, kind: Interpolation = "linear") -> Trajectory:
-        """The same with a sample for each round of a loop of `rate` (Hz), see `sampled`; `cubic` rounds the corners."""
-        return sampled(self.joined(kind), rate)
-
     def joined(self, kind: Interpolation = "spline") -> Course:
-        """What goes through its samples, see `interpolated`. Raises RequestError for a kind that is none."""
+        """What goes through its samples: straight between two, or a spline. Raises RequestError for another kind."""
         check_kind(kind)
-        return self if kind == "linear" else joined(self.times, self.axes, kind)
+        return self if kind == "linear" else spline(self.times, self.axes)
 
     def smoothed(self, cutoff: float) -> Trajectory:
         """Without what is quicker than `cutoff` (Hz, above 0): tremor of a hand, steps of a sensor.
@@ -144,34 +143,11 @@ class Trajectory:
             self.times, {name: smooth(self.times, places, cutoff) for name, places in self.axes.items()}
         )
 
-    def trimmed(self, begin: float = 0.0, end: float | None = None) -> Trajectory:
-        """The part from `begin` to `end` (s); its time begins with 0 again. Raises RequestError for no part of it."""
-        end = self.duration if end is None else end
-        if not 0 <= begin < end <= self.duration or end - begin < CLOSEST:
-            raise _refused(
-                f"{begin} s to {end} s is no part of it", f"a part of 0 s to {self.duration:.6g} s"
-            )
-        inner = [place for place, at in enumerate(self.times) if begin + CLOSEST <= at <= end - CLOSEST]
-        first, last = self.positions(begin), self.positions(end)
-        return Trajectory(
-            [0.0, *(self.times[place] - begin for place in inner), end - begin],
-            {
-                name: [first[name], *(places[place] for place in inner), last[name]]
-                for name, places in self.axes.items()
-            },
-        )
 
-    def scaled(self, factor: float) -> Trajectory:
-        """The same way in `factor` times the time: 2 is half as fast. Raises RequestError for 0 and less."""
-        _above_nothing(factor=factor)
-        return Trajectory([at * factor for at in self.times], self.axes)
-
-    def reversed(self) -> Trajectory:
-        """The way back."""
-        return Trajectory(
-            [self.duration - at for at in self.times[::-1]],
-            {name: places[::-1] for name, places in self.axes.items()},
-        )
+def check_kind(kind: str) -> None:
+    """Raise RequestError for an unknown kind of interpolation."""
+    if kind not in INTERPOLATIONS:
+        raise _refused(f"{kind!r} is no interpolation", f"one of {', '.join(INTERPOLATIONS)}")
 
 
 def sampled(course: Course, rate: float) -> Trajectory:

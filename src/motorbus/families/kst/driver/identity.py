@@ -13,15 +13,15 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 from motorbus.core.family import IdChanged, Identity
+from motorbus.core.register import Register
 from motorbus.core.request import ANY, Notification, Priority, Request, Response
 from motorbus.core.steps import Emit, Exclusive, WaitFor, gather
-from motorbus.errors import DeviceError, NoReply, RequestError, VerificationFailed
+from motorbus.errors import DeviceError, NoReply, RequestError, UnexpectedReply, VerificationFailed
 from motorbus.families.kst.driver.node import Node, checked_id, hexadecimal
 from motorbus.families.kst.driver.requests import (
     ask_presence,
     decoded,
     is_absent,
-    read_all_bytes,
     read_register,
     write_register,
 )
@@ -47,7 +47,7 @@ async def identify(node: Node) -> Identity:
     reads_back = await _read_id(node)
     try:
         firmware = await version(node)
-    except DeviceError:
+    except (DeviceError, UnexpectedReply):
         firmware = "unknown"
     name, id_format = node.profile.name, "ext" if node.settings.extended else "std"
     details = {"profile": name, "id_format": id_format, "reads_back_id": reads_back}
@@ -55,15 +55,22 @@ async def identify(node: Node) -> Identity:
 
 
 async def version(node: Node) -> str:
-    """The firmware version (hex where it is no text), from 0x100A or 0x100B. Raises DeviceError without both."""
+    """The firmware version (hex where it is no text), from 0x100A or 0x100B.
+
+    Raises DeviceError without both, UnexpectedReply for one that comes in segments.
+    """
     *rows, last = node.profile.version_rows
     for row in rows:
         try:
-            return version_text(await read_all_bytes(node, row))
+            return await _read_version(node, row)
         except DeviceError as error:
             if not is_absent(error):
                 raise
-    return version_text(await read_all_bytes(node, last))
+    return await _read_version(node, last)
+
+
+def _read_version(node: Node, row: Register) -> Request[str]:
+    return read_register(node, row, lambda raw: version_text(raw.to_bytes(row.size, "little")))
 
 
 async def _read_id(node: Node) -> int | None:

@@ -1,4 +1,4 @@
-"""Requests to one servo: read an object, write one, read a value in segments.
+"""Requests to one servo: read an object, write one.
 
 A reply is accepted by its index and sub-index, also an acknowledgement. An abort raises DeviceError with the words of
 the manual.
@@ -12,7 +12,6 @@ from typing import Final, TypeVar
 from motorbus.core.register import Register
 from motorbus.core.request import Effect, Precondition, Priority, Request, Response, TimeoutClass
 from motorbus.core.setpoint import Setpoint
-from motorbus.core.steps import Exclusive
 from motorbus.errors import DeviceError, UnexpectedReply
 from motorbus.families.kst import sdo
 from motorbus.families.kst.driver.node import Node
@@ -27,8 +26,6 @@ UNSIZED_REFUSED: Final = frozenset((0x0504_0001, 0x0607_0010, 0x0607_0012, 0x060
 """Abort codes that may mean "state the length"."""
 ABSENT: Final = frozenset((0x0601_0000, 0x0601_0001, 0x0602_0000, 0x0609_0011))
 """Abort codes of an object that cannot be read."""
-SEGMENTS: Final = 40  # maximum segments, of 7 bytes, of a value; a version has a few
-GENERAL_ERROR: Final = 0x0800_0000
 
 
 def upload(
@@ -76,8 +73,9 @@ def value_bytes(node: Node, row: Register, reply: SdoReply) -> bytes:
     extended = more in (bytes(len(more)), b"\xff" * len(more) if own[-1:] > b"\x7f" else b"")
     if reply.kind == "upload" and len(own) == row.size and (reply.size is None or extended):
         return own
+    length = "segments" if reply.kind == "upload-start" else f"{reply.size} bytes"
     raise UnexpectedReply(
-        f"node {node.node} sends {row.name} in {reply.size} bytes, not in {row.size}",
+        f"node {node.node} sends {row.name} in {length}, not in {row.size} bytes",
         received=reply.data,
         cause=f"its maker is not that of the profile {node.profile.name}, as in kst:PORT,profile=kst-ext",
         node=node.node,
@@ -170,36 +168,3 @@ def refused(node: Node, row: Register, reply: SdoReply) -> DeviceError:
 def is_absent(error: object) -> bool:
     """Whether this error says that the servo lacks the object."""
     return isinstance(error, DeviceError) and sdo.meant_code(error.code) in ABSENT
-
-
-async def read_all_bytes(node: Node, row: Register) -> bytes:
-    """All bytes of a value, from one reply or in segments. Raises UnexpectedReply for invalid segments."""
-
-    def take(answer: Response) -> SdoReply:
-        return accepted(node, row, answer)
-
-    async def read_segments() -> bytes:
-        first = await upload(node, row, take)  # again: another request may have ended the transfer
-        if first.kind == "upload":
-            return first.data
-        data = b""
-        for number in range(SEGMENTS):
-            toggle = number % 2
-            frame = node.settings.format(sdo.encode_segment(node.node, toggle))
-            segment = await Request(frame, (sdo.segment_due(node.node, toggle),), take, lane=node.node)
-            data += segment.data
-            if segment.last:
-                break
-        else:
-            abort = sdo.encode_abort(node.node, row.address, row.subindex or 0, GENERAL_ERROR)
-            await Request(node.settings.format(abort), lane=node.node)
-        if segment.last and first.size in (None, len(data)):
-            return data
-        raise UnexpectedReply(
-            f"node {node.node} announced {first.size} bytes of {row.name} and sent {len(data)}",
-            received=data[:32],
-            node=node.node,
-        )
-
-    first = await upload(node, row, take)
-    return first.data if first.kind == "upload" else await Exclusive(read_segments())

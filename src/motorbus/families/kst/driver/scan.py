@@ -1,11 +1,11 @@
-"""Find servos, and the bit rate of a bus.
+"""Find servos.
 
 A scan reads the node id: of all servos by one broadcast, then of each id that did not answer. It writes nothing: a
 write to the target position presets the encoder of some servos. An abort is an answer too. Source of the broadcast: a
 public demo driver.
 
 A frame at a wrong bit rate destroys frames of other devices. So at another rate the adapter first listens, without
-acknowledging: a valid frame proves the rate, errors disprove it, silence proves nothing; slcan reports no errors.
+acknowledging; where it reports errors and no valid frame, nothing is sent. slcan reports no errors.
 
 The `lane` of a reply is the id of the servo that sent it.
 """
@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from enum import Enum
 from typing import Final, NamedTuple
 
 from motorbus.core.family import Found, Identity
@@ -25,17 +24,15 @@ from motorbus.errors import LinkError, LinkLost, NoReply, RequestError, WireErro
 from motorbus.families.kst import sdo
 from motorbus.families.kst.driver.feedback import position
 from motorbus.families.kst.driver.identity import count_replies, identify, is_bus_error
-from motorbus.families.kst.driver.node import BusSettings, Node, check_above_zero, checked_ids
+from motorbus.families.kst.driver.node import BusSettings, Node, checked_ids
 from motorbus.families.kst.driver.requests import decoded, upload
 from motorbus.families.kst.notifications import BusState
-from motorbus.families.kst.profiles import RATES, bit_rate_code
+from motorbus.families.kst.profiles import bit_rate_code
 
 PASSES: Final = 2  # a silent id is read twice: a servo may miss the first frame after power-up
 BATCH: Final = 16  # ids that are read at the same time
-SHORT_LISTEN: Final = (
-    0.25  # s to listen at a rate that the caller has named: traffic of 4 Hz and more is received
-)
-LISTEN: Final = 1.0  # s to listen at each rate of `scan_bit_rates`
+LISTEN: Final = 0.25  # s to listen at another rate: traffic of 4 Hz and more is received
+IN_USE: Final = "errors only: the bus is in use at another rate"
 WRONG_RATE: Final = "the first frame caused a bus error and had no reply: this bus uses another rate"
 OTHER_FORMAT: Final = "no reply; servos with 29-bit identifiers need id_format=ext, others id_format=std"
 ERRORS: Final = "two servos with one id, another rate on the bus, bad wiring, or a missing terminator"
@@ -53,22 +50,6 @@ class ScanWarning(NamedTuple):
     node: int
     rate: int
     what: str
-
-
-class LineActivity(Enum):
-    """What an adapter received at one rate."""
-
-    TRAFFIC = "frames came whole: this is the rate of the bus"
-    ERRORS = "errors only: the bus is in use at another rate"
-    SILENCE = "silence: no frames, or this adapter reports no errors"
-
-
-class BitRates(NamedTuple):
-    """Result of a search: the rate (bit/s; None: not known), what was received at each rate, servos that answered."""
-
-    rate: int | None
-    activity: dict[int, LineActivity]
-    found: tuple[Found, ...] = ()
 
 
 async def scan(settings: BusSettings, ids: Sequence[int] = (), rates: Sequence[int] = ()) -> list[Found]:
@@ -96,57 +77,6 @@ async def scan(settings: BusSettings, ids: Sequence[int] = (), rates: Sequence[i
     return await Exclusive(scan_each())
 
 
-async def scan_bit_rates(
-    settings: BusSettings,
-    *,
-    rates: Sequence[int] = RATES,
-    isolated: bool = False,
-    seconds: float = LISTEN,
-) -> BitRates:
-    """Find the bit rate of a bus: listen `seconds` at each rate, then, only with `isolated`, send at the silent ones.
-
-    The search ends at a rate with a valid frame. `isolated` says that no machine depends on this bus. A rate that the
-    adapter lacks is `Skipped`. Raises RequestError for an impossible rate, and, unless `isolated`, for an adapter that
-    cannot listen.
-    """
-    _check_rates(rates)
-    check_above_zero("seconds", seconds, "s")
-
-    async def search() -> BitRates:
-        activity: dict[int, LineActivity] = {}
-        async with BitrateRestored():
-            for number, rate in enumerate(rates, 1):
-                try:
-                    activity[rate] = await listen(settings, rate, seconds)
-                except LinkLost:
-                    raise
-                except LinkError as error:
-                    if not isolated:
-                        await Emit(
-                            Skipped(rate, error.summary)
-                        )  # the adapter cannot listen, or lacks this rate
-                    continue
-                if activity[rate] is LineActivity.TRAFFIC:
-                    return BitRates(rate, activity)
-                await Emit(Progress(number, len(rates), f"{rate} bit/s: {activity[rate].value}"))
-            if not activity and not isolated:
-                raise RequestError(
-                    "this adapter cannot listen without taking part, so its bit rate is not searched for",
-                    expected="an adapter with a listen-only mode, or isolated=True if nothing depends on this bus",
-                )
-            silence = LineActivity.SILENCE
-            for rate in rates if isolated else ():
-                if activity.get(rate, silence) is silence and await _select_rate(
-                    settings, rate, listen_first=False
-                ):
-                    found = await _scan_at(settings, (), rate, careful=True)
-                    if found:
-                        return BitRates(rate, activity, tuple(found))
-        return BitRates(None, activity)
-
-    return await Exclusive(search())
-
-
 # -- rates -----------------------------------------------------------------------------------------------------
 
 
@@ -162,34 +92,25 @@ def _check_rates(rates: Sequence[int]) -> None:
         bit_rate_code(rate)
 
 
-async def listen(settings: BusSettings, rate: int, seconds: float) -> LineActivity:
-    """Listen at this rate without sending, until a report or alarm comes. The rate stays set.
-
-    Replies and frames of other devices are counted too. Raises LinkError when the adapter cannot listen.
-    """
-    await SetBitrate(rate, listen_only=True)
-    state = received(settings)
-    frames, errors = state.frames, state.errors
-    await WaitFor(lambda notification: not is_bus_error(notification), seconds)
-    if state.frames > frames:
-        return LineActivity.TRAFFIC
-    return LineActivity.ERRORS if state.errors > errors else LineActivity.SILENCE
-
-
-async def _listen_if_possible(settings: BusSettings, rate: int) -> LineActivity | None:
+async def _is_in_use(settings: BusSettings, rate: int) -> bool:
+    """Whether the bus is in use at another rate than this one, which stays set; False if the adapter cannot listen."""
     try:
-        return await listen(settings, rate, SHORT_LISTEN)
+        await SetBitrate(rate, listen_only=True)
     except LinkLost:
         raise
     except LinkError:
-        return None  # the adapter cannot listen
+        return False
+    state = received(settings)
+    frames, errors = state.frames, state.errors
+    await WaitFor(lambda notification: not is_bus_error(notification), LISTEN)
+    return state.frames == frames and state.errors > errors
 
 
 async def set_named_rate(settings: BusSettings, rate: int) -> None:
     """Set this rate after listening, if the adapter can. Raises RequestError if the bus is in use at another rate."""
-    if await _listen_if_possible(settings, rate) is LineActivity.ERRORS:
+    if await _is_in_use(settings, rate):
         raise RequestError(
-            f"nothing is sent at {rate} bit/s: {LineActivity.ERRORS.value}",
+            f"nothing is sent at {rate} bit/s: {IN_USE}",
             cause="a frame at a wrong rate breaks the frames of other devices",
             advice="connect this servo alone, and call again",
         )
@@ -198,8 +119,8 @@ async def set_named_rate(settings: BusSettings, rate: int) -> None:
 
 async def _select_rate(settings: BusSettings, rate: int, *, listen_first: bool) -> bool:
     """Set this rate; or report why it is `Skipped`, and return False."""
-    if listen_first and await _listen_if_possible(settings, rate) is LineActivity.ERRORS:
-        await Emit(Skipped(rate, LineActivity.ERRORS.value))
+    if listen_first and await _is_in_use(settings, rate):
+        await Emit(Skipped(rate, IN_USE))
         return False
     return await set_or_skip(rate)
 

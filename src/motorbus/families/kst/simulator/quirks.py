@@ -55,7 +55,7 @@ class Quirks:
     x1: int = switch(0, "the first status byte", source="manual, command 7: defined as needed", span=_BYTE)
     x2: int = switch(0, "the second status byte", source="manual, command 7: defined as needed", span=_BYTE)
     firmware: str = switch("1.00",
-        "version in 0x100A; more than four characters come in segments",
+        "version in 0x100A; more than four characters are announced in segments, which are not sent",
         source="manual, command 8: four characters; CiA 301: any length")
     save_reply: str = switch("none",
         "a save is not answered, acknowledged, or refused (and then nothing is saved)",

@@ -15,7 +15,6 @@ from motorbus.families.kst import sdo
 from motorbus.families.kst.profiles import VERSIONS
 from motorbus.families.kst.simulator.servo import Servo
 
-TOGGLE: Final = 0x0503_0000
 UNKNOWN_COMMAND: Final = 0x0504_0001
 WRITE_ONLY: Final = 0x0601_0001
 READ_ONLY: Final = 0x0601_0002
@@ -35,14 +34,12 @@ class SdoServer:
         self._servo = servo
         self._losses_seen = 0
         self._busy_until = -inf
-        self._transfer: tuple[sdo.SdoRequest, bytes, int] | None = None
-        """Upload in segments: its request, the bytes left, the next toggle."""
 
     def receive(self, request: sdo.SdoRequest, at: float) -> None:
         """Carry out a request and reply, one after the other. More requests than `MAILBOX` are lost."""
         servo = self._servo
         if self._losses_seen != servo.power_losses:
-            self._losses_seen, self._busy_until, self._transfer = servo.power_losses, -inf, None
+            self._losses_seen, self._busy_until = servo.power_losses, -inf
         if self._busy_until - at > MAILBOX * TURNAROUND:
             return
         servo.extended = request.extended
@@ -57,9 +54,6 @@ class SdoServer:
 
     def _answer(self, request: sdo.SdoRequest, at: float) -> CanFrame | None:
         """The reply to this request, None for no reply."""
-        if request.kind == "segment":
-            return self._segment(request)
-        self._transfer = None  # a request ends a transfer (CiA 301)
         if request.kind == "abort":
             return None
         reply: CanFrame | int | None
@@ -93,19 +87,7 @@ class SdoServer:
         node, index, subindex = servo.node, request.index, request.subindex
         if len(data) <= sdo.EXPEDITED:
             return sdo.encode_upload_reply(node, index, subindex, data)
-        self._transfer = request, data, 0
         return sdo.encode_upload_start(node, index, subindex, len(data))
-
-    def _segment(self, request: sdo.SdoRequest) -> CanFrame:
-        if self._transfer is None:
-            return self._abort(request, UNKNOWN_COMMAND)
-        first, left, toggle = self._transfer
-        if request.toggle != toggle:
-            self._transfer = None
-            return self._abort(first, TOGGLE)
-        data, left = left[: sdo.SEGMENT_BYTES], left[sdo.SEGMENT_BYTES :]
-        self._transfer = (first, left, toggle ^ 1) if left else None
-        return sdo.encode_segment_reply(self._servo.node, request.toggle, data, not left)
 
     def _download(self, request: sdo.SdoRequest, row: Register, at: float) -> CanFrame | int | None:
         quirks = self._servo.quirks
