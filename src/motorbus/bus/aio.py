@@ -198,7 +198,7 @@ def _serve(inbox: deque[Call]) -> None:
 def _advance(
     part: Part, inbox: deque[Call], calls: list[Call]
 ) -> list[tuple[asyncio.AbstractEventLoop, asyncio.Future[None]]]:
-    """Wait, then step these procedures, and those of the inbox; remove those that have ended, and give what reports their end."""
+    """Wait, then step these procedures and those of the inbox; remove those that have ended and give their futures."""
     try:
         if calls:
             part.wait()

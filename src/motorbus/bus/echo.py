@@ -15,11 +15,12 @@ from motorbus.core.request import Request
 class Echo:
     """`present` is None while unknown. `broken` is set where an echo did not come as it was sent.
 
-    `test` is a request whose reply differs in length from its echo.
+    `test` is a request whose reply differs in length from its echo. `possible`: the link carries bytes.
     """
 
-    def __init__(self) -> None:
-        self.present: bool | None = None
+    def __init__(self, *, possible: bool) -> None:
+        self._unknown = None if possible else False
+        self.present: bool | None = self._unknown
         self.broken = False
         self.test: Request[Any] | None = None
         self._expected = b""
@@ -61,5 +62,5 @@ class Echo:
 
     def reset(self) -> None:
         """The adapter was replugged: nothing sent before comes back."""
-        self.present, self.broken = None, False
+        self.present, self.broken = self._unknown, False
         self._expected = self._matched = b""

@@ -82,7 +82,7 @@ class Engine:
         self.notices: Feed[Notification] = Feed()
         self.statistics = Statistics()
         self.sync = SyncTable(driver)
-        self.echo = Echo()
+        self.echo = Echo(possible=driver.family.link.kind == "bytes")
         self.receiver = driver.receiver()
         self.nodes = Nodes(driver, rate)
         self.in_flight: dict[int, Attempt] = {}
