@@ -37,6 +37,7 @@ class Attempt(Step["Attempt | None"]):
         "in_flight",
         "is_probe",
         "is_probed",
+        "is_used",
         "nodes",
         "noise",
         "orders",
@@ -81,6 +82,7 @@ class Attempt(Step["Attempt | None"]):
         self.excluded = excluded
         """Nodes of a group that it does not wait for, or whose reply was damaged."""
         self.in_flight = False
+        self.is_used = False  # `reset` is needed before it is sent again
         self.sent_at = 0.0
         self.deadline = inf
         self.shared = 0  # attempts on other lanes that the deadline allows for
@@ -103,12 +105,10 @@ class Attempt(Step["Attempt | None"]):
 
     def reset(self) -> None:
         """It is sent: nothing has come for it. `excluded` stays."""
+        self.is_used = False
         self.error = self.accepted = None
-        self.shared = 0
-        self.deadline = inf
-        if self.replies or self.noise or self.fault or self.complete or self.surplus:
-            self.replies, self.noise, self.fault = {}, [], ""
-            self.surplus = self.complete = False
+        self.replies, self.noise, self.fault = {}, [], ""
+        self.surplus = self.complete = False
 
     def reading(self) -> tuple[Request[Any], Response]:
         """The request and its last accepted reply, split into the replies of the nodes."""

@@ -13,7 +13,7 @@ from motorbus.bus.engine import PENDING
 from motorbus.bus.interrupts import ELSEWHERE, INTERRUPTS, MAIN, interrupts
 from motorbus.bus.nodes import GATED
 from motorbus.bus.running import TURN_TIMEOUT, Part, run_here, run_parts
-from motorbus.bus.tasks import Notify, Tree, check_outside, decode
+from motorbus.bus.tasks import STEPPING, Notify, Tree, check_outside, decode
 from motorbus.core.register import shown
 from motorbus.core.request import Priority, Request, Response
 from motorbus.core.steps import Runnable, discard, gather
@@ -58,7 +58,8 @@ class Bus(BaseBus):
         tolerated: tuple[type[Exception], ...] = (),
     ) -> tuple[Any, Any]:
         """The value of an order without replies that leaves with this request, and the value of this request."""
-        check_outside()
+        if STEPPING.active:
+            check_outside()
         if self.link.virtual:
             self.check_thread()
         signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
@@ -74,7 +75,7 @@ class Bus(BaseBus):
                     except tolerated as error:
                         value = error
                     if value is not PENDING:
-                        return decode_order(order, started.sent_at), value
+                        return (decode_order(order, started.sent_at) if order else None), value
                 part, tree = self.continue_with(request, order, started, since, tolerated)
             except LinkLost as error:
                 self._lost(error)
@@ -137,7 +138,8 @@ class Bus(BaseBus):
             if not engine.not_written(attempt, error):
                 raise
             return None
-        engine.written(attempt)
+        if engine.window > 1 or not attempt.in_flight:
+            engine.written(attempt)
         return attempt
 
     def finish(self, attempt: Attempt) -> Any:

@@ -84,6 +84,8 @@ class Engine:
         self.sync = SyncTable(driver)
         self.echo = Echo(possible=driver.family.link.kind == "bytes")
         self.receiver = driver.receiver()
+        self.holds_data = False
+        """The receiver holds a part of a frame."""
         self.nodes = Nodes(driver, rate)
         self.in_flight: dict[int, Attempt] = {}
         self.done: deque[Attempt] = deque()
@@ -168,7 +170,7 @@ class Engine:
             or self.gone
             or self.echo.present is not False
             or self.exclusive is not None
-            or self.receiver.held
+            or self.holds_data
             or now < (self.free_at if self.paced else self.full_until)
         )
 
@@ -263,11 +265,12 @@ class Engine:
     def begin(self, attempt: Attempt, now: float) -> None:
         """Record an attempt before its request is written; `written` or `not_written` follows."""
         request = attempt.request
-        if self.receiver.held:  # bytes from before the request are no part of its reply
-            self._take_all(self.receiver.flush(), now)
+        if self.holds_data:  # bytes from before the request are no part of its reply
+            self._flush(now)
         if attempt.timing is not self._timing:
             self.measure(attempt)
-        attempt.reset()
+        if attempt.is_used:
+            attempt.reset()
         attempt.sent_at = now
         if request.expected != ():
             attempt.deadline = max(now, self.free_at) + attempt.budget
@@ -279,7 +282,8 @@ class Engine:
             self.nodes.ordered(request)
         if type(request.wire) is bytes:
             self._wires.append(request.wire)
-            self.echo.sent(request.wire)
+            if self.echo.present is not False:
+                self.echo.sent(request.wire)
         if self.trace.subscriptions:
             self.trace.put(TraceRecord(now, "tx", request.wire))
 
@@ -301,7 +305,7 @@ class Engine:
         if attempt.request.expected == ():
             self.free_at = max(attempt.sent_at, self.free_at) + attempt.air
             self.statistics.other["sent"] += 1
-            attempt.accepted = Response((), (), attempt.sent_at)
+            attempt.is_used, attempt.accepted = True, Response((), (), attempt.sent_at)
             self.done.append(attempt)
         elif self.window > 1:
             self._share_wire(attempt)
@@ -323,7 +327,7 @@ class Engine:
             alone: Request[Response] = Request(request.wire)
             self.full_until = attempt.sent_at + self.air_time(alone)
             return True
-        attempt.error = error
+        attempt.is_used, attempt.error = True, error
         self.done.append(attempt)
         return False
 
@@ -376,9 +380,14 @@ class Engine:
                 self._fail_by_echo()
             if rest:
                 self._take_all(self.receiver.feed(rest), now)
+                self.holds_data = bool(self.receiver.held)
         if chunks:
             self._end_complete(now)
         self.expire(now if looked is None else looked)
+
+    def _flush(self, now: float) -> None:
+        self.holds_data = False
+        self._take_all(self.receiver.flush(), now)
 
     def _take_all(self, events: Sequence[Event], now: float) -> None:
         for event in events:
@@ -465,8 +474,8 @@ class Engine:
     def _end_complete(self, now: float) -> None:
         for attempt in tuple(self.in_flight.values()):
             if attempt.complete or attempt.fault:
-                if self.receiver.held:  # all replies are here, so what is held is surplus
-                    self._take_all(self.receiver.flush(), now)
+                if self.holds_data:  # all replies are here, so what is held is surplus
+                    self._flush(now)
                 if attempt.complete or now >= attempt.deadline:
                     self._end(attempt, now)
 
@@ -478,7 +487,9 @@ class Engine:
             held = self.echo.give_up()
             if self.echo.broken:
                 self._fail_by_echo()
-            self._take_all([*(self.receiver.feed(held) if held else ()), *self.receiver.flush()], now)
+            if held:
+                self._take_all(self.receiver.feed(held), now)
+            self._flush(now)
             if attempt.in_flight:  # what was held has not completed it
                 self._end(attempt, now)
 
@@ -491,7 +502,7 @@ class Engine:
         if attempt.is_probe and not attempt.fault and not (request.decode and request.decode(answer)):
             attempt.fault = "unexpected"
         del self.in_flight[request.lane]
-        attempt.in_flight = False
+        attempt.in_flight, attempt.is_used = False, True
         missing = dues if attempt.fault else ()
         if answer.missing and not attempt.fault:
             missing = tuple(due for due in dues if due.node in answer.missing)
@@ -610,7 +621,7 @@ class Engine:
             self._mark_owed(attempt)
             for node in attempt.nodes:
                 self.statistics.of(node).errors["lost"] += 1
-            attempt.in_flight, attempt.error = False, error
+            attempt.in_flight, attempt.is_used, attempt.error = False, True, error
             self.done.append(attempt)
         self.in_flight.clear()
         self.exclusive = None
@@ -628,7 +639,7 @@ class Engine:
     def reconnected(self, now: float, latency: float) -> None:
         """The port is open again: all nodes are out of sync and their positions unknown; the nodes stay known."""
         self.latency = latency
-        self.receiver = self.driver.receiver()
+        self.receiver, self.holds_data = self.driver.receiver(), False
         self.echo.reset()
         self.sync.mark_all(now + self.quiet_time)
         self.nodes.forget()
@@ -639,7 +650,7 @@ class Engine:
         """The link has this rate (bit/s) now."""
         self.rate = rate
         self.listening = listen_only or self.always_listening
-        self.receiver = self.driver.receiver()
+        self.receiver, self.holds_data = self.driver.receiver(), False
 
 
 def must_sync(request: Request[Any]) -> bool:

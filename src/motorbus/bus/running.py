@@ -105,14 +105,15 @@ class Part:
                 tree.cancel(error)
         for call in self.calls:
             call.obey()
+        stepped = self._stepped
         while True:
-            for tree in self._stepped:
+            for tree in stepped:
                 tree.advance()
             if self.finished:
                 self.release_turn()
                 return True
-            self.sends_at = self.bus.send(self._stepped)
-            if not any(tree.ready for tree in self._stepped):
+            self.sends_at = self.bus.send(stepped)
+            if not any(tree.ready for tree in stepped):
                 return False
 
     @property
@@ -142,7 +143,7 @@ class Part:
 
     def next_moment(self) -> float:
         """When (s) a tree can go on by itself, or more may be sent."""
-        return min([self.sends_at, *(tree.next_moment() for tree in self._stepped)])
+        return min([self.sends_at, *[tree.next_moment() for tree in self._stepped]])
 
     def wait(self) -> None:
         """Wait for data, a deadline, or the next moment of a tree; without the turn sleep for at most `IDLE`."""

@@ -48,6 +48,6 @@ class Statistics:
         """Count a valid reply of each of these, after so many seconds."""
         bucket = min(int(seconds * 1e6).bit_length(), BUCKETS - 1)
         for node in nodes:
-            counters = self.of(node)
+            counters = self.nodes.get(node) or self.of(node)
             counters.ok += 1
             counters.latency[bucket] += 1

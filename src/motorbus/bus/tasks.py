@@ -57,12 +57,12 @@ class _Stepping(local):
     active = False
 
 
-_STEPPING: Final = _Stepping()
+STEPPING: Final = _Stepping()
 
 
 def check_outside() -> None:
     """Raise RequestError inside of a procedure: a call that waits there would wait for itself."""
-    if _STEPPING.active:
+    if STEPPING.active:
         raise RequestError(
             "a bus or a device method was called inside of a procedure",
             expected="a step, or the driver function: `await feetech.Servo.position.function(servo)`",
@@ -191,14 +191,11 @@ class Tree(Generic[T]):
         self.sending: list[Attempt | Pause] = []
         """What is to be sent, by priority, then in order."""
         self.timers: list[Timer] = []
+        self.finished = False
+        """The procedure has ended."""
         self.root = Task(self, procedure)
         self.ready.append((self.root, None, None))
         engine.end_sleeps.append(self.end_sleeps)
-
-    @property
-    def finished(self) -> bool:
-        """The procedure has ended."""
-        return self.root.finished
 
     # -- forward -----------------------------------------------------------------------------------------------
 
@@ -210,7 +207,7 @@ class Tree(Generic[T]):
             self._step(*self.ready.popleft())
             if self.interruption is not None and self.cancellation is None:
                 self.cancel(self.interruption)
-        return self.root.finished
+        return self.finished
 
     def _expire(self, now: float) -> None:
         for timer in tuple(self.timers):
@@ -224,7 +221,7 @@ class Tree(Generic[T]):
 
     def next_moment(self) -> float:
         """The moment (s) at which `advance` has something to do by itself; inf when there is none."""
-        if self.root.finished:
+        if self.finished:
             return inf
         return min([self.deadline, *(timer.until for timer in self.timers)])
 
@@ -263,25 +260,25 @@ class Tree(Generic[T]):
         task.waits_for = None
         task.entered = True
         coroutine, request = task.stack[-1]
-        outer, _STEPPING.active = _STEPPING.active, True
+        outer, STEPPING.active = STEPPING.active, True
         try:
             step = coroutine.send(value) if error is None else coroutine.throw(error)
         except StopIteration as end:
-            _STEPPING.active = outer
+            STEPPING.active = outer
             task.stack.pop()
             if request is None:
                 self._finish(task, end.value)
             else:
                 self._decode(task, request, end.value)
         except BaseException as failure:
-            _STEPPING.active = outer
+            STEPPING.active = outer
             task.stack.pop()
             if request is None:
                 self._finish(task, error=failure)
             else:
                 self.ready.append((task, None, failure))
         else:
-            _STEPPING.active = outer
+            STEPPING.active = outer
             self._begin(task, step)
 
     def _decode(self, task: Task, request: Request[Any], answer: Response) -> None:
@@ -299,6 +296,7 @@ class Tree(Generic[T]):
         if task.claims and self.engine.exclusive is task.owner:
             self.engine.exclusive = None
         if task is self.root:
+            self.finished = True
             self._forget()
         elif task.parent is not None and all(child.finished for child in task.parent.children):
             self._join(task.parent)
@@ -538,6 +536,7 @@ class Tree(Generic[T]):
 
     def drop(self) -> None:
         """End the procedure where it stands; nothing that its clean-up asks for is carried out."""
+        self.finished = True
         self._forget()
         for task in self._waiting(self.root):
             self._drop_wait(task)
