@@ -25,13 +25,13 @@ class Echo:
         self.test: Request[Any] | None = None
         self._expected = b""
         self._matched = b""
-        self._came = False
+        self._came = self._differs = False
 
     def sent(self, data: bytes) -> None:
         """These bytes are sent."""
         if self.present is not False:
             self._expected += data
-            self._came = False
+            self._came = self._differs = False
 
     def strip(self, data: bytes) -> bytes:
         """What remains of incoming bytes without the echo."""
@@ -40,6 +40,7 @@ class Echo:
             return data
         count = min(len(expected), len(data))
         if data[:count] != expected[:count]:
+            self._differs = True
             return self.give_up(data)
         self._expected, self._matched = expected[count:], self._matched + data[:count]
         if not self._expected:
@@ -57,7 +58,7 @@ class Echo:
 
     def conclude(self, *, is_test: bool) -> None:
         """A reply was accepted: behind a whole echo, or without one. A reply that may be an echo proves nothing."""
-        if self.present is None and (self._came or is_test):
+        if self.present is None and (self._came or self._differs or is_test):
             self.present = self._came
 
     def reset(self) -> None:
