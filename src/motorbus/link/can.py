@@ -149,6 +149,16 @@ def python_can(port: str) -> ModuleType:
     return can
 
 
+def describe(port: str) -> CanAddress:
+    """The parts of an address whose interface exists. Raises RequestError, or LinkError without python-can."""
+    address = read_address(port)
+    if address.interface not in python_can(port).VALID_INTERFACES:
+        raise RequestError(
+            f"{port!r}: python-can has no interface {address.interface!r}", advice=f"for example {EXAMPLES}"
+        )
+    return address
+
+
 class CanLink:
     """An open CAN channel. Arguments as for `open_link`. `queue`: frames that it takes at once, 0 if unknown.
 
@@ -177,7 +187,7 @@ class CanLink:
         connect_time: float | None = None,
     ) -> None:
         self.name = port
-        self._address = address = read_address(port)
+        self._address = address = describe(port)
         given = {name: _SWITCHES.get(value, value) for name, value in (options or {}).items()}
         listen_only = given.pop("listen_only", False)
         if not isinstance(listen_only, bool):
@@ -462,10 +472,6 @@ def kernel_rate(address: CanAddress, rate: int, listen_only: bool) -> int | None
 def open_error(address: CanAddress, error: Exception) -> MotorbusError:
     """The error for what python-can has raised at open: a missing driver is an ImportError here, a NameError there."""
     name, interface, code = address.name, address.interface, _error_code(error)
-    if str(error).startswith("Unknown interface"):
-        return RequestError(
-            f"{name}: python-can has no interface {interface!r}", advice=f"for example {EXAMPLES}"
-        )
     if isinstance(error, (NotImplementedError, ImportError, NameError)) or "library not found" in str(error):
         return LinkError(
             f"{name}: the driver of {interface} is missing: {error}",
