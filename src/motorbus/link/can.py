@@ -8,6 +8,7 @@ Some back ends ignore an unknown option, and some take another bit rate for one 
 from __future__ import annotations
 
 import contextlib
+import difflib
 import errno
 import json
 import logging
@@ -152,9 +153,12 @@ def python_can(port: str) -> ModuleType:
 def describe(port: str) -> CanAddress:
     """The parts of an address whose interface exists. Raises RequestError, or LinkError without python-can."""
     address = read_address(port)
-    if address.interface not in python_can(port).VALID_INTERFACES:
+    known = python_can(port).VALID_INTERFACES
+    if address.interface not in known:
+        near = difflib.get_close_matches(address.interface, known, 1)
         raise RequestError(
-            f"{port!r}: python-can has no interface {address.interface!r}", advice=f"for example {EXAMPLES}"
+            f"{port!r}: python-can has no interface {address.interface!r}",
+            advice=f"did you mean {near[0]}?" if near else f"for example {EXAMPLES}",
         )
     return address
 
