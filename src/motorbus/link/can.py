@@ -8,6 +8,7 @@ Some back ends ignore an unknown option, and some take another bit rate for one 
 from __future__ import annotations
 
 import contextlib
+import difflib
 import errno
 import json
 import logging
@@ -149,6 +150,19 @@ def python_can(port: str) -> ModuleType:
     return can
 
 
+def describe(port: str) -> CanAddress:
+    """The parts of an address whose interface exists. Raises RequestError, or LinkError without python-can."""
+    address = read_address(port)
+    known = python_can(port).VALID_INTERFACES
+    if address.interface not in known:
+        near = difflib.get_close_matches(address.interface, known, 1)
+        raise RequestError(
+            f"{port!r}: python-can has no interface {address.interface!r}",
+            advice=f"did you mean {near[0]}?" if near else f"for example {EXAMPLES}",
+        )
+    return address
+
+
 class CanLink:
     """An open CAN channel. Arguments as for `open_link`. `queue`: frames that it takes at once, 0 if unknown.
 
@@ -177,7 +191,7 @@ class CanLink:
         connect_time: float | None = None,
     ) -> None:
         self.name = port
-        self._address = address = read_address(port)
+        self._address = address = describe(port)
         given = {name: _SWITCHES.get(value, value) for name, value in (options or {}).items()}
         listen_only = given.pop("listen_only", False)
         if not isinstance(listen_only, bool):
@@ -461,10 +475,6 @@ def kernel_rate(address: CanAddress, rate: int, listen_only: bool) -> int | None
 def open_error(address: CanAddress, error: Exception) -> MotorbusError:
     """The error for what python-can has raised at open: a missing driver is an ImportError here, a NameError there."""
     name, interface, code = address.name, address.interface, _error_code(error)
-    if str(error).startswith("Unknown interface"):
-        return RequestError(
-            f"{name}: python-can has no interface {interface!r}", advice=f"for example {EXAMPLES}"
-        )
     if isinstance(error, (NotImplementedError, ImportError, NameError)) or "library not found" in str(error):
         return LinkError(
             f"{name}: the driver of {interface} is missing: {error}",
