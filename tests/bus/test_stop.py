@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import socket
 import threading
 import time
@@ -163,46 +162,15 @@ def served(path: Path) -> tuple[Bus, Responder]:
     return bus, responder
 
 
-@pytest.mark.parametrize("garbage", [b"", b"\n", b"hello\n", b"\xff" * 4096])
+@pytest.mark.parametrize("garbage", [b"", b"\n", b".", b"hello!", b"\xff" * 4096])
 def test_what_is_not_a_request_stops_nothing(tmp_path: Path, garbage: bytes) -> None:
     path = tmp_path / "stop"
     bus, responder = served(path)
-    with socket.socket(socket.AF_UNIX) as client:
-        client.settimeout(10)
-        client.connect(str(path))
-        client.sendall(garbage)
-        client.shutdown(socket.SHUT_WR)
-        with contextlib.suppress(ConnectionResetError):
-            assert client.recv(10) == b""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as client:
+        client.sendto(garbage, str(path))
     assert torque_offs(responder) == []
     assert request_estop(path).acknowledged == (1,), "and the stop still works"
     bus.close()
-
-
-def test_a_client_may_take_its_time_between_connecting_and_asking(tmp_path: Path) -> None:
-    path = tmp_path / "stop"
-    bus, _ = served(path)
-    with socket.socket(socket.AF_UNIX) as client:
-        client.settimeout(10)
-        client.connect(str(path))
-        time.sleep(0.2)
-        client.sendall(b"estop\n")
-        assert b'"acknowledged": [1]' in client.recv(1000)
-    assert bus.latched
-    bus.close()
-
-
-def test_clients_that_say_nothing_hold_up_nobody(tmp_path: Path) -> None:
-    path = tmp_path / "stop"
-    bus, responder = served(path)
-    with contextlib.ExitStack() as stack:
-        for _ in range(4):
-            mute = stack.enter_context(socket.socket(socket.AF_UNIX))
-            mute.connect(str(path))
-        assert request_estop(path).acknowledged == (1,), "the fifth is served although the others are mute"
-        assert bus.estop().acknowledged == (1,)
-        assert torque_offs(responder).count(254) >= 2, "a host that is held up may say one of them twice"
-        bus.close()
 
 
 def test_where_nobody_serves_the_request_says_so(tmp_path: Path) -> None:

@@ -1,10 +1,10 @@
 """The emergency stop of one bus: a thread that sleeps until a stop is requested.
 
 It exists from the first motion or torque request on, or from `open` on where other processes can request a stop. It
-needs neither the event loop nor the thread that uses the bus: a signal handler, another thread or another process wakes
-it by one byte. It latches the engine, waits for the turn at most as long as a reply is on the wire, writes the stop
-frames in any case, and then repeats them with the turn until all nodes acknowledge. On a simulated bus with virtual
-time the caller does the same work without a thread. Decision record 0015.
+needs neither the event loop nor the thread that uses the bus: a signal handler or another process wakes it by a
+datagram. `estop` does the same work in the calling thread: it latches the engine, waits for the turn at most as long as
+a reply is on the wire, writes the stop frames in any case, and then repeats them with the turn until all nodes
+acknowledge. Decision record 0015.
 """
 
 from __future__ import annotations
@@ -16,25 +16,20 @@ import os
 import socket
 import time
 from collections.abc import Sequence
-from concurrent.futures import Future
-from concurrent.futures import TimeoutError as LateError
 from pathlib import Path
-from selectors import EVENT_READ, DefaultSelector
-from threading import Event, Lock, Thread, current_thread
+from threading import Lock, Thread, current_thread
 from typing import Any, Final, Protocol
 from weakref import ref
 
 from motorbus.bus.engine import Engine
 from motorbus.bus.stop_rounds import stop_in_rounds
-from motorbus.bus.stop_socket import STOP_TIMEOUT, StopOutcome, asked_by, client_name, listening
+from motorbus.bus.stop_socket import LONGEST, STOP_TIMEOUT, StopOutcome, asked_by, client_name, open_socket
 from motorbus.bus.tasks import Tree
 from motorbus.bus.turn import Turn
 from motorbus.core.request import Priority, Request
 from motorbus.errors import LinkError, LinkFull, LinkLost
 from motorbus.link.base import Link
 
-CLIENT_TIME: Final = 0.05
-"""s for a client to send its request."""
 ROUNDS_TIME: Final = 3.0
 """s for all rounds of a stop, less than `STOP_TIMEOUT`."""
 STOP, END = b"!", b"."
@@ -58,9 +53,8 @@ class EmergencyStop:
     def __init__(self, bus: StoppableBus, socket_path: Path | None = None) -> None:
         self._bus = ref(bus)
         self.socket_path = socket_path
-        self._pair: tuple[socket.socket, socket.socket] | None = None
-        self._requests: list[Future[StopOutcome]] = []
-        self._ready = Event()
+        self._sockets: tuple[socket.socket, socket.socket] | None = None
+        """The one that the thread reads, and one that sends to it."""
         self._starting = Lock()
         self._thread: Thread | None = None
         self._closed = False
@@ -82,8 +76,8 @@ class EmergencyStop:
             return
         with self._starting:
             if self._thread is None and not self._closed:
-                self._pair = self._pair or socket.socketpair()
-                thread = Thread(target=self._serve, name="motorbus stop", daemon=True)
+                self._sockets = self._sockets or open_socket(self.socket_path)
+                thread = Thread(target=self._serve, args=self._sockets[:1], name="motorbus stop", daemon=True)
                 try:
                     thread.start()
                 except RuntimeError as error:
@@ -92,7 +86,6 @@ class EmergencyStop:
                         advice="end processes that hold many threads; nothing was sent",
                     ) from error
                 self._thread = thread
-                self._ready.wait(STOP_TIMEOUT)
                 atexit.register(self.close)
 
     def move(self, path: Path | None) -> None:
@@ -109,26 +102,15 @@ class EmergencyStop:
         self._wake(STOP)
 
     def _wake(self, word: bytes) -> None:
-        if self._pair is not None:
+        if self._sockets is not None:
             with contextlib.suppress(OSError):
-                self._pair[1].send(word)
+                self._sockets[1].send(word)
 
     def estop(self) -> StopOutcome:
-        """Stop and wait for the outcome. Raises LinkLost when the bus is closed."""
+        """Stop, in the calling thread, and give the outcome. Raises LinkLost when the bus is closed."""
         if self._closed:
             raise LinkLost("the bus is closed: no stop was sent", advice="open it again, or cut the power")
-        with contextlib.suppress(LinkError):
-            self.start()
-        if self._thread is None:
-            return self.stop()
-        request: Future[StopOutcome] = Future()
-        self._requests.append(request)
-        self.trigger()
-        try:
-            return request.result(STOP_TIMEOUT)
-        except LateError:
-            silent = tuple(sorted(self.bus.engine.nodes.known))
-            return StopOutcome((), silent, 0, "nothing: the stop thread did not answer")
+        return self.stop()
 
     def stop(self, client: str = "") -> StopOutcome:
         """Latch the engine and send the stop frames, in the calling thread. Raises what the driver raises."""
@@ -194,66 +176,28 @@ class EmergencyStop:
 
     # -- the thread --------------------------------------------------------------------------------------------
 
-    def _serve(self) -> None:
-        assert self._pair is not None
-        ear = self._pair[0]
-        with listening(self.socket_path, lambda: self.socket_path) as listener, DefaultSelector() as ready:
+    def _serve(self, ear: socket.socket) -> None:
+        while True:
             try:
-                for end in (ear,) if listener is None else (ear, listener):
-                    ready.register(end, EVENT_READ)
-            except ValueError:  # closed while it was started
-                return
-            finally:
-                self._ready.set()
-            ended = False
-            while not ended:
-                try:
-                    ended = self._serve_ready(ready, ear, listener)
-                except Exception:  # the thread must serve the next request
-                    ended = self._closed
-            for key in list(ready.get_map().values()):
-                if key.fileobj not in (ear, listener) and isinstance(key.fileobj, socket.socket):
-                    key.fileobj.close()
+                data, address = ear.recvfrom(LONGEST)
+                word, _, about = data.strip().partition(b" ")
+                if word == b"estop":
+                    outcome = self._outcome(client_name(about))
+                    if address:
+                        ear.sendto(json.dumps(outcome._asdict()).encode(), address)
+                elif STOP in data and not data.strip(STOP + END):
+                    self._outcome()
+                if self._closed:
+                    return
+            except OSError:  # the client is gone, or the socket was closed
+                if self._closed:
+                    return
 
-    def _serve_ready(
-        self, ready: DefaultSelector, ear: socket.socket, listener: socket.socket | None
-    ) -> bool:
-        """Wait, then serve this process first, then clients that have sent something; True at the end."""
-        ends = [key.fileobj for key, _ in ready.select()]
-        if ear in ends:
-            words = ear.recv(4096)
-            if STOP in words:
-                self._stop_and_answer()
-            if END in words:
-                return True
-        for end in ends:
-            if end is listener and listener is not None:
-                with contextlib.suppress(OSError):
-                    ready.register(listener.accept()[0], EVENT_READ)
-            elif end is not ear and isinstance(end, socket.socket):
-                ready.unregister(end)
-                self._serve_client(end)
-        return False
-
-    def _stop_and_answer(self, client: str = "") -> StopOutcome:
-        requests, self._requests = self._requests, []
+    def _outcome(self, client: str = "") -> StopOutcome:
         try:
-            outcome = self.stop(client)
-        except BaseException as error:
-            for request in requests:
-                request.set_exception(error)
-            raise
-        for request in requests:
-            request.set_result(outcome)
-        return outcome
-
-    def _serve_client(self, client: socket.socket) -> None:
-        with contextlib.suppress(OSError), client:
-            client.settimeout(CLIENT_TIME)
-            word, _, about = client.recv(4096).strip().partition(b" ")
-            if word == b"estop":
-                outcome = self._stop_and_answer(client_name(about))
-                client.sendall(json.dumps(outcome._asdict()).encode() + b"\n")
+            return self.stop(client)
+        except Exception as error:  # the thread must serve the next request
+            return StopOutcome((), (), 0, f"nothing: {error}")
 
     def close(self) -> None:
         """End the thread when a stop that has begun is over. Nothing else is sent."""
@@ -264,5 +208,8 @@ class EmergencyStop:
         self._wake(END)
         if self._thread is not None and self._thread is not current_thread():
             self._thread.join(STOP_TIMEOUT)
-        for end in self._pair or ():
+        for end in self._sockets or ():
             end.close()
+        if self._sockets and self.socket_path is not None:
+            self.socket_path.unlink(missing_ok=True)
+        self._sockets = None

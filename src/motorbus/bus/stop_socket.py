@@ -1,15 +1,14 @@
-"""The local socket by which another process asks for an emergency stop, and what an emergency stop achieved."""
+"""The datagram socket by which another process asks for an emergency stop, and what an emergency stop achieved."""
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import shlex
 import socket
 import sys
+import tempfile
 import time
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -18,6 +17,8 @@ from motorbus.link.lock import program_name
 
 COMMAND_SHOWN: Final = 60
 """Characters of a command line in the message of the stop that it asked for."""
+LONGEST: Final = 65_536
+"""Bytes of a datagram."""
 STOP_TIMEOUT: Final = 5.0
 """s that a caller waits for the outcome of a stop."""
 
@@ -50,28 +51,27 @@ def client_name(about: bytes) -> str:
 def _request() -> bytes:
     """What a client sends: the word, its process id and its command line."""
     command = shlex.join([program_name(), *sys.argv[1:]])[: 2 * COMMAND_SHOWN]
-    return f"estop {json.dumps({'pid': os.getpid(), 'command': command})}\n".encode()
+    return f"estop {json.dumps({'pid': os.getpid(), 'command': command})}".encode()
 
 
-@contextlib.contextmanager
-def listening(path: Path | None, now: Callable[[], Path | None]) -> Iterator[socket.socket | None]:
-    """A local socket at this path, mode 0600, None where there is none; `now` gives its path at the end."""
-    if path is None or not hasattr(socket, "AF_UNIX"):
-        yield None
-        return
-    with socket.socket(socket.AF_UNIX) as listener:
+def open_socket(path: Path | None) -> tuple[socket.socket, socket.socket]:
+    """The datagram socket of a stop thread, mode 0600 at this path, and one that sends to it.
+
+    Without a path, or where none can be made, no other process reaches it.
+    """
+    if path is not None and hasattr(socket, "AF_UNIX"):
+        ear, mouth = (socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) for _ in range(2))
         try:
             path.unlink(missing_ok=True)
-            listener.bind(str(path))
-            path.chmod(0o600)  # before `listen`, which lets clients connect
-            listener.listen(4)
+            ear.bind(str(path))
+            path.chmod(0o600)
+            mouth.connect(str(path))
         except OSError:  # a full disk must not take the stop away from this process
-            yield None
-            return
-        try:
-            yield listener
-        finally:
-            (now() or path).unlink(missing_ok=True)
+            ear.close()
+            mouth.close()
+        else:
+            return ear, mouth
+    return socket.socketpair()
 
 
 def request_estop(path: Path, timeout: float = STOP_TIMEOUT) -> StopOutcome:
@@ -79,15 +79,13 @@ def request_estop(path: Path, timeout: float = STOP_TIMEOUT) -> StopOutcome:
 
     Raises PortNotFound when no process serves it, LinkError when the process does not answer in time.
     """
-    reply = b""
-    with socket.socket(socket.AF_UNIX) as client:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as client, tempfile.TemporaryDirectory() as folder:
         client.settimeout(timeout)
         try:
+            client.bind("" if sys.platform == "linux" else f"{folder}/reply")  # "": a free abstract name
             client.connect(str(path))
-            client.sendall(_request())
-            reply = client.makefile("rb").readline()
-        except (ConnectionResetError, BrokenPipeError):
-            pass
+            client.send(_request())
+            reply = client.recv(LONGEST)
         except (FileNotFoundError, ConnectionRefusedError):
             raise PortNotFound(
                 "no motorbus process offers an emergency stop for this bus",
@@ -95,8 +93,6 @@ def request_estop(path: Path, timeout: float = STOP_TIMEOUT) -> StopOutcome:
             ) from None
         except OSError as error:
             raise LinkError(f"the process that holds the bus did not answer: {error}") from error
-    if not reply.endswith(b"\n"):
-        raise LinkError("the process that holds the bus ended without answering", received=reply)
     outcome = json.loads(reply)
     return StopOutcome(
         tuple(outcome["acknowledged"]), tuple(outcome["silent"]), outcome["rounds"], outcome["promise"]
