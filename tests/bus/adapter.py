@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 from motorbus.bus.blocking import Bus
 from motorbus.bus.stop_socket import StopOutcome
-from motorbus.bus.tasks import TaskTree
+from motorbus.bus.tasks import Tree
 from motorbus.core.request import ANY, Data, Expected, Request, Response
 from motorbus.core.request import Effect as Effect
 from motorbus.core.request import Priority as Priority
@@ -36,7 +36,6 @@ def request(
     priority: Priority = Priority.POLL,
     goal_of: int | None = None,
     goal: float = 0.0,
-    alternate: Callable[[], Any] | None = None,
     **options: Any,
 ) -> Request[Any]:
     """One request and the replies it calls for: (node, key, length) each; None: all until the deadline."""
@@ -65,7 +64,6 @@ def request(
         read,
         priority=priority,
         setpoints=() if goal_of is None else (Setpoint(goal_of, "position", goal, -1.0, 1.0),),
-        alternate=alternate,
         decode_exact=whole if isinstance(frame, bytes) and dues else None,
         **options,
     )
@@ -121,12 +119,7 @@ class Wire:
 
 
 class Engine:
-    """A bus of one family over a scripted wire, opened, with `check` as its interlock (None: it has none).
-
-    `settled` is set when a call can go on.
-    """
-
-    settled = False
+    """A bus of one family over a scripted wire, opened, with `check` as its interlock (None: it has none)."""
 
     def __init__(
         self,
@@ -174,11 +167,8 @@ class Engine:
         return self.engine.next_deadline() - self.now
 
     def submit(self, name: str, work: Any) -> None:
-        self.calls[name] = TaskTree(self.engine, work, now=self.link.now, settled=self._settle)
+        self.calls[name] = Tree(self.engine, work, now=self.link.now)
         self.advance()
-
-    def _settle(self) -> None:
-        self.settled = True
 
     def run(self, work: Any) -> Any:
         """Carry it out as a blocking caller does."""
@@ -194,23 +184,22 @@ class Engine:
         self.advance(after)
 
     def _state(self) -> tuple[Any, ...]:
-        finished = [call.root.finished for call in self.calls.values()]
-        return self.now, len(self.wire.sent), len(self.engine.queue), len(self.engine.in_flight), finished
+        calls = [(call.finished, len(call.ready), len(call.sending)) for call in self.calls.values()]
+        return self.now, len(self.wire.sent), len(self.engine.in_flight), calls
 
     def advance(self, seconds: float = 0.0) -> None:
         """Let time pass, and do all that is to be done meanwhile."""
         end, same = self.now + seconds, 0
         while same < 3:
-            before, self.settled = self._state(), False
-            for call in self.calls.values():
-                call.advance()
+            before = self._state()
+            trees = [call for call in self.calls.values() if not call.advance()]
             if self.engine.gone is not None:
                 self._look_for_link(end)
             else:
-                self.bus.send()
-                if self.settled:
+                moment = self.bus.send(trees)
+                if any(tree.ready for tree in trees):
                     continue
-                self.bus.receive(min([end, *(call.next_moment() for call in self.calls.values())]))
+                self.bus.receive(min([end, moment, *(tree.next_moment() for tree in trees)]), trees)
                 if self.engine.gone is None:
                     self.link.advance(0.0)
             same = same + 1 if before == self._state() else 0

@@ -47,14 +47,12 @@ def value_of(reply: bytes) -> int:
     return int.from_bytes(reply[5:7], "little")
 
 
-def read(node: int, count: int = 2, *, alternate: bool = False, **options: Any) -> Any:
-    """Read the position in `count` bytes; with `alternate` the bus may ask for another length instead."""
-    other = (lambda: read(node, 5 - count, alternate=True, **options)) if alternate else None
+def read(node: int, count: int = 2, **options: Any) -> Any:
+    """Read the position in `count` bytes."""
     return request(
         read_frame(node, count),
         [(node, node, 6 + count)],
         lambda replies: value_of(replies[0]),
-        alternate=other,
         **{"repeatable": True, **options},
     )
 

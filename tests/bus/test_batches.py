@@ -146,7 +146,6 @@ def test_the_value_of_an_order_is_the_same_on_an_idle_and_a_busy_bus(stack: Exit
 
 def test_can_frames_of_a_batch_are_written_one_by_one() -> None:
     can = Engine("kst")
-    can.bus.engine.echo.exclude()
     can.wire.answer = lambda frame: Servos()(frame) if frame.id > 0x600 else []
     order: Request[Any] = Request(CanFrame(0x123, b"\1"))
     read = can_read(1)

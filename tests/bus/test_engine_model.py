@@ -361,7 +361,6 @@ class SerialModel(Model):
             instruction(node, 2, bytes([mark, count])),
             [(node, node, 6 + count)],
             lambda replies: value_of(replies[0]),
-            alternate=lambda: self._read(node, 5 - count, mark, priority),
             priority=priority,
             repeatable=True,
         )
@@ -398,7 +397,6 @@ class SerialModel(Model):
             "exclusive", node, exclusive(self._read(node, 2, mark), self._read(other, 2, mark)), (2, mark)
         )
 
-    @precondition(lambda self: not self._copies())
     @rule(nodes=st.lists(NODES, min_size=2, max_size=3, unique=True))
     def read_group(self, nodes: list[int]) -> None:
         mark = self._mark()
@@ -422,26 +420,6 @@ class SerialModel(Model):
         frame = instruction(node, 3, bytes([TORQUE, 0, mark]))
         options: Any = {"effect": Effect.TORQUE, "priority": Priority.STOP}
         self.submit("stop", node, request(frame, [(node, node, 6)], lambda _: None, **options), (3, mark))
-
-    def _copies(self) -> bool:
-        """A copy of a reply that has come is on its way."""
-        return any(number in self.answered for number, _ in self.lines.get(0, ()))
-
-    @precondition(lambda self: self._is_single_read() and not self._pending("group"))
-    @rule()
-    def copy_later(self) -> None:
-        """A copy of the reply to a single read comes behind the next request."""
-        first = self.lines[0][0]
-        self._deliver(0, self._take(0))
-        self._collect()
-        self.lines[0].appendleft(first)
-        self.seen["copied later"] += 1
-
-    def _is_single_read(self) -> bool:
-        line = self.lines.get(0)
-        return (
-            line is not None and len(line) > 0 and not self._copies() and self.sent[line[0][0]].frame[4] == 2
-        )
 
     @precondition(Model.has_reply)
     @rule(at=st.integers(0, 12), flip=st.integers(1, 255))

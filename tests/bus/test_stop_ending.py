@@ -9,9 +9,10 @@ ENDING = """
 import atexit, motorbus
 sim = motorbus.simulate("feetech", ids="1", clock="real")
 bus = motorbus.open(sim.url)
-atexit.register(lambda: print(bus.stop_count(1) // 2))
+atexit.register(lambda: print(sum(one.direction == "tx" for one in trace) // 2))
 motorbus.feetech.Servo(bus, 1).enable_torque()
 sim[1].unplug()  # so that all five rounds are needed, each with a frame for all and one for node 1
+trace = bus.trace.subscribe()
 bus.trigger_estop()
 """
 

@@ -146,12 +146,14 @@ class Command:
         for first in firsts:
             if len(pairs) >= count:
                 break
-            world = World(self, first)
+            second = random.choice(list(Kind))
+            world = World(self, first, is_async=second is Kind.CANCEL)
             world.execute(self.call)
             world.recover()
             moments = range(len(world.moments))
-            for number in random.sample(moments, min(SECONDS, len(moments))):
-                pairs.append((first, Cut(random.choice(list(Kind)), number)))
+            pairs += [
+                (first, Cut(second, number)) for number in random.sample(moments, min(SECONDS, len(moments)))
+            ]
         return pairs[:count]
 
 
@@ -162,9 +164,10 @@ class World:
     `moments`   those since the last cut, `unchanged` of them before `memory` differed from `watched`
     """
 
-    def __init__(self, command: Command, *cuts: Cut) -> None:
+    def __init__(self, command: Command, *cuts: Cut, is_async: bool = False) -> None:
         self.command = command
         self.cuts = list(cuts)
+        self.is_async = is_async or any(cut.kind is Kind.CANCEL for cut in cuts)
         self.made = self.unchanged = 0
         self.moments: list[Moment] = []
         self.watched: object = None
@@ -205,9 +208,10 @@ class World:
         """Open the bus, call a method of the device at this id and rate; its value, or what it has raised."""
         node, rate = at or self.address
         self.link = link = CutLink(self, rate)
-        is_async = any(cut.kind is Kind.CANCEL for cut in self.cuts)
+        self.task = None
         try:
-            return asyncio.run(self._call_async(node, call)) if is_async else self._call(node, call)
+            value = asyncio.run(self._call_async(node, call)) if self.is_async else self._call(node, call)
+            return LinkError("the process was killed") if link.dead else value
         except (MotorbusError, KeyboardInterrupt, asyncio.CancelledError) as error:
             return error
         finally:
@@ -280,9 +284,9 @@ class World:
             self.link.dead = True
         if kind in (Kind.DEATH, Kind.BLACKOUT, Kind.UNPLUG):
             self.link.lose()
-        if kind is Kind.INTERRUPT:
+        if kind is Kind.INTERRUPT and self.task is None:
             raise KeyboardInterrupt
-        if kind is Kind.CANCEL:
+        if kind in (Kind.INTERRUPT, Kind.CANCEL):  # asyncio cancels the main task at Ctrl-C
             assert self.task is not None
             self.task.cancel()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -113,14 +114,17 @@ def test_ctrl_c_at_any_frame_leaves_nothing_moving(kind: Kind, number: int) -> N
 def test_what_ends_a_task_stops_its_move_and_a_closed_coroutine_sends_nothing(kind: Kind, how: str) -> None:
     async def ended(sim: Simulation, servo: Any, goal: float) -> BaseException | None:
         moving = servo.move(goal, **kind.bounds)
+        task = asyncio.create_task(moving)
         if how == "close":
             while sim.now < 0.4:
-                moving.send(None)
+                await asyncio.sleep(0)
             sim.line = Line(lambda: pytest.fail("sent by a closed coroutine"))
             moving.close()
+            task.cancel()
+            with contextlib.suppress(asyncio.CancelledError, RuntimeError):  # its coroutine is closed
+                await task
             sim.line = PerfectLine()
             return None
-        task = asyncio.create_task(moving)
         try:
             async with asyncio.timeout(None) as limit:
                 loop = asyncio.get_running_loop()

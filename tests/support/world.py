@@ -6,22 +6,23 @@ This file alone knows the engine (`motorbus.bus`). Every other helper and every 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from typing import Any, Protocol, cast
 
 from motorbus.bus.aio import AsyncBus
+from motorbus.bus.attempt import Attempt
 from motorbus.bus.base import BaseBus
 from motorbus.bus.blocking import Bus
 from motorbus.bus.engine import Engine
-from motorbus.bus.jobs import Attempt, RequestJob
 from motorbus.bus.stop_socket import StopOutcome
+from motorbus.bus.tasks import Tree
 from motorbus.bus.trace import Subscription, TraceRecord
 from motorbus.core.family import AxisDriver, BusDriver, Family
 from motorbus.core.register import Register, RegisterMap
 from motorbus.core.request import Data, Effect, Notification, Request, Step
-from motorbus.core.steps import Exclusive, Gather, Runnable, Shielded, discard
+from motorbus.core.steps import Exclusive, Gather, Runnable, Shielded, catch, discard, gather
 from motorbus.errors import RequestError
 from motorbus.link.base import Line, Link
 from motorbus.link.memory import MemoryLink
@@ -55,17 +56,6 @@ def make_async_bus(
     return AsyncBus(link, driver, interlock=Gate(), report=report, journal=journal)
 
 
-def exclude_echo(bus: BaseBus) -> None:
-    """Tell the bus that its line has no echo, as the echo test of `motorbus.open` finds out."""
-    bus.engine.echo.exclude()
-
-
-def has_queued_motion(bus: BaseBus) -> bool:
-    """Requests wait to be sent that move something or switch torque."""
-    jobs = [job for job in bus.engine.queue if isinstance(job, RequestJob)]
-    return any(job.request.effect >= Effect.TORQUE for job in jobs)
-
-
 def is_listening(bus: BaseBus) -> bool:
     """The bus sends nothing."""
     return bus.engine.listening
@@ -81,17 +71,25 @@ def set_rate(bus: BaseBus, rate: int) -> None:
     bus.engine.rate = rate
 
 
-def queue(bus: BaseBus, request: Request[Any]) -> RequestJob:
-    """Queue a request without waiting for its reply."""
-    job = RequestJob(request)
-    bus.engine.submit(job, bus.link.now())
-    return job
+class Queue:
+    """Requests that wait on a bus, sent only by `turn`. `outcomes`: value or error of each, None while it waits."""
 
+    def __init__(self, bus: BaseBus, requests: Sequence[Request[Any]]) -> None:
+        self.bus = bus
+        self.outcomes: list[Any] = [None] * len(requests)
+        procedures = [self._carry_out(*one) for one in enumerate(requests)]
+        self.tree: Tree[Any] = Tree(bus.engine, gather(*procedures), now=bus.link.now)
 
-def turn(bus: BaseBus, seconds: float) -> None:
-    """Send what may be sent, and receive for at most so long."""
-    bus.send()
-    bus.receive(bus.link.now() + seconds)
+    async def _carry_out(self, number: int, request: Request[Any]) -> None:
+        self.outcomes[number] = await catch(request)
+
+    def turn(self, seconds: float) -> None:
+        """Send what may be sent, and receive for at most so long."""
+        bus, trees = self.bus, (self.tree,)
+        self.tree.advance()
+        bus.send(trees)
+        bus.receive(bus.link.now() + seconds, trees)
+        self.tree.advance()
 
 
 class Interrupting(MemoryLink):
@@ -126,19 +124,17 @@ class Tries:
     SOON = 0.001
     """s from the request to its reply."""
 
-    def __init__(self, family: Family, rate: int, *, echo: bool = True) -> None:
+    def __init__(self, family: Family, rate: int) -> None:
         self.engine = Engine(family.open(), rate=rate)
-        if not echo:
-            self.engine.echo.exclude()
 
     def answered(self, request: Request[Any], data: list[Data]) -> tuple[Any, str]:
         """The answer, None where it failed, and the kind of failure of what is missing: `silence`, `checksum` …"""
         attempt = Attempt(request)
         self.engine.begin(attempt, 0.0)
-        self.engine.written()
+        self.engine.written(attempt)
         self.engine.feed(data, self.SOON)
         self.engine.expire(attempt.deadline)
-        return None if attempt.fault else attempt.answer(self.SOON), attempt.failure()
+        return attempt.accepted, attempt.failure()
 
 
 IDS = (1, 2, 3)

@@ -11,21 +11,18 @@ from threading import Condition
 from typing import Any
 
 from motorbus.bus import failures
+from motorbus.bus.attempt import Attempt
 from motorbus.bus.engine import Engine
 from motorbus.bus.interlock import Interlock
-from motorbus.bus.jobs import Attempt, RateJob, RequestJob, Since
-from motorbus.bus.policy import carry_out
-from motorbus.bus.positions import Reading
-from motorbus.bus.prepared import Prepared
+from motorbus.bus.nodes import Reading
 from motorbus.bus.stop import EmergencyStop
 from motorbus.bus.stop_socket import StopOutcome, asked_by
-from motorbus.bus.tasks import Notify, TaskTree
-from motorbus.bus.trace import TraceRecord
+from motorbus.bus.tasks import Notify, Pause, Tree, in_order
 from motorbus.bus.turn import Turn
 from motorbus.core.family import BusDriver, Family, IdChanged
-from motorbus.core.request import Data, Priority, Request
+from motorbus.core.request import Priority, Request
 from motorbus.core.steps import JournalEntry, Runnable
-from motorbus.errors import LinkError, LinkFull, LinkLost, MotorbusError, RequestError
+from motorbus.errors import LinkError, LinkLost, MotorbusError, RequestError
 from motorbus.link.base import Link, Renewable
 from motorbus.link.memory import MemoryLink
 
@@ -73,7 +70,7 @@ class BaseBus:
         """Subscribe to every request and delivery."""
         self.notices = self.engine.notices
         """Subscribe to what devices send without a request."""
-        self.positions: Mapping[int, Reading] = self.engine.positions
+        self.positions: Mapping[int, Reading] = self.engine.nodes
         """The last request that read a position and its reply, by node."""
         self.lock = self.turn = Turn()
         """Held while a request is in flight, or the state of this bus is read or changed as a whole."""
@@ -84,9 +81,9 @@ class BaseBus:
         self.engine.before_motion = self._start_stopper
         self.reconnects = isinstance(link, Renewable)
         """A lost port is opened again by the next request. May be set to False only."""
+        self.watches: list[Tree[Any]] = []
+        """Procedures that are stepped whenever the bus is used; for virtual time, which passes only then."""
         self._on_reconnect: list[Callable[[], None]] = []
-        self.background: list[TaskTree[Any]] = []
-        """Procedures that are stepped whenever the bus is used; see `BackgroundTask`."""
         self._open = True
         if stop_socket is not None:
             self.stopper.start()
@@ -140,40 +137,121 @@ class BaseBus:
 
     # -- the link ----------------------------------------------------------------------------------------------
 
-    def send(self) -> None:
-        """Write all that may be sent now. The caller holds the turn; a lost link fails all requests."""
+    def send(self, trees: Sequence[Tree[Any]]) -> float:
+        """Write all that these may send now; the moment (s) from which more may be sent, inf while none is known.
+
+        The caller holds the turn; a lost link fails everything that waits.
+        """
         engine, link = self.engine, self.link
-        for tree in tuple(self.background):
-            if tree.advance() and tree in self.background:
-                self.background.remove(tree)
         if engine.gone is not None and not self._reconnect():
-            return
+            self._fail(engine.gone, trees)
+            return inf
+        moment = inf
         try:
             now = link.now()
-            if engine.queue and (stale := link.read(now)):  # it cannot answer what has not left
-                engine.feed(stale, now)
-            while (out := engine.next_frame(now)) is not None:
-                if isinstance(out, RateJob):
-                    self._set_rate(out)
-                else:
-                    try:
-                        link.write(out)
-                    except LinkLost:
-                        raise
-                    except LinkError as error:
-                        engine.not_written(error)
-                    else:
-                        engine.written()
+            if any(tree.sending for tree in trees) and (stale := link.read(now)):
+                engine.feed(stale, now)  # it cannot answer what has not left
+            while (moment := self._send_next(trees, now)) == 0.0:
+                pass
         except LinkError as error:
-            self._lost(error)
+            self._fail(self._lost(error), trees)
+        self.hand_over()
+        return moment
 
-    def receive(self, until: float) -> None:
+    def _send_next(self, trees: Sequence[Tree[Any]], now: float) -> float:
+        """Send the first that may leave and return 0; else the moment (s) from which one may, inf if unknown."""
+        engine, moment = self.engine, inf
+        waiting = trees[0].sending if len(trees) == 1 else in_order(trees)
+        for one in waiting:
+            tree = one.task.tree
+            if not self._may_use_bus(one):
+                continue
+            if isinstance(one, Pause):
+                if engine.in_flight:  # what is behind it waits, too
+                    break
+                tree.sending.remove(one)
+                self._end_pause(one)
+                return 0.0
+            if len(engine.in_flight) >= engine.window:
+                break
+            if blocked := engine.is_blocked(one, now):
+                moment = min(moment, blocked)
+                continue
+            tree.sending.remove(one)
+            try:
+                if engine.needs_sync(one):
+                    engine.check_stops(one.request, one.since, one.stop_since)
+                    tree.send_back(one)
+                    return 0.0
+                engine.check(one.request, one.since, one.stop_since, now)
+            except MotorbusError as error:
+                one.error = error
+                tree.end(one)
+            else:
+                self._write(tree, one, now)
+            return 0.0
+        return moment
+
+    def _may_use_bus(self, one: Attempt | Pause) -> bool:
+        if isinstance(one, Attempt) and one.request.priority is Priority.STOP:
+            return True
+        owner = self.engine.exclusive
+        return not self.engine.stopping and (owner is None or owner is one.task.owner)
+
+    def _write(self, tree: Tree[Any], attempt: Attempt, now: float) -> None:
+        engine = self.engine
+        engine.begin(attempt, now)
+        try:
+            self.link.write(attempt.request.wire)
+        except LinkLost as error:
+            if not attempt.in_flight:
+                attempt.error = error
+                engine.done.append(attempt)
+            raise
+        except LinkError as error:
+            if engine.not_written(attempt, error):
+                tree.put_back(attempt)
+        else:
+            engine.written(attempt)
+
+    def _end_pause(self, pause: Pause) -> None:
+        """Nothing is in flight: set the rate, or give the bus to the task of this pause."""
+        engine, task, tune = self.engine, pause.task, pause.tune
+        if tune is None:
+            engine.exclusive = task
+            task.tree.ready.append((task, None, None))
+            return
+        before, failure = engine.rate, None
+        try:
+            if tune.rate:
+                self.link.tune(tune.rate, tune.listen_only or engine.always_listening)
+                engine.set_rate(tune.rate, listen_only=tune.listen_only)
+        except LinkLost as error:
+            task.tree.ready.append((task, None, error))
+            raise
+        except MotorbusError as error:
+            failure = error
+        task.tree.ready.append((task, before, failure))
+
+    def hand_over(self) -> None:
+        """Give every attempt that has ended to the task that waits for it."""
+        done = self.engine.done
+        while done:
+            attempt = done.popleft()
+            if attempt.task is not None:
+                attempt.task.tree.end(attempt)
+
+    def _fail(self, error: LinkError, trees: Sequence[Tree[Any]]) -> None:
+        self.hand_over()
+        for tree in trees:
+            tree.fail(error)
+
+    def receive(self, until: float, trees: Sequence[Tree[Any]] = ()) -> None:
         """Wait for data, at most until this moment or the next deadline, and feed the engine.
 
         Only what was due before this look is overdue after it: the reply may be in the buffer of a host that was late.
         """
         engine, link = self.engine, self.link
-        until = min([until, *(tree.next_moment() for tree in self.background)])
         if engine.gone is not None:
             self._wait_without_link(until)
             return
@@ -182,28 +260,19 @@ class BaseBus:
             chunks = link.read(min(until, engine.next_deadline(), looked + IDLE))
             engine.feed(chunks, link.now(), looked)
         except LinkError as error:
-            self._lost(error)
+            self._fail(self._lost(error), trees)
+        self.hand_over()
 
     def next_event(self, moment: float) -> float:
         """When something happens on a simulated bus in virtual time, at `moment` (s) at the latest."""
         due = self.link.due() if isinstance(self.link, MemoryLink) else inf
         return max(min(moment, self.engine.next_deadline(), due), self.now())
 
-    def _lost(self, error: LinkError) -> None:
+    def _lost(self, error: LinkError) -> LinkError:
         if isinstance(error, LinkLost):
             error = failures.reconnecting(error) if self.reconnects else failures.final(error)
         self.engine.lost(error)
-
-    def _set_rate(self, job: RateJob) -> None:
-        try:
-            if job.tune.rate:
-                self.link.tune(job.tune.rate, job.tune.listen_only or self.engine.always_listening)
-        except MotorbusError as error:
-            self.engine.rate_changed(job, error)
-            if isinstance(error, LinkLost):
-                raise
-        else:
-            self.engine.rate_changed(job)
+        return error
 
     def _reconnect(self) -> bool:
         """Open the lost port again if it is there; False when it is not, and every request has failed."""
@@ -227,108 +296,6 @@ class BaseBus:
     def _wait_without_link(self, until: float) -> None:
         if isinstance(self.link, Renewable) and self.reconnects:
             self.link.rest(min(until, self.link.now() + IDLE))
-
-    # -- prepared requests -------------------------------------------------------------------------------------
-
-    def find_prepared(self, request: Request[Any]) -> Prepared | None:
-        """The prepared form of this request if it may be sent at once, else None. The caller holds the turn.
-
-        `Engine.submit` makes the prepared form when the request is sent for the first time.
-        """
-        engine, link = self.engine, self.link
-        prepared: Prepared | None = request.prepared
-        if prepared is None or prepared.engine is not engine:
-            return None
-        if engine.in_flight or (not engine.ready and not engine.check_ready()):
-            return None
-        single = prepared.single
-        if single is not None and single.length == prepared.length:
-            prepared = prepared.alternate
-        if engine.sync.out_of_sync and not engine.sync.out_of_sync.isdisjoint(prepared.nodes):
-            return None
-        if prepared.rate != engine.rate or prepared.latency != engine.latency:
-            engine.measure(prepared)
-        if stale := link.read(-inf):  # it cannot answer what has not left
-            engine.feed(stale, link.now())
-            return None
-        return None if engine.paced and link.now() < engine.free_at else prepared
-
-    def write(
-        self, prepared: Prepared, order: Request[Any] | None = None, since: Since | None = None
-    ) -> Attempt | None:
-        """Write a prepared request; an order without reply goes in front of it. None: the link is full.
-
-        Raises what forbids the order.
-        """
-        engine, now = self.engine, self.link.now()
-        attempt = prepared.attempt
-        if attempt.ended:
-            attempt = prepared.attempt = Attempt(prepared.request)
-        wire: Any = prepared.wire
-        attempt.sent_at = now
-        if order is not None:
-            assert since is not None
-            wire, attempt.sent_at = self._write_order(order, since, now) + wire, engine.free_at
-        attempt.deadline = attempt.sent_at + prepared.budget
-        engine.in_flight[prepared.lane] = attempt
-        try:
-            self.link.write(wire)
-        except LinkFull:
-            del engine.in_flight[prepared.lane]
-            return None
-        if order is not None:
-            engine.statistics.other["sent"] += 1
-        if engine.trace.subscriptions:
-            for request in (prepared.request,) if order is None else (order, prepared.request):
-                engine.trace.put(TraceRecord(now, "tx", request.wire))
-        return attempt
-
-    def _write_order(self, order: Request[Any], since: Since, now: float) -> Any:
-        """Check and count an order that leaves with the next request; its data."""
-        engine = self.engine
-        engine.time = now
-        engine.check(order, since)
-        if order.priority is Priority.STOP:
-            engine.note_stop(order)
-        else:
-            engine.positions.sent(order)
-        engine.free_at = now + engine.air_time(order)
-        return order.wire
-
-    def accept(self, prepared: Prepared, chunks: Sequence[Data], deadline: float) -> Any:
-        """The value if this is the complete reply to a prepared request, else None."""
-        if len(chunks) != 1:
-            return None
-        at = self.link.now()
-        if at > deadline:  # the host was late
-            at = deadline
-        value = prepared.decode(chunks[0], at)
-        if value is None:
-            return value
-        engine, record, single = self.engine, prepared.record, prepared.single
-        if engine.trace.subscriptions:
-            engine.trace.put(TraceRecord(at, "rx", chunks[0]))
-        if engine.last is not record:
-            engine.note_last(record)
-        sent_at = prepared.attempt.sent_at
-        if single is not None:
-            single.length, single.asked_at = prepared.length, sent_at
-        prepared.times[int(1e6 * (at - sent_at)).bit_length()] += 1
-        record.data, record.at, record.source, record.kept = chunks[0], at, prepared, None
-        record.orders = engine.positions.orders
-        engine.positions.rate = engine.rate
-        del engine.in_flight[prepared.lane]
-        return value
-
-    def adopt(self, prepared: Prepared, chunks: Sequence[Data], job: RequestJob) -> None:
-        """The reply to a prepared request is in pieces, damaged or missing: its job goes the general path."""
-        engine, attempt = self.engine, prepared.attempt
-        prepared.attempt = Attempt(prepared.request)
-        job.policy = carry_out(engine, job.request)
-        job.policy.send(None)  # up to the attempt that is in flight
-        attempt.job = job
-        engine.adopt(attempt)
-        engine.feed(chunks, self.link.now(), attempt.sent_at)
 
     # -- observers ---------------------------------------------------------------------------------------------
 
@@ -368,9 +335,8 @@ class BaseBus:
         self.engine.latency = seconds
 
     def stop_count(self, node: int | None = None) -> int:
-        """Number of stops sent to this node, those for all nodes included; None: of all stops sent on this bus."""
-        positions = self.engine.positions
-        return positions.stop_total if node is None else positions.stop_count(node)
+        """A number that a stop of this node changes; None: of any node, an emergency stop or a lost port as well."""
+        return self.engine.nodes.epoch if node is None else self.engine.nodes.last_stop(node)
 
     @property
     def loss_count(self) -> int:
@@ -385,10 +351,21 @@ class BaseBus:
         """The reads that the interlock needs before it can check this request."""
         return () if self.interlock is None else self.interlock.required_reads(request)
 
+    def watch(self, procedure: Runnable[Any]) -> Tree[Any]:
+        """Step this procedure whenever the bus is used, in virtual time, until `unwatch`."""
+        tree: Tree[Any] = Tree(self.engine, procedure, now=self.now, report=self.event_sink(None))
+        self.watches.append(tree)
+        return tree
+
+    def unwatch(self, tree: Tree[Any]) -> None:
+        """End what `watch` began."""
+        self.watches.remove(tree)
+        tree.drop()
+
     def attach(self, gate: Any) -> None:
         """Let the gate see positions and stops of this bus, and ask it which reads a request requires first."""
-        positions = self.engine.positions
-        gate.watch(positions, self.link.now, positions.stop_count, positions.accepted_count)
+        nodes = self.engine.nodes
+        gate.watch(nodes, self.link.now, nodes.last_stop, nodes.accepted_count)
         self.interlock = gate
         self.on_reconnect(gate.forget)
 

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
 from math import inf
 from threading import get_ident
 from typing import Any, Self, TypeVar
 
+from motorbus.bus.attempt import Attempt
 from motorbus.bus.base import BaseBus
-from motorbus.bus.interrupts import ELSEWHERE, INTERRUPTS, MAIN, Interrupts, interrupts
-from motorbus.bus.jobs import Attempt, RequestJob, Since
-from motorbus.bus.positions import GATED
-from motorbus.bus.prepared import Prepared
-from motorbus.bus.running import TURN_TIMEOUT, run_here, run_on
-from motorbus.bus.tasks import Notify, check_outside
+from motorbus.bus.engine import PENDING
+from motorbus.bus.interrupts import ELSEWHERE, INTERRUPTS, MAIN, interrupts
+from motorbus.bus.nodes import GATED
+from motorbus.bus.running import TURN_TIMEOUT, Part, run_here, run_parts
+from motorbus.bus.tasks import STEPPING, Notify, Tree, check_outside, decode
 from motorbus.core.register import shown
 from motorbus.core.request import Priority, Request, Response
 from motorbus.core.steps import Runnable, discard, gather
@@ -34,70 +33,9 @@ class Bus(BaseBus):
 
         Raises what the procedure raises; a signal is raised when the procedure has cleaned up.
         """
-        if isinstance(procedure, Request) and not self._needs_reads(procedure):  # without a TaskTree
-            return self.transact(procedure)  # type: ignore[no-any-return]
+        if isinstance(procedure, Request):
+            return self._carry_out(procedure)[1]  # type: ignore[no-any-return]
         return run_here(self, procedure, report)
-
-    def transact(self, request: Request[Any]) -> Any:
-        """Carry out one request."""
-        check_outside()
-        turn = self.turn
-        if self.link.virtual:
-            self.check_thread()
-        signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
-        since = self.engine.since if request.effect else None
-        signals.depth += 1  # as `with interrupts()`, written out for speed
-        try:
-            turn.acquire(request.priority)
-            try:
-                prepared = self.find_prepared(request)
-                attempt = None if prepared is None else self.write(prepared)
-                if prepared is not None and attempt is not None:
-                    return self._receive(prepared, attempt)
-                job = RequestJob(request, since=since)
-                self.engine.submit(job, self.link.now())
-                return self._finish(job)
-            except LinkLost as error:
-                self._lost(error)
-                raise
-            finally:
-                turn.release()
-        finally:
-            signals.depth -= 1
-            if signals.pending is not None and not signals.depth:
-                signals.raise_pending()
-
-    def _receive(self, prepared: Prepared, attempt: Attempt) -> Any:
-        """The value of a prepared request that was written; its reply may come in pieces."""
-        link, deadline = self.link, attempt.deadline
-        chunks: list[Any] = link.read(deadline)
-        if chunks and type(chunks[0]) is bytes and len(chunks[0]) != prepared.size:
-            data: Any = b"".join(chunks)
-            while len(data) < prepared.size and (more := link.read(deadline)):
-                data += b"".join(more)  # type: ignore[arg-type]  # a link gives bytes or frames
-            chunks = [data]
-        value = self.accept(prepared, chunks, deadline)
-        if value is not None:
-            return value
-        job = RequestJob(prepared.request)
-        self.adopt(prepared, chunks, job)
-        return self._finish(job)
-
-    def _finish(self, job: RequestJob) -> Any:
-        try:
-            while not job.done:
-                self.send()
-                if job.done:
-                    break
-                if self.waits_for_stop:
-                    self.turn.release()
-                    self.turn.acquire(job.priority)
-                else:
-                    self.receive(inf)
-        except BaseException:  # the caller does not wait any more
-            self.engine.cancel(job)
-            raise
-        return job.result()
 
     def exchange(
         self, requests: Sequence[Request[Any]], tolerated: tuple[type[Exception], ...] = ()
@@ -108,54 +46,151 @@ class Bus(BaseBus):
         An error of a `tolerated` type becomes the value of its request; any other is raised, and requests behind it
         have not been sent.
         """
-        with self._start(requests) as batch:
-            return batch.result(tolerated)
-
-    def _start(self, requests: Sequence[Request[Any]], timeout: float = -1.0) -> _Batch:
-        """Send a batch, see `exchange`; `result` gives its values.
-
-        A batch that cannot be sent at once, or for which the bus is not free within `timeout` s (-1: no limit), is sent
-        by `result`. Until then the calling thread has the bus, and signals are deferred.
-        """
         _check_requests(requests)
-        check_outside()
+        if len(requests) == 2 and may_join(requests[0]):
+            return list(self._carry_out(requests[1], requests[0], tolerated))
+        return run_here(self, carry_out_batch(requests, tolerated))
+
+    def _carry_out(
+        self,
+        request: Request[Any],
+        order: Request[Any] | None = None,
+        tolerated: tuple[type[Exception], ...] = (),
+    ) -> tuple[Any, Any]:
+        """The value of an order without replies that leaves with this request, and the value of this request."""
+        if STEPPING.active:
+            check_outside()
         if self.link.virtual:
             self.check_thread()
         signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
-        pending = _Batch(self, requests, signals)
-        signals.depth += 1
+        since = self.engine.nodes.epoch
+        signals.depth += 1  # as `with interrupts()`, written out for speed
         try:
-            if self.turn.acquire(Priority.CONTROL, timeout):
-                pending.prepared = self._write_batch(requests, pending.since)
-        except LinkLost as error:
-            self._lost(error)
-            raise
+            self.turn.acquire(request.priority if order is None else order.priority)
+            try:
+                started = self.start(request, order, since)
+                if started is not None:
+                    try:
+                        value = self.finish(started)
+                    except tolerated as error:
+                        value = error
+                    if value is not PENDING:
+                        return (decode_order(order, started.sent_at) if order else None), value
+                part, tree = self.continue_with(request, order, started, since, tolerated)
+            except LinkLost as error:
+                self._lost(error)
+                raise
+            finally:
+                self.turn.release()
+            run_parts([part], single=True)
+            values = tree.result()
+            return (
+                values if order is not None and started is None else (decode_order(order, self.now()), values)
+            )
         finally:
-            if pending.prepared is None:
-                pending.release()
-        return pending
+            signals.depth -= 1
+            if signals.pending is not None and not signals.depth:
+                signals.raise_pending()
 
-    def _write_batch(self, requests: Sequence[Request[Any]], since: Since) -> Prepared | None:
-        """Write a prepared request, and an order in front of it; None where they cannot leave now."""
-        order = requests[0] if len(requests) == 2 else None
-        if len(requests) > 2 or not requests or (order is not None and not self._may_join(order)):
+    # -- a single request, without a task; the caller holds the turn ---------------------------------------------
+
+    def start(self, request: Request[Any], order: Request[Any] | None, since: int) -> Attempt | None:
+        """Send this request at once, an order without replies in front of it; None where it must wait.
+
+        Raises what forbids the request.
+        """
+        engine, link = self.engine, self.link
+        now = link.now()
+        if self.watches or not engine.is_free(now):
             return None
-        prepared = self.find_prepared(requests[-1])
-        try:
-            if prepared is None or self.write(prepared, order, since) is None:
+        excluded = engine.put_off(request, now) if engine.sync.out_of_sync else ()
+        if excluded is None:
+            return None
+        if stale := link.read(-inf):  # it cannot answer what has not left
+            engine.feed(stale, now)
+            self.hand_over()
+            return None
+        wire: Any = request.wire
+        if request.effect:
+            if self._reads_first(request):
                 return None
-        except LinkError:
+            engine.check(request, since, since, now)
+        if order is not None:
+            if self._reads_first(order):
+                return None
+            try:
+                engine.check(order, since, since, now)
+            except MotorbusError:  # the general path says so
+                return None
+            engine.lead(order, now)
+            wire = order.wire + wire
+        if request.priority is Priority.STOP:
+            engine.note_stop(request)
+        attempt = engine.attempt(request)
+        attempt.excluded, attempt.task, attempt.direct = excluded, None, True
+        attempt.since = attempt.stop_since = since
+        engine.begin(attempt, now)
+        try:
+            link.write(wire)
+        except LinkLost:
             raise
-        except MotorbusError:  # the order is refused: `result` says so
+        except LinkError as error:
+            if not engine.not_written(attempt, error):
+                raise
             return None
-        return prepared
+        if engine.window > 1 or not attempt.in_flight:
+            engine.written(attempt)
+        return attempt
 
-    def _may_join(self, order: Request[Any]) -> bool:
-        """This order may leave in one write with the next request; CAN frames are written one by one."""
-        return order.expected == () and isinstance(order.wire, bytes) and not self._needs_reads(order)
+    def finish(self, attempt: Attempt) -> Any:
+        """Wait for the reply to what `start` sent: its value, or `PENDING` where it needs more than one look."""
+        engine, link, request = self.engine, self.link, attempt.request
+        if attempt.in_flight:
+            chunks = link.read(attempt.deadline)
+            if chunks and request.decode_exact is not None and not request.effect and not attempt.excluded:
+                data = chunks[0]
+                if type(data) is bytes and (len(data) != attempt.size or len(chunks) > 1):
+                    data = self._rest_of(attempt, chunks)
+                value = engine.accept(attempt, data, link.now())
+                if value is not PENDING:
+                    return value
+                chunks = [data]
+            engine.feed(chunks, link.now(), attempt.sent_at)
+            if attempt.accepted is None:
+                return PENDING
+        self.hand_over()
+        assert attempt.accepted is not None
+        return decode(engine, request, attempt.accepted)
 
-    def _needs_reads(self, request: Request[Any]) -> bool:
-        """Whether the gate must read positions first; `run_here` makes these reads again."""
+    def _rest_of(self, attempt: Attempt, chunks: list[Any]) -> bytes:
+        """The whole reply, which comes in pieces."""
+        data = b"".join(chunks)
+        while len(data) < attempt.size and (more := self.link.read(attempt.deadline)):
+            data += b"".join(more)  # type: ignore[arg-type]  # a link gives bytes or frames
+        return data
+
+    def continue_with(
+        self,
+        request: Request[Any],
+        order: Request[Any] | None,
+        started: Attempt | None,
+        since: int,
+        tolerated: tuple[type[Exception], ...],
+    ) -> tuple[Part, Tree[Any]]:
+        """Carry out what could not be sent at once, or was answered otherwise than by one complete reply, as a task."""
+        part = Part(self)
+        if started is not None:
+            tree: Tree[Any] = part.add(request, since=since)
+            tree.adopt(started)
+            self.hand_over()
+        elif order is None:
+            tree = part.add(request, since=since)
+        else:
+            tree = part.add(carry_out_batch((order, request), tolerated), since=since)
+        return part, tree
+
+    def _reads_first(self, request: Request[Any]) -> bool:
+        """Whether the gate must read positions first; the task makes these reads again."""
         reads = self.required_reads(request) if request.effect in GATED else ()
         for read in reads:
             discard(read)
@@ -182,59 +217,17 @@ class Bus(BaseBus):
         self.close()
 
 
-class _Batch:
-    """A batch that was started. `prepared` is the request whose reply is awaited, None where nothing was sent yet.
+def may_join(order: Request[Any]) -> bool:
+    """This order may leave in one write with the next request; CAN frames are written one by one."""
+    return order.expected == () and isinstance(order.wire, bytes)
 
-    At the end of its block the bus is free, also where an error was raised before `result`.
-    """
 
-    __slots__ = ("bus", "prepared", "requests", "signals", "since")
-
-    def __init__(self, bus: Bus, requests: Sequence[Request[Any]], signals: Interrupts) -> None:
-        self.bus = bus
-        self.requests = requests
-        self.signals = signals
-        self.since = bus.engine.since
-        self.prepared: Prepared | None = None
-
-    def __enter__(self) -> _Batch:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        if (
-            self.prepared is not None
-        ):  # its reply is not awaited, and the node is out of sync from its deadline on
-            self.prepared = None
-            self.release()
-
-    def release(self) -> None:
-        """Give the bus back; raise a signal that came meanwhile."""
-        self.bus.turn.release()
-        signals = self.signals
-        signals.depth -= 1
-        if signals.pending is not None and not signals.depth:
-            signals.raise_pending()
-
-    def result(self, tolerated: tuple[type[Exception], ...] = ()) -> list[Any]:
-        """The values of all requests; an error of a `tolerated` type is the value of its request. Raises others."""
-        prepared, bus = self.prepared, self.bus
-        if prepared is None:
-            return run_here(bus, carry_out_batch(self.requests, tolerated), since=self.since)
-        answer, value = Response((), (), bus.engine.time), None
-        try:
-            value = bus._receive(prepared, prepared.attempt)
-        except LinkLost as error:
-            bus._lost(error)
-            raise
-        except tolerated as error:
-            value = error
-        finally:
-            self.prepared = None
-            self.release()
-        if len(self.requests) == 1:
-            return [value]
-        decode = self.requests[0].decode
-        return [answer if decode is None else decode(answer), value]
+def decode_order(order: Request[Any] | None, at: float) -> Any:
+    """The value of an order without replies; None where there is none."""
+    if order is None:
+        return None
+    answer = Response((), (), at)
+    return answer if order.decode is None else order.decode(answer)
 
 
 async def carry_out_batch(
@@ -261,28 +254,94 @@ def exchange_on(
     batches: Mapping[Bus, Sequence[Request[Any]]], tolerated: tuple[type[Exception], ...] = ()
 ) -> dict[BaseBus, Any]:
     """Carry out a batch on each bus at the same time: the values of each, or its MotorbusError."""
+    check_outside()
     found: dict[BaseBus, Any] = {}
-    pending: list[_Batch] = []
-    with interrupts(), ExitStack() as stack:
-        for bus, requests in batches.items():
-            try:
-                pending.append(stack.enter_context(bus._start(requests, TURN_TIMEOUT if pending else -1.0)))
-            except MotorbusError as error:
-                found[bus] = error
-        sent = [one for one in pending if one.prepared is not None]
-        for one in sent:
-            try:
-                found[one.bus] = one.result(tolerated)
-            except Exception as error:
-                found[one.bus] = error
-        unsent = [one for one in pending if one not in sent]
-        if unsent:
-            work = {one.bus: carry_out_batch(one.requests, tolerated) for one in unsent}
-            found |= run_on(work, {one.bus: one.since for one in unsent})
-    for value in found.values():
-        if isinstance(value, Exception) and not isinstance(value, MotorbusError):
-            raise value
+    started: list[_Batch] = []
+    with interrupts():
+        waiting = [_Batch(bus, requests, tolerated) for bus, requests in batches.items()]
+        try:
+            for batch in waiting:
+                if batch.send(TURN_TIMEOUT if started else -1.0):
+                    started.append(batch)
+            for batch in started:
+                batch.receive()
+        finally:
+            for batch in waiting:
+                batch.release()
+        run_parts([batch.part for batch in waiting if batch.part is not None], single=True)
+        for batch in waiting:
+            found[batch.bus] = batch.outcome()
     return found
+
+
+class _Batch:
+    """A batch on one bus. `part` carries out what could not be sent at once or has no whole reply yet."""
+
+    def __init__(
+        self, bus: Bus, requests: Sequence[Request[Any]], tolerated: tuple[type[Exception], ...]
+    ) -> None:
+        _check_requests(requests)
+        bus.check_thread()
+        self.bus = bus
+        self.requests = requests
+        self.tolerated = tolerated
+        self.since = bus.engine.nodes.epoch
+        self.order = requests[0] if len(requests) == 2 and may_join(requests[0]) else None
+        self.attempt: Attempt | None = None
+        self.part: Part | None = None
+        self.tree: Tree[Any] | None = None
+        self.value: Any = None
+        self._holds_turn = False
+
+    def send(self, timeout: float) -> bool:
+        """Send it at once, and hold the turn; False where that is not possible."""
+        bus, requests = self.bus, self.requests
+        self._holds_turn = bus.turn.acquire(Priority.CONTROL, timeout)
+        if self._holds_turn and (self.order is not None or len(requests) == 1):
+            try:
+                self.attempt = bus.start(requests[-1], self.order, self.since)
+            except LinkLost as error:
+                self.value = bus._lost(error)
+                return False
+            except MotorbusError:  # it is refused: the task says so
+                pass
+        if self.attempt is None:
+            self.part = Part(bus)
+            self.tree = self.part.add(carry_out_batch(requests, self.tolerated), since=self.since)
+            self.release()
+        return self.attempt is not None
+
+    def receive(self) -> None:
+        """Wait for the reply; what is more than one complete reply is left to a task."""
+        bus, attempt = self.bus, self.attempt
+        assert attempt is not None
+        try:
+            self.value = bus.finish(attempt)
+        except LinkLost as error:
+            self.value = bus._lost(error)
+        except Exception as error:
+            self.value = error
+        if self.value is PENDING:
+            self.part, self.tree = bus.continue_with(
+                self.requests[-1], self.order, attempt, self.since, self.tolerated
+            )
+
+    def release(self) -> None:
+        """Give the turn back."""
+        if self._holds_turn:
+            self._holds_turn = False
+            self.bus.turn.release()
+
+    def outcome(self) -> Any:
+        """The values of the requests, or the MotorbusError that is not tolerated. Raises any other error."""
+        value = self.value if self.tree is None else self.tree.outcome()
+        if self.attempt is None:
+            return value
+        if isinstance(value, Exception) and not isinstance(value, self.tolerated):
+            if not isinstance(value, MotorbusError):
+                raise value
+            return value
+        return [value] if self.order is None else [decode_order(self.order, self.attempt.sent_at), value]
 
 
 def _check_requests(requests: Sequence[Any]) -> None:

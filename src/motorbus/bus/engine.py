@@ -1,4 +1,4 @@
-"""The engine of a bus: requests in, frames out, data in, replies out. No I/O and no clock.
+"""The engine of a bus: attempts out, data in, replies out. No I/O and no clock.
 
 At most one request is in flight per lane, on at most `window` lanes. A request with replies is in `in_flight` from
 before it is written until its attempt ends or the link fails; which nodes may still owe a reply is in `sync`. A
@@ -9,20 +9,16 @@ it.
 
 from __future__ import annotations
 
-from bisect import insort
+from collections import deque
 from collections.abc import Callable, Sequence
-from contextlib import suppress
-from itertools import count
 from math import inf
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 from motorbus.bus import failures
+from motorbus.bus.attempt import Attempt
 from motorbus.bus.echo import Echo
 from motorbus.bus.interlock import Interlock
-from motorbus.bus.jobs import Attempt, ExclusiveJob, Job, RateJob, RequestJob, Since, Wait
-from motorbus.bus.policy import carry_out
-from motorbus.bus.positions import GATED, LastPositions, addressed, moves
-from motorbus.bus.prepared import Prepared, nodes_of
+from motorbus.bus.nodes import GATED, Nodes, addressed, is_refusal, moves
 from motorbus.bus.statistics import Statistics
 from motorbus.bus.sync import SyncTable
 from motorbus.bus.trace import Feed, TraceRecord
@@ -42,9 +38,7 @@ from motorbus.core.request import (
     Response,
     TimeoutClass,
 )
-from motorbus.errors import LinkError, LinkFull, LinkLost, MotorbusError
-
-T = TypeVar("T")
+from motorbus.errors import LinkError, LinkFull, LinkLost
 
 MARGIN: Final = {TimeoutClass.SCAN: 0.002, TimeoutClass.REPLY: 0.02, TimeoutClass.STORE: 0.02}
 """s that the host may be late; short for a scan, where silence is the usual answer."""
@@ -52,14 +46,17 @@ DIRECT: Final = 0.001
 """s; a link of less latency has no adapter that holds data back."""
 STOP_DELAY: Final = 0.003
 """s that a stop waits for the turn beyond the air time of what is in flight."""
+RECENT: Final = 64
+"""Attempts whose nodes are doubted when unexpected data comes within the quiet time."""
+PENDING: Final = object()
+"""The value of a request whose reply is not complete."""
 
 
 class Engine:
-    """The engine of one bus. `rate` (bit/s) and `latency` (s) describe the link; `paced`: the link takes air
-    time, so nothing is sent before `free_at` (s). `queue`: frames that its adapter takes at once, 0 if unknown.
+    """The engine of one bus. `rate` (bit/s) and `latency` (s) describe the link; `paced`: the link takes air time,
+    so nothing is sent before `free_at` (s). `queue`: frames that its adapter takes at once, 0 if unknown.
 
-    `time` (s) is `now` of the last `submit`, `next_frame` or `feed`. `losses` and `latches` count lost ports and
-    emergency stops. An emergency stop is announced (`stopping`), sent (`stop_sent`), and stays `latched` until `reset`.
+    An emergency stop is announced (`stopping`), sent (`stop_sent`), and stays `latched` until `reset`.
     """
 
     def __init__(
@@ -85,326 +82,254 @@ class Engine:
         self.notices: Feed[Notification] = Feed()
         self.statistics = Statistics()
         self.sync = SyncTable(driver)
-        self.echo = Echo()
+        self.echo = Echo(possible=driver.family.link.kind == "bytes")
         self.receiver = driver.receiver()
-        self.positions = LastPositions(driver, rate)
+        self.holds_data = False
+        """The receiver holds a part of a frame."""
+        self.nodes = Nodes(driver, rate)
         self.in_flight: dict[int, Attempt] = {}
-        self.queue: list[Job] = []
+        self.done: deque[Attempt] = deque()
+        """Attempts that have ended, in order, for the scheduler of their tasks."""
         self.notification_handlers: list[Callable[[Notification], None]] = []
         self.end_sleeps: list[Callable[[BaseException], None]] = []
         """Called with the error when an emergency stop is latched or the port is lost: procedures that sleep end."""
         self.exclusive: object = None
+        """The task that has the bus alone."""
         self.latched = self.stopping = False
         self.latched_by = ""
-        self.losses = self.latches = 0
+        self.latched_at = self.lost_at = 0
+        """Epochs of the last emergency stop and the last loss; see `Nodes.epoch`."""
+        self.losses = 0
         self.gone: LinkLost | None = None
         """Why there is no port; None again when it is back."""
-        self.free_at = self.time = 0.0
+        self.free_at = 0.0
         self.full_until = 0.0
         """s; the link was full, and nothing is written before."""
-        self.rate = rate
+        self._rate = rate
+        self._latency = latency
+        self._timing = object()
+        self._recent: deque[Attempt] = deque(maxlen=RECENT)
+        self._wires: deque[bytes] = deque(maxlen=8)
+        """What was sent last: an echo of it is no reply."""
+        self._repeats: dict[int, tuple[tuple[Expected, ...], int]] = {}
+        """By lane, the last replies expected, and how often in a row."""
+        self._last: Attempt | None = None
+        """The last accepted attempt that read positions."""
+
+    # -- time --------------------------------------------------------------------------------------------------
+
+    @property
+    def rate(self) -> int:
         """bit/s"""
-        self.latency = latency
+        return self._rate
+
+    @rate.setter
+    def rate(self, rate: int) -> None:
+        self._rate, self._timing = rate, object()
+
+    @property
+    def latency(self) -> float:
         """s that the adapter may hold data back; part of every deadline."""
-        self.since = Since(self.positions.stops, self.latches, self.losses)
-        """Present counts of stops, emergency stops and losses. A caller keeps them; `check` compares."""
-        self._serial = count()
-        self._leaving: Attempt | None = None
-        """The attempt whose request is being written."""
-        self.ready = False
-        self.last: Prepared | None = None
-        """The prepared request that was carried out last, if nothing else happened since."""
+        return self._latency
+
+    @latency.setter
+    def latency(self, seconds: float) -> None:
+        self._latency, self._timing = seconds, object()
 
     @property
     def quiet_time(self) -> float:
         """s of silence before a node out of sync is probed."""
-        return self.driver.quiet_time(self.rate)
+        return self.driver.quiet_time(self._rate)
 
     def air_time(self, request: Request[Any]) -> float:
         """s on the wire of this request and its replies."""
-        return self.driver.air_time(request, self.rate)
+        return self.driver.air_time(request, self._rate)
 
     def reply_timeout(self, request: Request[Any]) -> float:
         """s from the end of the air time to the deadline.
 
         For a scan on a link that holds nothing back: the shorter of the normal and the scan turnaround, no margin.
         """
-        if request.reply_within is TimeoutClass.SCAN and self.latency < DIRECT:
+        if request.reply_within is TimeoutClass.SCAN and self._latency < DIRECT:
             plain: Request[Response] = Request(request.wire, request.expected)
-            return min(self.driver.turnaround(plain), self.driver.turnaround(request)) + self.latency
-        return self.driver.turnaround(request) + self.latency + MARGIN[request.reply_within]
+            return min(self.driver.turnaround(plain), self.driver.turnaround(request)) + self._latency
+        return self.driver.turnaround(request) + self._latency + MARGIN[request.reply_within]
 
-    @property
-    def idle(self) -> bool:
-        """Nothing is in flight or waits to be sent."""
-        return not (self.in_flight or self.queue)
+    def next_deadline(self) -> float:
+        """The next moment (s) at which an attempt in flight ends; inf when there is none."""
+        return min([attempt.deadline for attempt in self.in_flight.values()], default=inf)
 
-    def check_ready(self) -> bool:
-        """Set and return `ready`: a prepared request may be sent at once.
+    # -- what may leave ----------------------------------------------------------------------------------------
 
-        `ready` stays True until `submit`, `feed`, an emergency stop or a lost link clears it.
-        """
-        self.ready = not (self.in_flight or self.queue or self.stopping or self.listening or self.gone) and (
-            self.exclusive is None and self.echo.is_out and not self.receiver.held
+    def is_free(self, now: float) -> bool:
+        """A single request may be sent at once."""
+        return not (
+            self.in_flight
+            or self.stopping
+            or self.listening
+            or self.gone
+            or self.echo.present is not False
+            or self.exclusive is not None
+            or self.holds_data
+            or now < (self.free_at if self.paced else self.full_until)
         )
-        return self.ready
 
-    # -- jobs --------------------------------------------------------------------------------------------------
+    def is_blocked(self, attempt: Attempt, now: float) -> float:
+        """The moment (s) from which this attempt may leave, inf if another one must end first; 0: at once."""
+        lane = attempt.request.lane
+        if lane in self.in_flight:
+            return inf
+        free = max(self.full_until, self.free_at if self.paced else 0.0)
+        if attempt.is_probe:
+            free = max(free, self.sync.of(attempt.nodes[0]).quiet_until)
+        return free if now < free else 0.0
 
-    def submit(self, job: Job, now: float) -> None:
-        """Queue a job: by priority, then in order of submission. A refused job is settled at once."""
-        self.time, self.ready = now, False
-        self.note_last()
-        job.serial = next(self._serial)
-        if isinstance(job, RequestJob):
-            try:
-                self._check_stops(job.request, job.since)
-            except MotorbusError as error:
-                job.settle(error=error)
-                return
-            if job.priority is Priority.STOP:
-                self.note_stop(job.request)
-            if (
-                job.request.decode_exact is not None
-                and getattr(job.request.prepared, "engine", None) is not self
-            ):
-                job.request.prepared = self.prepare(job.request)
-            job.policy = carry_out(self, job.request)
-            insort(self.queue, job)
-        elif isinstance(job, ExclusiveJob) and self.exclusive is not None and self.exclusive is job.owner:
-            job.settle()
-        else:
-            insort(self.queue, job)
+    def needs_sync(self, attempt: Attempt) -> bool:
+        """A node of this attempt, which is no probe, is out of sync: it must be probed first."""
+        if not self.sync.out_of_sync or attempt.is_probe or not must_sync(attempt.request):
+            return False
+        return any(node not in attempt.excluded for node in self.sync.doubtful(attempt.request))
 
-    def cancel(self, job: Job, error: BaseException | None = None) -> None:
-        """Its caller no longer waits. A request in flight keeps its lane until its reply or its deadline."""
-        self._remove(job)
-        for attempt in self.in_flight.values():
-            if attempt.job is job:
-                attempt.job = None
-        job.settle(error=error or failures.abandoned())
+    def put_off(self, request: Request[Any], now: float) -> tuple[int, ...] | None:
+        """The nodes out of sync for which a group does not wait now; None if one must be probed first."""
+        if not must_sync(request):
+            return ()
+        nodes = tuple(self.sync.doubtful(request))
+        put_off = request.expected is not ANY and len(request.expected) > 1
+        if nodes and not (put_off and all(self.sync.is_put_off(node, now) for node in nodes)):
+            return None
+        return nodes
 
-    def release(self, owner: object) -> None:
-        """This owner no longer has the bus alone."""
-        if self.exclusive is owner:
-            self.exclusive = None
+    def check(self, request: Request[Any], since: int, stop_since: int, now: float) -> None:
+        """Raise the error that forbids sending this request now.
 
-    def _resume(self, job: RequestJob, attempt: Attempt | None = None) -> None:
-        """Ask the policy of a job for its next step, and queue the job with it.
-
-        `attempt` is the finished one; None to start, after a wait, or when the chosen attempt may not leave.
+        `since` is the epoch when its caller decided: of latches and lost ports; `stop_since` of stops of nodes.
         """
-        assert job.policy is not None
-        self._remove(job)
-        if job.done:  # its caller waits no more
-            return
-        try:
-            step = job.policy.send(attempt)
-            while isinstance(step, Wait) and step.until <= self.time:
-                step = job.policy.send(None)
-        except StopIteration as end:
-            self._decode(job, end.value)
-        except MotorbusError as error:
-            job.settle(error=error)
-        else:
-            job.step = step
-            insort(self.queue, job)
-
-    def _decode(self, job: RequestJob, answer: Response) -> None:
-        request = job.request
-        try:
-            value = answer if request.decode is None else request.decode(answer)
-        except Exception as error:  # a refusal of the device, or an error of the driver
-            job.settle(error=error)
-            return
-        if request.expected:
-            self.positions.accept(request, answer)
-        job.settle(value)
-
-    def _remove(self, job: Job) -> None:
-        if job in self.queue:
-            self.queue.remove(job)
-
-    # -- what is sent ------------------------------------------------------------------------------------------
-
-    def next_frame(self, now: float) -> Data | RateJob | None:
-        """What to do now: write this data, or change the rate; None: nothing until `next_deadline` or new data.
-
-        After a write call `written` or `not_written`, after a change of rate `rate_changed`. Also grants exclusive use
-        of the bus.
-        """
-        self.time = now
-        for job in list(self.queue):
-            if not self._may_use_bus(job):
-                continue
-            if isinstance(job, RequestJob):
-                data = self._try_to_send(job, now)
-                if data is not None:
-                    return data
-            elif self.in_flight:  # a rate change or exclusive use waits, and what is behind it waits, too
-                return None
-            else:
-                self.queue.remove(job)
-                if isinstance(job, RateJob):
-                    return job
-                self.exclusive = job.owner
-                job.settle()
-        return None
-
-    def _may_use_bus(self, job: Job) -> bool:
-        if job.priority is Priority.STOP:
-            return True
-        return not self.stopping and (self.exclusive is None or self.exclusive is job.owner)
-
-    def _try_to_send(self, job: RequestJob, now: float) -> Data | None:
-        """Begin the next attempt of this job: its lane and the wire are free, its nodes are in sync, `check` passes."""
-        if job.request.lane in self.in_flight or len(self.in_flight) >= self.window:
-            return None
-        if now < self.full_until or (self.paced and now < self.free_at):
-            return None
-        if not isinstance(job.step, Attempt):
-            if job.step is not None and now < job.step.until:
-                return None
-            self._resume(job)
-        if job.done or not isinstance(job.step, Attempt):
-            return None
-        attempt, request = job.step, job.step.request
-        # Another request to this node may have failed since the probe was chosen: its quiet time runs again.
-        if now < self._earliest(attempt):
-            return None
-        unprobed = (
-            attempt.is_probe or request.priority is Priority.STOP or request.reply_within is TimeoutClass.SCAN
-        )
-        doubtful = [] if unprobed else self.sync.doubtful(request)
-        if any(node not in attempt.excluded for node in doubtful):
-            self._resume(job)
-            return None
-        self._remove(job)
-        try:
-            self.check(request, job.since)
-        except MotorbusError as error:
-            job.settle(error=error)
-            return None
-        attempt.job = job
-        attempt.echo_excluded = attempt.after_echo and self.echo.present is False
-        self.begin(attempt, now)
-        return request.wire
-
-    def _earliest(self, step: Attempt | Wait) -> float:
-        """The earliest moment (s) for this step; -inf if it may be carried out now."""
-        if isinstance(step, Wait):
-            return step.until
-        return self.sync.of(step.dues[0].node).quiet_until if step.is_probe else -inf
-
-    def check(self, request: Request[Any], since: Since | None) -> None:
-        """Raise the error that forbids sending this request now. `since`: the counts when its caller decided."""
         if self.listening:
             raise failures.listen_only(request)
         if request.priority is Priority.STOP:
             return
-        if self.latched or since is not self.since:
-            self._check_stops(request, since)
+        self.check_stops(request, since, stop_since)
         if request.effect in GATED or (request.deferred is not None and self.interlock is not None):
             if self.interlock is None:
                 raise failures.no_interlock(request)
-            if request.precondition is not None and (
-                error := request.precondition(self.positions.stop_count)
-            ):
+            if request.precondition is not None and (error := request.precondition(self.nodes.last_stop)):
                 raise error
-            self.interlock.check(request, self.time)
+            self.interlock.check(request, now)
             if self.before_motion is not None:
                 self.before_motion()
 
-    def _check_stops(self, request: Request[Any], since: Since | None) -> None:
+    def check_stops(self, request: Request[Any], since: int, stop_since: int) -> None:
         """Raise the error for a motion or torque request that must not leave.
 
         A stop is latched; or the request moves something, and a stop of its nodes or a lost port came after `since`.
         """
-        if request.effect not in GATED or request.priority is Priority.STOP:
+        if request.priority is Priority.STOP or request.effect not in GATED:
             return
         if self.latched:
             raise failures.latched(self.latched_by)
-        if since is None or not moves(request):
+        if since == self.nodes.epoch or not moves(request):
             return
-        if since.latches != self.latches or self.positions.is_stopped(request, since.stops):
+        if self.latched_at > since or self.nodes.is_stopped(request, stop_since):
             raise failures.stopped()
-        if since.losses != self.losses:
+        if self.lost_at > since:
             raise failures.outlived(request)
 
     def note_stop(self, request: Request[Any]) -> None:
-        """Count a stop request that will be sent, and inform the interlock; from any thread."""
-        self.positions.sent(request)
-        self._note_since()
-        if self.interlock is not None and request.effect in GATED:
-            with suppress(Exception):  # the stop must go out
+        """Count a stop that will be sent, and inform the interlock; from any thread."""
+        if request.effect in GATED:
+            self.nodes.stopped(request)
+            if self.interlock is not None:
                 self.interlock.stopped(tuple(addressed(request)))
 
-    def _note_since(self) -> None:
-        self.since = Since(self.positions.stops, self.latches, self.losses)
+    # -- an attempt begins -------------------------------------------------------------------------------------
+
+    def attempt(self, request: Request[Any]) -> Attempt:
+        """An attempt of this request. One with `decode_exact` is kept, and so is its attempt."""
+        if request.decode_exact is None:
+            return Attempt(request)
+        attempt: Attempt | None = request.attempt
+        if attempt is None or attempt.timing is not self._timing or attempt.in_flight:
+            attempt = request.attempt = Attempt(request)
+            self.measure(attempt)
+        return attempt
+
+    def measure(self, attempt: Attempt) -> None:
+        """Compute its times for the present rate and latency."""
+        attempt.air = self.air_time(attempt.request)
+        attempt.budget = attempt.air + self.reply_timeout(attempt.request)
+        attempt.timing = self._timing
+        for node in attempt.nodes:
+            self.sync.of(node)
 
     def begin(self, attempt: Attempt, now: float) -> None:
         """Record an attempt before its request is written; `written` or `not_written` follows."""
         request = attempt.request
-        if self.receiver.held:  # bytes from before the request are no part of its reply
-            self._take_all(self.receiver.flush(), now)
-        attempt.sent_at, attempt.air = now, self.air_time(request)
+        if self.holds_data:  # bytes from before the request are no part of its reply
+            self._flush(now)
+        if attempt.timing is not self._timing:
+            self.measure(attempt)
+        if attempt.is_used:
+            attempt.reset()
+        attempt.sent_at = now
         if request.expected != ():
-            attempt.deadline = max(now, self.free_at) + attempt.air + self.reply_timeout(request)
+            attempt.deadline = max(now, self.free_at) + attempt.budget
+            attempt.in_flight = True
             self.in_flight[request.lane] = attempt
+            if not self._recent or self._recent[-1] is not attempt:
+                self._recent.append(attempt)
         if (request.effect or request.setpoints) and request.priority is not Priority.STOP:
-            self.positions.sent(request)
-        self._leaving = attempt
-
-    def adopt(self, attempt: Attempt) -> None:
-        """Record of a written prepared request what `begin` records; it continues on the general path."""
-        request = attempt.request
-        self.note_last()
-        self.sync.mark_sent(request, attempt.sent_at)
-        self.statistics.asked(request.expected)
-        if isinstance(request.wire, bytes):
-            self.echo.sent(request.wire, testing=False)
-
-    def written(self) -> None:
-        """The data of `next_frame` was written. If its request expects no reply, settle the job."""
-        attempt, self._leaving = self._leaving, None
-        assert attempt is not None
-        request = attempt.request
-        if request.expected == ():
-            self.free_at = max(attempt.sent_at, self.free_at) + attempt.air
-        else:
-            self.sync.mark_sent(request, attempt.sent_at)
-            self._share_wire(attempt)
-        if isinstance(request.wire, bytes):
-            self.echo.sent(request.wire, attempt.is_probe or request is self.echo.test)
-        self.statistics.asked(request.expected)
+            self.nodes.ordered(request)
+        if type(request.wire) is bytes:
+            self._wires.append(request.wire)
+            if self.echo.present is not False:
+                self.echo.sent(request.wire)
         if self.trace.subscriptions:
-            self.trace.put(TraceRecord(attempt.sent_at, "tx", request.wire))
-        if request.expected == () and attempt.job is not None:
-            self._decode(attempt.job, attempt.answer(self.time))
+            self.trace.put(TraceRecord(now, "tx", request.wire))
 
-    def not_written(self, error: LinkError) -> None:
-        """The link did not take the data of `next_frame`; other requests lose nothing.
+    def lead(self, order: Request[Any], now: float) -> None:
+        """Record an order without replies that is written in front of the next request."""
+        if order.priority is Priority.STOP:
+            self.note_stop(order)
+        else:
+            self.nodes.ordered(order)
+        self.free_at = max(now, self.free_at) + self.air_time(order)
+        self.statistics.other["sent"] += 1
+        if type(order.wire) is bytes:
+            self._wires.append(order.wire)
+        if self.trace.subscriptions:
+            self.trace.put(TraceRecord(now, "tx", order.wire))
 
-        If it is full, the request is written again after its air time, until the deadline of this attempt. Any other
-        error ends the request, of which a part may have been sent.
+    def written(self, attempt: Attempt) -> None:
+        """Its data was written. A request without replies has ended."""
+        if attempt.request.expected == ():
+            self.free_at = max(attempt.sent_at, self.free_at) + attempt.air
+            self.statistics.other["sent"] += 1
+            attempt.is_used, attempt.accepted = True, Response((), (), attempt.sent_at)
+            self.done.append(attempt)
+        elif self.window > 1:
+            self._share_wire(attempt)
+
+    def not_written(self, attempt: Attempt, error: LinkError) -> bool:
+        """The link did not take its data; other requests lose nothing. True: write it again after its air time.
+
+        A full link takes it later, until the deadline of this attempt. Any other error ends the request, of which a
+        part may have been sent.
         """
-        attempt, self._leaving = self._leaving, None
-        assert attempt is not None
-        assert attempt.job is not None
-        request, job = attempt.request, attempt.job
-        if request.expected != ():
+        request = attempt.request
+        if attempt.in_flight:
+            attempt.in_flight = False
             del self.in_flight[request.lane]
         if not isinstance(error, LinkFull):
             self._mark_owed(attempt)
         elif not attempt.write_until or attempt.sent_at < attempt.write_until:
-            attempt.write_until = attempt.write_until or (
-                attempt.sent_at + attempt.air + self.reply_timeout(request)
-            )
+            attempt.write_until = attempt.write_until or attempt.sent_at + attempt.budget
             alone: Request[Response] = Request(request.wire)
             self.full_until = attempt.sent_at + self.air_time(alone)
-            insort(self.queue, job)
-            return
-        job.settle(error=error)
+            return True
+        attempt.is_used, attempt.error = True, error
+        self.done.append(attempt)
+        return False
 
     def _mark_owed(self, attempt: Attempt) -> None:
         """The replies to this attempt may still come."""
@@ -414,88 +339,77 @@ class Engine:
     def _share_wire(self, attempt: Attempt) -> None:
         """Extend this deadline by the air time of each other attempt in flight, and theirs by its own.
 
-        Each attempt counts each competitor once, and at most window - 1 of them.
+        Each attempt counts each other one once, and at most window - 1 of them.
         """
-        if self.window == 1:
-            return
         others = [other for other in self.in_flight.values() if other is not attempt]
-        attempt.competitors = len(others)
+        attempt.shared = len(others)
         for other in others:
             attempt.deadline += other.air
-            if other.competitors < self.window - 1 and other.job is not None:
+            if other.shared < self.window - 1 and other.task is not None:
                 other.deadline += attempt.air
-                other.competitors += 1
-
-    def rate_changed(self, job: RateJob, error: MotorbusError | None = None) -> None:
-        """A rate job has ended: the rate was set, or only read (0), or the link refused it (`error`)."""
-        before = self.rate
-        if error is None and job.tune.rate:
-            self.rate = job.tune.rate
-            self.listening = job.tune.listen_only or self.always_listening
-            self.receiver = self.driver.receiver()
-        job.settle(before, error)
-
-    def alternate(self, request: Request[Any]) -> Request[Any]:
-        """The equivalent request with another reply length, if the last reply of the node had the length of this one.
-
-        A copy of the last reply then cannot pass for the new one.
-        """
-        if request.alternate is None or request.expected is ANY or len(request.expected) != 1:
-            return request
-        due = request.expected[0]
-        node = self.sync.nodes.get(due.node)
-        return request.alternate() if node is not None and node.length == due.length else request
+                other.shared += 1
 
     # -- what comes in -----------------------------------------------------------------------------------------
 
+    def accept(self, attempt: Attempt, data: Data, at: float) -> Any:
+        """The value of an attempt that is alone in flight, if this is its whole reply, else `PENDING`.
+
+        Only for a request with `decode_exact`. Data of a pending attempt was not taken: `feed` it.
+        """
+        at = min(at, attempt.deadline)  # the host was late
+        value = attempt.request.decode_exact(data, at)  # type: ignore[misc]  # the caller has looked
+        if value is None or attempt.excluded:
+            return PENDING
+        if self.trace.subscriptions:
+            self.trace.put(TraceRecord(at, "rx", data))
+        del self.in_flight[attempt.request.lane]
+        attempt.in_flight = False
+        attempt.data, attempt.answer = data, None
+        self._note(attempt, at)
+        if self.sync.out_of_sync:
+            self._confirm(attempt, attempt.nodes)
+        return value
+
     def feed(self, chunks: Sequence[Data], now: float, looked: float | None = None) -> None:
         """Take the data of the link, then end attempts overdue at `looked`, when the link was read."""
-        self.time, self.ready = now, False
-        self.note_last()
         for data in chunks:
             if self.trace.subscriptions:
                 self.trace.put(TraceRecord(now, "rx", data))
-            if isinstance(data, bytes):
-                self._feed_bytes(data, now)
-            else:
-                self._take_all(self.receiver.feed(data), now)
-        self._end_complete(now)
+            rest = self.echo.strip(data) if type(data) is bytes else data
+            if self.echo.broken:
+                self._fail_by_echo()
+            if rest:
+                self._take_all(self.receiver.feed(rest), now)
+                self.holds_data = bool(self.receiver.held)
+        if chunks:
+            self._end_complete(now)
         self.expire(now if looked is None else looked)
 
-    def _feed_bytes(self, data: bytes, now: float) -> None:
-        rest = self.echo.strip(data)
-        if self.echo.broken:
-            self._echo_broke(now)
-        if rest:
-            self._take_all(self.receiver.feed(rest), now)
-        if self.echo.returned and not any(
-            attempt.echo_excluded or attempt.fault == "echo" for attempt in self.in_flight.values()
-        ):
-            self.echo.suspect()
-            self._fail_all_by_echo()
+    def _flush(self, now: float) -> None:
+        self.holds_data = False
+        self._take_all(self.receiver.flush(), now)
 
     def _take_all(self, events: Sequence[Event], now: float) -> None:
         for event in events:
-            self._take(event, now)
+            if type(event) is Reply:
+                self._take_reply(event, now)
+            elif type(event) is Notification:
+                self._take_notice(event, now)
+            elif type(event) is Noise:
+                self._take_noise(event, now)
 
-    def _take(self, event: Event, now: float) -> None:
-        if isinstance(event, Reply):
-            self._take_reply(event, now)
-        elif isinstance(event, Notification):
-            self.statistics.other["notices"] += 1
-            notice = event._replace(at=now)
-            self.notices.put(notice)
-            for handle in tuple(self.notification_handlers):
-                handle(notice)
-        else:
-            self._take_noise(event, now)
+    def _take_notice(self, event: Notification, now: float) -> None:
+        self.statistics.other["notices"] += 1
+        notice = event._replace(at=now)
+        self.notices.put(notice)
+        for handle in tuple(self.notification_handlers):
+            handle(notice)
 
     def _take_reply(self, reply: Reply, now: float) -> None:
         attempt = self.in_flight.get(reply.lane)
         if attempt is None:
             self._take_unexpected(None, reply, now)
-        elif reply.data in self.echo.recent and not attempt.echo_excluded:
-            self.echo.suspect()
+        elif reply.data in self._wires and not attempt.is_probed:
             attempt.fault = "echo"
             self.statistics.other["echo"] += 1
         elif attempt.complete:
@@ -529,7 +443,7 @@ class Engine:
             self.statistics.other["unexpected"] += 1
         else:
             self.statistics.other["foreign"] += 1
-            self.sync.mark_recent(now, self.quiet_time, reply.lane)
+            self._doubt_recent(now, reply.lane)
 
     def _take_noise(self, noise: Noise, now: float) -> None:
         self.statistics.other[noise.fault] += 1
@@ -538,14 +452,19 @@ class Engine:
         for lane, attempt in self.in_flight.items():
             if noise.lane in (None, lane):
                 attempt.take_noise(noise.fault, noise.data)
-        self.sync.mark_recent(now, self.quiet_time, noise.lane)
+        self._doubt_recent(now, noise.lane)
 
-    def _echo_broke(self, now: float) -> None:
+    def _doubt_recent(self, now: float, lane: int | None) -> None:
+        """Unexpected data came: every node asked within the quiet time, on this lane, may have sent it."""
+        quiet = self.quiet_time
+        for attempt in self._recent:
+            if lane in (None, attempt.request.lane) and now - attempt.sent_at <= quiet:
+                for node in attempt.nodes:
+                    self.sync.mark_doubted(node, now + quiet)
+
+    def _fail_by_echo(self) -> None:
+        """The echo of what was sent did not come as a whole: no reply of now counts."""
         self.echo.broken = False
-        self._fail_all_by_echo()
-        self.sync.mark_recent(now, self.quiet_time)
-
-    def _fail_all_by_echo(self) -> None:
         self.statistics.other["echo"] += 1
         for attempt in self.in_flight.values():
             attempt.fault = "echo"
@@ -553,156 +472,114 @@ class Engine:
     # -- how an attempt ends -----------------------------------------------------------------------------------
 
     def _end_complete(self, now: float) -> None:
-        for lane, attempt in list(self.in_flight.items()):
-            if not attempt.complete:
-                continue
-            self._take_all(self.receiver.flush(), now)  # all replies are here, so what is held is surplus
-            if not self._may_be_echo(attempt) or attempt.surplus or now >= attempt.deadline:
-                self._end(lane, attempt, now)
-
-    def _may_be_echo(self, attempt: Attempt) -> bool:
-        """Whether echo is unknown and the reply is the beginning of the request: the rest of an echo may follow."""
-        return self.echo.present is None and any(
-            self.echo.may_be(reply.data) for reply in attempt.replies.values()
-        )
+        for attempt in tuple(self.in_flight.values()):
+            if attempt.complete or attempt.fault:
+                if self.holds_data:  # all replies are here, so what is held is surplus
+                    self._flush(now)
+                if attempt.complete or now >= attempt.deadline:
+                    self._end(attempt, now)
 
     def expire(self, now: float) -> None:
         """End every attempt whose deadline has passed."""
-        for lane, attempt in list(self.in_flight.items()):
+        for attempt in tuple(self.in_flight.values()):
             if now < attempt.deadline:
                 continue
             held = self.echo.give_up()
             if self.echo.broken:
-                self._echo_broke(now)
-            self._take_all([*(self.receiver.feed(held) if held else ()), *self.receiver.flush()], now)
-            if self.in_flight.get(lane) is attempt:  # what was held has not completed it
-                self._end(lane, attempt, now)
+                self._fail_by_echo()
+            if held:
+                self._take_all(self.receiver.feed(held), now)
+            self._flush(now)
+            if attempt.in_flight:  # what was held has not completed it
+                self._end(attempt, now)
 
-    def _end(self, lane: int, attempt: Attempt, now: float) -> None:
-        """End an attempt: accept its replies (of a group, those that came) or set its fault; resume its job."""
+    def _end(self, attempt: Attempt, now: float) -> None:
+        """End an attempt: accept its replies (of a group, those that came) or set its fault."""
         request, dues = attempt.request, attempt.dues
-        single = request.expected is not ANY and len(dues) == 1
-        if (single and not attempt.complete) or (dues and (attempt.fault or attempt.surplus)):
+        if (len(dues) == 1 and not attempt.complete) or (dues and (attempt.fault or attempt.surplus)):
             attempt.fault = attempt.failure()
-        answer = attempt.answer(min(now, attempt.deadline))
-        if (
-            attempt.is_probe
-            and not attempt.fault
-            and not (request.decode is not None and request.decode(answer))
-        ):
+        answer = attempt.response(min(now, attempt.deadline))
+        if attempt.is_probe and not attempt.fault and not (request.decode and request.decode(answer)):
             attempt.fault = "unexpected"
-        answered = [due for index, due in enumerate(dues) if self._judge_reply(attempt, index, due, now)]
-        del self.in_flight[lane]
-        if attempt.fault in ("", "silence") or not dues:
-            self._end_echo_test(attempt)
+        del self.in_flight[request.lane]
+        attempt.in_flight, attempt.is_used = False, True
+        missing = dues if attempt.fault else ()
+        if answer.missing and not attempt.fault:
+            missing = tuple(due for due in dues if due.node in answer.missing)
+        for due in missing:
+            self._miss(attempt, due, now)
         if not attempt.fault or not dues:
             attempt.accepted = answer
-            self._accept(attempt, answer, answered, now)
-        attempt.ended = True
-        if attempt.job is not None:
-            self._resume(attempt.job, attempt)
+            self._accept_response(attempt, answer)
+        self.done.append(attempt)
 
-    def _judge_reply(self, attempt: Attempt, index: int, due: Expected, now: float) -> bool:
-        """True if this reply counts. Else count the error, and note the quiet time or the owed reply of its node."""
-        if not attempt.fault and index in attempt.replies and due.node not in attempt.excluded:
-            return True
-        quiet_until = now + self.quiet_time
-        if index in attempt.replies or attempt.request.priority is Priority.STOP:
-            self.sync.of(due.node).quiet_until = quiet_until
+    def _miss(self, attempt: Attempt, due: Expected, now: float) -> None:
+        """This reply does not count: note the quiet time, or that its node owes it."""
+        came = any(attempt.dues[index] is due for index in attempt.replies)
+        if came or attempt.request.priority is Priority.STOP:
+            self.sync.mark_doubted(due.node, 0.0)
+            self.sync.of(due.node).quiet_until = now + self.quiet_time
         else:
-            self.sync.mark_owed(attempt.request.lane, due, quiet_until)
+            self.sync.mark_owed(attempt.request.lane, due, now + self.quiet_time)
         self.statistics.of(due.node).errors[attempt.failure()] += 1
-        return False
 
-    def _accept(self, attempt: Attempt, answer: Response, answered: Sequence[Expected], now: float) -> None:
+    def _accept_response(self, attempt: Attempt, answer: Response) -> None:
         request = attempt.request
         if request.expected is ANY:
-            if (
-                request.lane == EVERY_LANE
-            ):  # on such a bus the lane is the node: a stop must reach all that answered
-                self.positions.add([reply.lane for reply in answer.replies])
+            if request.lane == EVERY_LANE:  # the lane is the node: a stop must reach all that answered
+                self.nodes.add([reply.lane for reply in answer.replies])
             return
-        if (
-            request.priority is not Priority.STOP
-        ):  # an earlier reply may still come, so a stop puts no node in sync
-            for due in answered:
-                self.sync.confirm(due, probe=attempt.is_probe)
-        self.statistics.answered(answered, now - attempt.sent_at)
-        self.positions.answered([due.node for due in answered], request, answer, self.rate)
+        self.echo.conclude(is_test=attempt.is_probe or request is self.echo.test)
+        nodes = attempt.nodes
+        if answer.missing:
+            nodes = tuple([node for node in nodes if node not in answer.missing])
+        if request.priority is not Priority.STOP and self.sync.out_of_sync:
+            self._confirm(attempt, nodes)  # an earlier reply may follow a stop, which puts no node in sync
+        reads = request.reports_position and not is_refusal(request, answer)
+        if reads:
+            attempt.answer = answer
+        self._note(attempt, answer.at, nodes, reads=bool(reads))
 
-    def _end_echo_test(self, attempt: Attempt) -> None:
-        """If this attempt shows that there is no echo, record that."""
-        if self.echo.present is not None or attempt.noise:
-            return
-        if attempt.is_probe or attempt.request is self.echo.test or self.echo.disproved:
-            self.echo.exclude()
+    def _confirm(self, attempt: Attempt, nodes: Sequence[int]) -> None:
+        for node in nodes:
+            self.sync.confirm(node, probe=attempt.is_probe)
 
-    # -- prepared requests -------------------------------------------------------------------------------------
+    def _note(
+        self, attempt: Attempt, at: float, nodes: tuple[int, ...] | None = None, *, reads: bool = True
+    ) -> None:
+        """Note an accepted reply: its position, its time, and how often in a row an equal one was expected."""
+        request, known = attempt.request, self.nodes
+        nodes = attempt.nodes if nodes is None else nodes
+        attempt.at = at
+        if reads and request.reports_position:
+            attempt.orders = known.orders
+            if self._last is not attempt or nodes is not attempt.nodes:
+                known.sources.update(dict.fromkeys(nodes, attempt))
+                self._last = attempt if nodes is attempt.nodes else None
+        known.rate = self._rate
+        if not known.known.issuperset(nodes):
+            known.add(nodes)
+        self.statistics.answered(nodes, at - attempt.sent_at)
+        expected, count = self._repeats.get(request.lane, ((), 0))
+        if attempt.dues != expected or not self.driver.probe_after:
+            self._repeats[request.lane] = attempt.dues, 1
+        elif count < self.driver.probe_after:
+            self._repeats[request.lane] = expected, count + 1
+        else:
+            self._repeats[request.lane] = expected, 1
+            for due in attempt.dues:
+                if due.node not in self.sync.out_of_sync:
+                    self.sync.mark_owed(request.lane, due, 0.0)
+                    break
 
-    def prepare(self, request: Request[Any]) -> Prepared | None:
-        """Prepare a request that is repeated; None if it needs the general path (queue, policy, receiver)."""
-        if (
-            request.decode_exact is None
-            or request.priority is Priority.STOP
-            or request.effect
-            or not request.expected
-        ):
-            return None
-        prepared = self._prepare(request)
-        if request.alternate is not None and prepared is not None:
-            alternate = self._prepare(request.alternate())
-            if alternate is None:
-                return None
-            prepared.alternate = alternate
-            alternate.alternate = alternate.record = prepared
-        request.prepared = prepared
-        return prepared
-
-    def _prepare(self, request: Request[Any]) -> Prepared | None:
-        if request.decode_exact is None or request.expected is ANY:
-            return None
-        nodes = nodes_of(request)
-        states, times = [self.sync.of(node) for node in nodes], self.statistics.group(nodes)
-        return Prepared(self, request, request.decode_exact, nodes, states, times, Attempt(request))
-
-    def measure(self, prepared: Prepared) -> None:
-        """Compute the time budget of a prepared request for the present rate and latency."""
-        request = prepared.request
-        prepared.budget = self.air_time(request) + self.reply_timeout(request)
-        prepared.rate, prepared.latency = self.rate, self.latency
-
-    def note_last(self, record: Prepared | None = None) -> None:
-        """Note what was put off for the last prepared request: when its nodes were asked, and the reply length.
-
-        `record` is the last one from now on.
-        """
-        last, self.last = self.last, record
-        if last is not None:
-            for state in last.states:
-                state.length, state.asked_at = last.source.length, last.source.attempt.sent_at
-        if record is not None and record.request.reports_position:
-            self.positions.latest.update(dict.fromkeys(record.nodes, record))
-
-    # -- time, loss, stop --------------------------------------------------------------------------------------
-
-    def next_deadline(self) -> float:
-        """The next moment (s) at which `next_frame` or `expire` has something to do; inf when there is none."""
-        moments = [attempt.deadline for attempt in self.in_flight.values()]
-        steps = [job.step for job in self.queue if isinstance(job, RequestJob)]
-        waits = [self._earliest(step) for step in steps if step is not None]
-        moments += [moment for moment in waits if moment > self.time]
-        if self.queue:
-            free = (self.full_until, self.free_at if self.paced else -inf)
-            moments += [moment for moment in free if moment > self.time]
-        return min(moments, default=inf)
+    # -- loss, stop --------------------------------------------------------------------------------------------
 
     def announce_stop(self, by: str) -> None:
         """Refuse motion and torque from now on; from any thread. `by` is kept from the first stop until `reset`."""
         self.latched_by = self.latched_by if self.latched else by
-        self.latches += 1
+        self.nodes.epoch += 1
+        self.latched_at = self.nodes.epoch
         self.latched = self.stopping = True
-        self._note_since()
-        self.ready = False
 
     def stop_delay(self, now: float) -> float:
         """s that a stop waits for the turn: as long as a reply may be on the wire; from any thread."""
@@ -710,33 +587,23 @@ class Engine:
         return max((self._remaining(one, now) for one in flying), default=0.0) + STOP_DELAY
 
     def latch(self, now: float, by: str) -> None:
-        """Emergency stop: end motion that waits and what is in flight, refuse motion until `reset`.
+        """Emergency stop: end sleeps, shorten what is in flight, refuse motion until `reset`.
 
-        Requests that wait and neither move nor switch torque stay queued. With several lanes repeatable reads in flight
-        are sent again after the stop; anything else in flight fails.
+        A repeatable read in flight may be sent again after the stop; anything else in flight fails.
         """
         self.announce_stop(by)
         error = failures.latched(self.latched_by)
-        for job in list(self.queue):
-            if isinstance(job, RequestJob) and job.request.effect in GATED:
-                self.cancel(job, error)
         for end in tuple(self.end_sleeps):
             end(error)
         for attempt in self.in_flight.values():
-            attempt.deadline = min(attempt.deadline, now + self._remaining(attempt, now) + self.latency)
-            caller, attempt.job = attempt.job, None
-            if caller is None:
-                continue
-            if self.window > 1 and caller.request.repeatable and caller.request.effect is Effect.NONE:
-                caller.policy, caller.step = carry_out(self, caller.request), None
-                insort(self.queue, caller)
-            else:
-                caller.settle(error=error)
+            attempt.deadline = min(attempt.deadline, now + self._remaining(attempt, now) + self._latency)
+            if self.window == 1 or not is_read(attempt.request):
+                attempt.error = error
 
     def _remaining(self, attempt: Attempt, now: float) -> float:
         """s that a stop waits at most: the whole air time on a half-duplex line, else the rest of the request."""
         if not self.driver.full_duplex:
-            return self.air_time(attempt.request)
+            return attempt.air
         request: Request[Response] = Request(attempt.request.wire)
         return max(0.0, attempt.sent_at + self.air_time(request) - now)
 
@@ -750,34 +617,47 @@ class Engine:
 
     def lost(self, error: LinkError) -> None:
         """The link failed: everything that waits fails with this error."""
-        self.ready = False
-        leaving, self._leaving = self._leaving, None
-        attempts = {*self.in_flight.values(), *([] if leaving is None else [leaving])}
-        jobs = [*self.queue, *(attempt.job for attempt in attempts)]
         for attempt in self.in_flight.values():
             self._mark_owed(attempt)
-            for due in attempt.dues:
-                self.statistics.of(due.node).errors["lost"] += 1
+            for node in attempt.nodes:
+                self.statistics.of(node).errors["lost"] += 1
+            attempt.in_flight, attempt.is_used, attempt.error = False, True, error
+            self.done.append(attempt)
         self.in_flight.clear()
-        self.queue.clear()
         self.exclusive = None
         if isinstance(error, LinkLost):
             if self.gone is None:
                 self.losses += 1
-                self._note_since()
+                self.nodes.epoch += 1
+                self.lost_at = self.nodes.epoch
                 for end in tuple(self.end_sleeps):
                     end(error)
             self.gone = error
-            self.positions.forget()
-        for job in jobs:
-            if job is not None:
-                job.settle(error=error)
+            self.nodes.forget()
+            self._last = None
 
     def reconnected(self, now: float, latency: float) -> None:
         """The port is open again: all nodes are out of sync and their positions unknown; the nodes stay known."""
         self.latency = latency
-        self.receiver = self.driver.receiver()
+        self.receiver, self.holds_data = self.driver.receiver(), False
         self.echo.reset()
         self.sync.mark_all(now + self.quiet_time)
-        self.positions.forget()
+        self.nodes.forget()
+        self._last = None
         self.gone = None
+
+    def set_rate(self, rate: int, *, listen_only: bool) -> None:
+        """The link has this rate (bit/s) now."""
+        self.rate = rate
+        self.listening = listen_only or self.always_listening
+        self.receiver, self.holds_data = self.driver.receiver(), False
+
+
+def must_sync(request: Request[Any]) -> bool:
+    """The nodes of this request must be in sync: not of a stop, nor of a scan, whose usual answer is silence."""
+    return request.priority is not Priority.STOP and request.reply_within is not TimeoutClass.SCAN
+
+
+def is_read(request: Request[Any]) -> bool:
+    """Sending it again changes nothing."""
+    return request.repeatable and request.effect is Effect.NONE

@@ -1,107 +1,90 @@
-"""What is done for one request: resynchronise its nodes, send it, try again or fail."""
+"""What is done for a request whose nodes are out of sync, or whose first attempt failed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Final
 
 from motorbus.bus import failures
-from motorbus.bus.jobs import Attempt, Policy, Wait
-from motorbus.bus.statistics import Statistics
-from motorbus.bus.sync import SyncTable
-from motorbus.core.request import ANY, Priority, Request, TimeoutClass
+from motorbus.bus.attempt import Attempt
+from motorbus.bus.engine import is_read, must_sync
+from motorbus.core.request import ANY, Priority, Request, Response, TimeoutClass
+from motorbus.core.steps import Sleep
 from motorbus.errors import MotorbusError
 
-RETRIES = 2
+if TYPE_CHECKING:
+    from motorbus.bus.engine import Engine
+
+RETRIES: Final = 2
 """Attempts of a repeatable request after the first."""
 
 
-class Context(Protocol):
-    """What a policy sees of the engine."""
-
-    sync: SyncTable
-    statistics: Statistics
-    time: float
-    stopping: bool
-    latched_by: str
-    diagnosis: Callable[[], str]
-
-    @property
-    def quiet_time(self) -> float: ...
-
-    def alternate(self, request: Request[Any], /) -> Request[Any]: ...
-
-
-def carry_out(engine: Context, request: Request[Any]) -> Policy:
-    """The reply to this request. Raises MotorbusError when the last attempt fails."""
-    tries, sent, fault = 0, False, ""
+async def carry_out(engine: Engine, request: Request[Any], attempt: Attempt | None = None) -> Response:
+    """The reply to this request; `attempt` is its first one, which has failed. Raises when the last one fails."""
+    tries, sent = 0, False
     while True:
+        if attempt is not None:
+            sent = True
+            if attempt.accepted is not None:
+                return attempt.accepted
+            if engine.stopping and not is_read(request) and request.priority is not Priority.STOP:
+                raise failures.latched(engine.latched_by)
+            tries += 1
+            if not _may_repeat(request) or tries > RETRIES:
+                raise _error(engine, request, attempt, tries, sent)
+            engine.statistics.retried(attempt.nodes)
         excluded: tuple[int, ...] = ()
-        if request.priority is not Priority.STOP and (
-            request.reply_within is not TimeoutClass.SCAN or fault == "echo"
-        ):
-            for node in engine.sync.doubtful(request):
-                failed, probes = yield from _resync(engine, request, node)
-                tries += probes
-                if failed is None:
-                    continue
-                if len(request.expected) == 1:  # type: ignore[arg-type]  # never ANY here
-                    raise _error(engine, request, failed, tries, sent)
-                excluded += (node,)
-        attempt: Attempt | None = yield Attempt(
-            engine.alternate(request), excluded=excluded, after_echo=fault == "echo"
-        )
-        if attempt is None:  # a node has come out of sync before this could be sent
-            continue
-        sent = True
-        fault = attempt.fault
-        if attempt.accepted is not None:
-            return attempt.accepted
-        if engine.stopping and request.priority is not Priority.STOP:
-            raise failures.latched(engine.latched_by)
-        tries += 1
-        if not _may_repeat(request, fault) or tries > RETRIES:
-            raise _error(engine, request, attempt, tries, sent)
-        engine.statistics.retried(request.expected)
+        is_probed = False
+        for node in engine.sync.doubtful(request) if must_sync(request) else ():
+            failed, probes = await _resync(engine, request, node)
+            tries += probes
+            if failed is None:
+                is_probed = True
+                continue
+            if len(request.expected) == 1:  # type: ignore[arg-type]  # never ANY here
+                raise _error(engine, request, failed, tries, sent)
+            excluded += (node,)
+        attempt = await Attempt(
+            request, excluded=excluded, is_probed=is_probed
+        )  # None: a node came out of sync before it left
 
 
-def _may_repeat(request: Request[Any], fault: str) -> bool:
+def _may_repeat(request: Request[Any]) -> bool:
     """A scan is not repeated, for silence is its usual answer; nor is a stop, which has rounds of its own."""
-    patient = request.reply_within is not TimeoutClass.SCAN or fault == "echo"
     return (
         request.repeatable
         and request.priority is not Priority.STOP
         and request.expected is not ANY
-        and patient
+        and request.reply_within is not TimeoutClass.SCAN
     )
 
 
-def _resync(
-    engine: Context, request: Request[Any], node: int
-) -> Generator[Attempt | Wait, Attempt | None, tuple[Attempt | None, int]]:
-    """Wait for the quiet time and probe this node; the probe that failed, None when the node is in sync, and how many.
+async def _resync(engine: Engine, request: Request[Any], node: int) -> tuple[Attempt | None, int]:
+    """Wait for the quiet time and probe this node.
 
-    A group does not wait for a node that was silent lately.
+    Gives the probe that failed, None when the node is in sync, and how many. A group does not wait for a node that was
+    silent lately.
     """
-    state, group = engine.sync.of(node), len(request.expected) > 1  # type: ignore[arg-type]
-    if group and state.silences and engine.time < state.probe_at:
+    state, tries = engine.sync.of(node), 0
+    if len(request.expected) > 1 and engine.sync.is_put_off(node, await Sleep(0)):  # type: ignore[arg-type]
         return Attempt(request), 0
     for tries in range(1, RETRIES + 2):
-        while engine.time < state.quiet_until:  # another request may have moved it meanwhile
-            yield Wait(state.quiet_until)
+        while (
+            pause := state.quiet_until - await Sleep(0)
+        ) > 0:  # another request may have moved it meanwhile
+            await Sleep(pause)
         if node not in engine.sync.out_of_sync:  # another request has probed it meanwhile
             return None, tries - 1
-        attempt = yield Attempt(engine.sync.next_probe(node), is_probe=True)
+        attempt = await Attempt(engine.sync.next_probe(node), is_probe=True)
         assert attempt is not None
         if not attempt.fault:
             return None, 0
         if attempt.fault == "silence":
             break
-    engine.sync.back_off(node, engine.time, engine.quiet_time)
+    engine.sync.back_off(node, await Sleep(0), engine.quiet_time)
     return attempt, tries
 
 
-def _error(engine: Context, request: Request[Any], attempt: Attempt, tries: int, sent: bool) -> MotorbusError:
+def _error(engine: Engine, request: Request[Any], attempt: Attempt, tries: int, sent: bool) -> MotorbusError:
     return failures.no_answer(
         request, attempt.failure(), attempt.received(), tries=tries, sent=sent, diagnosis=engine.diagnosis()
     )

@@ -1,17 +1,16 @@
-"""Procedures run in the calling thread, on one bus or on several at the same time. Its counterpart is in `aio.py`."""
+"""Procedures run in the calling thread, on one bus or on several at the same time."""
 
 from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from math import inf
-from typing import Any, Final, Generic, TypeVar
+from typing import Any, Final, TypeVar
 
 from motorbus.bus.base import IDLE, BaseBus, check_clocks
 from motorbus.bus.interrupts import interrupts
-from motorbus.bus.jobs import Since
-from motorbus.bus.tasks import Notify, TaskTree, starting
+from motorbus.bus.tasks import Notify, Tree, starting
 from motorbus.core.steps import Runnable
 from motorbus.link.stream import wait_any
 
@@ -25,23 +24,17 @@ TURN_TIMEOUT: Final = 0.002
 """Longest wait (s) for the turn of a bus while holding another's: two threads never block each other."""
 
 
-def run_here(
-    bus: BaseBus, procedure: Runnable[T], report: Notify | None = None, *, since: Since | None = None
-) -> T:
-    """Run a procedure in this thread; the bus may be an asyncio bus.
-
-    `since`: what had happened on the bus when the caller decided; None: as of now.
-    """
+def run_here(bus: BaseBus, procedure: Runnable[T], report: Notify | None = None) -> T:
+    """Run a procedure in this thread."""
     with interrupts():
         with starting(procedure):
-            part = _Part(bus, procedure, report, since)
-        _run_parts([part])
-        return part.tree.result()
+            part = Part(bus)
+            tree = part.add(procedure, report)
+        run_parts([part])
+        return tree.result()
 
 
-def run_on(
-    procedures: Mapping[Any, Runnable[Any]], since: Mapping[Any, Since] | None = None
-) -> dict[BaseBus, Any]:
+def run_on(procedures: Mapping[Any, Runnable[Any]]) -> dict[BaseBus, Any]:
     """Run a procedure on each bus at the same time: what each returned, or the MotorbusError that it raised.
 
     An error that is not a MotorbusError, or a signal, cancels all; it is raised after all have cleaned up.
@@ -49,104 +42,140 @@ def run_on(
     with interrupts():
         with starting(*procedures.values()):
             check_clocks(procedures)
-            sinces = since or {}
-            parts = [_Part(bus, procedure, None, sinces.get(bus)) for bus, procedure in procedures.items()]
-        _run_parts(parts)
-        return {part.bus: part.tree.outcome() for part in parts}
+            parts = [Part(bus) for bus in procedures]
+            trees = [part.add(procedures[part.bus]) for part in parts]
+        run_parts(parts)
+        return {part.bus: tree.outcome() for part, tree in zip(parts, trees, strict=True)}
 
 
-class _Part(Generic[T]):
-    """A procedure on one bus. `news`: its tree can advance. `blocked`: another thread had the turn of the bus.
+class Part:
+    """The procedures of this thread on one bus. `blocked`: another thread had the turn of the bus.
 
-    `cancellations` are thrown into the tree when this thread has the turn.
+    `sends_at` is when (s) more may be sent. `cancellations` are thrown into the trees when this thread has the turn.
+    `calls` are those of a worker, `inbox` its next ones.
     """
 
-    def __init__(
-        self, bus: BaseBus, procedure: Runnable[T], report: Notify | None, since: Since | None
-    ) -> None:
+    def __init__(self, bus: BaseBus, inbox: Collection[Any] = ()) -> None:
         bus.check_thread()
         self.bus = bus
-        self.news = True
+        self.inbox = inbox
+        self.calls: Sequence[Any] = ()
+        self.trees: list[Tree[Any]] = []
         self.is_sleeping = self.holds_turn = self.blocked = False
+        self.sends_at = inf
         self.cancellations: list[BaseException] = []
-        self.tree: TaskTree[T] = TaskTree(
+
+    def add(self, procedure: Runnable[T], report: Notify | None = None, since: int = -1) -> Tree[T]:
+        """Run this procedure, too."""
+        bus = self.bus
+        tree: Tree[T] = Tree(
             bus.engine,
             procedure,
             now=bus.link.now,
             report=bus.event_sink(report),
-            settled=self._settled,
+            wake=self.wake,
             since=since,
         )
+        self.trees.append(tree)
+        return tree
 
-    def _settled(self) -> None:
-        self.news = True
+    @property
+    def finished(self) -> bool:
+        """Every procedure has ended."""
+        return all(tree.finished for tree in self.trees)
+
+    def wake(self) -> None:
+        """End `_sleep`; from any thread."""
         if self.is_sleeping:
             with self.bus.settled:
                 self.bus.settled.notify_all()
 
-    def cancel(self, error: BaseException) -> None:
-        """Throw this into the tree when it advances."""
-        self.cancellations.append(error)
-        self.news = True
-
     def advance(self, timeout: float) -> bool:
-        """Step the tree and send; True when it has ended.
+        """Step the trees and send; True when all have ended.
 
         Does nothing if the turn is not free within `timeout` s (-1: no limit).
         """
-        if self.tree.root.finished:
-            return True
         self.holds_turn = self.holds_turn or self.bus.turn.acquire(timeout=timeout)
         self.blocked = not self.holds_turn
         if self.blocked:
             return False
         while self.cancellations:
-            self.tree.cancel(self.cancellations.pop(0))
-        while self.news and not self.tree.root.finished:
-            self.news = False
-            if not self.tree.advance():
-                self.bus.send()
-        if self.tree.root.finished:
-            self.release_turn()
-        return self.tree.root.finished
+            error = self.cancellations.pop(0)
+            for tree in self.trees:
+                tree.cancel(error)
+        for call in self.calls:
+            call.obey()
+        stepped = self._stepped
+        while True:
+            for tree in stepped:
+                tree.advance()
+            if self.finished:
+                self.release_turn()
+                return True
+            self.sends_at = self.bus.send(stepped)
+            if not any(tree.ready for tree in stepped):
+                return False
+
+    @property
+    def _stepped(self) -> list[Tree[Any]]:
+        """Its procedures, and what watches the bus in virtual time."""
+        return [*self.trees, *self.bus.watches] if self.bus.watches else self.trees
+
+    @property
+    def is_idle(self) -> bool:
+        """Nothing of it is in flight or waits to be sent."""
+        return not self.bus.engine.in_flight and not any(tree.sending for tree in self._stepped)
 
     def release_turn(self) -> None:
-        """Release the turn if the tree has ended, a stop waits for it, or the bus is idle and not exclusive.
+        """Release the turn if all has ended, a stop waits for it, or the bus is idle and not exclusive.
 
         A tree that waits for a notice keeps it until another thread wants it.
         """
         engine = self.bus.engine
         free = (
-            engine.idle
+            self.is_idle
             and engine.exclusive is None
             and (not engine.notification_handlers or self.bus.turn.wanted)
         )
-        if self.holds_turn and (self.tree.root.finished or free or self.bus.waits_for_stop):
+        if self.holds_turn and (free or self.finished or self.bus.waits_for_stop):
             self.holds_turn = False
             self.bus.turn.release()
 
+    def next_moment(self) -> float:
+        """When (s) a tree can go on by itself, or more may be sent."""
+        return min([self.sends_at, *[tree.next_moment() for tree in self._stepped]])
+
     def wait(self) -> None:
-        """Wait for data, a deadline, or the next moment of the tree; without the turn sleep for at most `IDLE`."""
-        bus, moment = self.bus, self.tree.next_moment()
+        """Wait for data, a deadline, or the next moment of a tree; without the turn sleep for at most `IDLE`."""
+        bus, moment = self.bus, self.next_moment()
         if self.holds_turn:
-            listens = bus.engine.idle and bus.engine.notification_handlers and not bus.link.virtual
-            bus.receive(min(moment, bus.link.now() + LISTEN_TIME) if listens else moment)
+            listens = self.is_idle and bus.engine.notification_handlers and not bus.link.virtual
+            bus.receive(min(moment, bus.link.now() + LISTEN_TIME) if listens else moment, self._stepped)
         elif not bus.waits_for_stop:
             self._sleep(min(moment - bus.link.now(), IDLE))
-        self.news = True
 
     def _sleep(self, seconds: float) -> None:
-        """Sleep this long, or until something that the tree waits for has ended."""
+        """Sleep this long, or until something that a tree waits for has ended."""
         with self.bus.settled:
-            self.news, self.is_sleeping = False, True
+            self.is_sleeping = True
             try:
-                self.bus.settled.wait_for(lambda: self.news, max(0.0, seconds))
+                self.bus.settled.wait_for(self._can_advance, max(0.0, seconds))
             finally:
                 self.is_sleeping = False
 
+    def _can_advance(self) -> bool:
+        return (
+            bool(self.inbox or self.cancellations)
+            or any(tree.ready for tree in self.trees)
+            or any(call.requests for call in self.calls)
+        )
 
-def _run_parts(parts: Sequence[_Part[Any]]) -> None:
-    """Run all trees to their end. A signal, or an error that is not a MotorbusError, cancels them; they clean up."""
+
+def run_parts(parts: Sequence[Part], *, single: bool = False) -> None:
+    """Run all trees to their end. A signal, or an error that is not a MotorbusError, cancels them; they clean up.
+
+    With `single`, of a single request, signals wait for its end.
+    """
     signals = interrupts()
     try:
         while True:
@@ -154,55 +183,58 @@ def _run_parts(parts: Sequence[_Part[Any]]) -> None:
                 if not (going := _advance(parts)):
                     return
                 # While all buses are idle the handler raises a signal itself. Set it before `pending` is looked at.
-                signals.waiting = all(part.bus.engine.idle for part in going)
-                if signals.pending is not None:
+                signals.waiting = not single and all(part.is_idle for part in going)
+                if signals.pending is not None and not single:
                     signals.waiting = False
                     signals.raise_pending()
-                _wait(going)
+                wait_for(going)
             except BaseException as error:
                 for part in parts:
-                    part.cancel(error)
+                    part.cancellations.append(error)
             finally:
                 signals.waiting = False
     finally:
         for part in parts:
-            if not part.tree.root.finished:  # a signal was raised outside the inner `try`
-                with part.bus.turn:
-                    part.tree.drop()
+            for tree in part.trees:
+                if not tree.finished:  # a signal was raised outside the inner `try`
+                    with part.bus.turn:
+                        tree.drop()
             part.release_turn()
 
 
-def _advance(parts: Sequence[_Part[Any]]) -> list[_Part[Any]]:
+def _advance(parts: Sequence[Part]) -> list[Part]:
     """Step all trees and return the parts that have not ended. Raises an error that is not a MotorbusError."""
     going = []
     for part in parts:
-        holds_another = any(other.holds_turn for other in parts if other is not part)
+        if part.finished:
+            continue
+        holds_another = len(parts) > 1 and any(other.holds_turn for other in parts if other is not part)
         if not part.advance(TURN_TIMEOUT if holds_another else -1.0):
             going.append(part)
     for part in parts:
-        if (error := part.tree.foreign_error()) is not None:
-            raise error
+        for tree in part.trees:
+            if tree.finished and (error := tree.foreign_error()) is not None and going:
+                raise error
     for part in going:
         if part.bus.waits_for_stop or not part.bus.link.virtual:
             part.release_turn()
     return going
 
 
-def _wait(parts: Sequence[_Part[Any]]) -> None:
+def wait_for(parts: Sequence[Part]) -> None:
     """Wait until one of these can advance."""
     if len(parts) == 1:
         parts[0].wait()
     elif all(part.bus.link.virtual for part in parts):
         # one shared clock: read every bus up to the earliest event, first the bus that has it
-        events = {part: part.bus.next_event(part.tree.next_moment()) for part in parts}
+        events = {part: part.bus.next_event(part.next_moment()) for part in parts}
         for part in sorted(parts, key=events.__getitem__):
-            part.bus.receive(min(events.values()))
-            part.news = True
+            part.bus.receive(min(events.values()), part._stepped)
     else:
         _poll(parts)
 
 
-def _poll(parts: Sequence[_Part[Any]]) -> None:
+def _poll(parts: Sequence[Part]) -> None:
     """One wait on the descriptors of all links, then take what has come."""
     descriptors, seconds = [], IDLE
     for part in parts:
@@ -211,7 +243,7 @@ def _poll(parts: Sequence[_Part[Any]]) -> None:
             seconds = min(seconds, POLL_PERIOD)
         elif part.holds_turn and descriptor is not None:
             descriptors.append(descriptor)
-        moment = min(part.tree.next_moment(), part.bus.engine.next_deadline())
+        moment = min(part.next_moment(), part.bus.engine.next_deadline())
         seconds = min(seconds, max(0.0, moment - part.bus.link.now()))
     if descriptors:
         with contextlib.suppress(OSError, ValueError):  # closed or lost: `receive` says so
@@ -220,5 +252,4 @@ def _poll(parts: Sequence[_Part[Any]]) -> None:
         time.sleep(seconds)
     for part in parts:
         if part.holds_turn:
-            part.bus.receive(-inf)
-        part.news = True
+            part.bus.receive(-inf, part.trees)

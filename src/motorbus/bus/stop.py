@@ -15,6 +15,7 @@ import json
 import os
 import socket
 import time
+from collections.abc import Sequence
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as LateError
 from pathlib import Path
@@ -24,13 +25,11 @@ from typing import Any, Final, Protocol
 from weakref import ref
 
 from motorbus.bus.engine import Engine
-from motorbus.bus.jobs import RateJob
 from motorbus.bus.stop_rounds import stop_in_rounds
 from motorbus.bus.stop_socket import STOP_TIMEOUT, StopOutcome, asked_by, client_name, listening
-from motorbus.bus.tasks import TaskTree
+from motorbus.bus.tasks import Tree
 from motorbus.bus.turn import Turn
 from motorbus.core.request import Priority, Request
-from motorbus.core.steps import SetBitrate
 from motorbus.errors import LinkError, LinkFull, LinkLost
 from motorbus.link.base import Link
 
@@ -49,8 +48,8 @@ class StoppableBus(Protocol):
     turn: Turn
 
     def now(self) -> float: ...
-    def send(self) -> None: ...
-    def receive(self, until: float) -> None: ...
+    def send(self, trees: Sequence[Tree[Any]]) -> float: ...
+    def receive(self, until: float, trees: Sequence[Tree[Any]]) -> None: ...
 
 
 class EmergencyStop:
@@ -128,7 +127,7 @@ class EmergencyStop:
         try:
             return request.result(STOP_TIMEOUT)
         except LateError:
-            silent = tuple(sorted(self.bus.engine.positions.nodes))
+            silent = tuple(sorted(self.bus.engine.nodes.known))
             return StopOutcome((), silent, 0, "nothing: the stop thread did not answer")
 
     def stop(self, client: str = "") -> StopOutcome:
@@ -144,14 +143,14 @@ class EmergencyStop:
         bus, engine = self.bus, self.bus.engine
         if bus.turn.acquire(Priority.STOP, engine.stop_delay(bus.now())):
             return self._stop_with_turn(by)
-        stop = engine.positions.frames(bus.now())
+        stop = engine.nodes.stop_requests(bus.now())
         disturbs_no_reply = [request for request in stop.requests if not request.expected]
         for request in disturbs_no_reply or stop.requests:
             engine.note_stop(request)
             self._write_blind(request)
         if bus.turn.acquire(Priority.STOP, STOP_TIMEOUT):
             return self._stop_with_turn(by)
-        silent = tuple(sorted(engine.positions.nodes))
+        silent = tuple(sorted(engine.nodes.known))
         return StopOutcome((), silent, 1, f"{stop.promise}; sent once, no acknowledgement could be read")
 
     def _write_blind(self, request: Request[Any]) -> None:
@@ -173,12 +172,12 @@ class EmergencyStop:
         try:
             engine.latch(bus.now(), by)
             self._restore_rate()
-            tree = TaskTree(engine, stop_in_rounds(engine, bus.now), now=bus.now)
+            tree = Tree(engine, stop_in_rounds(engine, bus.now), now=bus.now)
             tree.deadline = bus.now() + ROUNDS_TIME
             while not tree.advance():
-                bus.send()
-                if not tree.advance():
-                    bus.receive(tree.next_moment())
+                moment = bus.send((tree,))
+                if not tree.ready:
+                    bus.receive(min(moment, tree.next_moment()), (tree,))
             return tree.result()
         finally:
             engine.stop_sent()  # before the turn is free
@@ -187,9 +186,11 @@ class EmergencyStop:
     def _restore_rate(self) -> None:
         """A scan may be trying another rate: the nodes are stopped at the rate at which they answered last."""
         engine = self.bus.engine
-        if (engine.rate, engine.listening) != (engine.positions.rate, engine.always_listening):
-            engine.submit(RateJob(SetBitrate(engine.positions.rate), urgent=True), self.bus.now())
-            self.bus.send()
+        rate = engine.nodes.rate
+        if (engine.rate, engine.listening) != (rate, engine.always_listening):
+            with contextlib.suppress(LinkError):
+                self.bus.link.tune(rate, engine.always_listening)
+                engine.set_rate(rate, listen_only=False)
 
     # -- the thread --------------------------------------------------------------------------------------------
 

@@ -1,13 +1,13 @@
-"""Which nodes are in sync. Decision record 0039.
+"""Which nodes are in sync. A node changes its state in `SyncTable._fire` and nowhere else.
 
-A node is in flight from the first byte of a request until its reply is accepted, and out of sync if none is. Before
-the next request to it the bus is silent for a quiet time, then sends a probe: a request whose reply differs in key or
-length from every reply that the node owes. A link is first in, first out, so when the probe is answered no older
-reply can follow.
+A node whose reply did not come in time owes it. Before the next request to it the bus is silent for a quiet time, then
+sends a probe: a request whose reply differs in key or length from every reply that the node owes. A link is first in,
+first out, so when the probe is answered no older reply can follow. Decision record 0039.
 """
 
 from __future__ import annotations
 
+from enum import Enum
 from typing import Any, Final, TypeAlias
 
 from motorbus.core.family import BusDriver
@@ -22,29 +22,47 @@ Kind: TypeAlias = "tuple[int, Key, int]"
 """Lane, key and length of a reply."""
 
 
-class NodeSync:
-    """One node: what it owes, and when it may be asked."""
+class State(Enum):
+    """State of a node: it may be asked, needs a probe first, or owes a reply and needs a probe first."""
 
-    __slots__ = (
-        "asked_at",
-        "lane",
-        "length",
-        "owed",
-        "probe_at",
-        "probes",
-        "quiet_until",
-        "silences",
-    )
+    IN_SYNC = "in sync"
+    DOUBTED = "doubted"
+    OWING = "owing"
+
+
+IN_SYNC, DOUBTED, OWING = State
+MOVES: Final = {
+    (IN_SYNC, "missed"): OWING,  # a reply did not come, or a copy of one may follow
+    (DOUBTED, "missed"): OWING,
+    (OWING, "missed"): OWING,
+    (IN_SYNC, "doubted"): DOUBTED,  # it may have sent what was not expected
+    (DOUBTED, "doubted"): DOUBTED,
+    (OWING, "doubted"): OWING,
+    (IN_SYNC, "answered"): IN_SYNC,
+    (DOUBTED, "answered"): IN_SYNC,
+    (OWING, "answered"): OWING,  # the older reply may still come
+    (IN_SYNC, "probed"): IN_SYNC,
+    (DOUBTED, "probed"): IN_SYNC,
+    (OWING, "probed"): IN_SYNC,
+}
+"""State and event -> state."""
+
+
+class NodeSync:
+    """One node: what it owes (the oldest first), and when (s) it may be asked.
+
+    `silences` are probes in a row without an answer; a group does not wait for the node before `probe_at`.
+    """
+
+    __slots__ = ("owed", "probe_at", "probes", "quiet_until", "silences", "state")
 
     def __init__(self) -> None:
-        self.owed: dict[Kind, None] = {}  # the oldest first
-        self.length = 0  # of its last reply
-        self.lane = 0
-        self.asked_at = 0.0
+        self.state = IN_SYNC
+        self.owed: dict[Kind, None] = {}
         self.quiet_until = 0.0
-        self.silences = 0  # probes in a row without an answer
-        self.probe_at = 0.0  # not before, while a group is read
-        self.probes = 0  # sent so far
+        self.silences = 0
+        self.probe_at = 0.0
+        self.probes = 0
 
 
 class SyncTable:
@@ -67,45 +85,40 @@ class SyncTable:
             return []
         return [due.node for due in request.expected if due.node in self.out_of_sync]
 
-    def mark_sent(self, request: Request[Any], now: float) -> None:
-        """A request leaves: its nodes are out of sync until they answer."""
-        for due in request.expected if request.expected is not ANY else ():
-            node = self.of(due.node)
-            node.asked_at, node.lane = now, request.lane
-            self.out_of_sync.add(due.node)
+    def _fire(self, number: int, event: str) -> NodeSync:
+        node = self.of(number)
+        node.state = MOVES[node.state, event]
+        if node.state is IN_SYNC:
+            self.out_of_sync.discard(number)
+            node.owed.clear()
+            node.silences = 0
+        else:
+            self.out_of_sync.add(number)
+        return node
 
     def mark_owed(self, lane: int, due: Expected, quiet_until: float) -> None:
-        """This reply did not come in time and may still come."""
-        node = self.of(due.node)
+        """This reply did not come in time, or was sent twice: it may still come."""
+        node = self._fire(due.node, "missed")
         node.owed[lane, due.key, due.length] = None
         if due.refusal:
             node.owed[lane, due.key, due.refusal] = None
         node.quiet_until = quiet_until
-        self.out_of_sync.add(due.node)
 
-    def mark_recent(self, now: float, quiet: float, lane: int | None = None) -> None:
-        """Unexpected data came: every node asked within the quiet time, on this lane, may have sent it."""
-        for number, node in self.nodes.items():
-            if lane in (None, node.lane) and now - node.asked_at <= quiet and number not in self.out_of_sync:
-                self.out_of_sync.add(number)
-                node.quiet_until = now + quiet
+    def mark_doubted(self, number: int, quiet_until: float) -> None:
+        """This node may have sent something unexpected."""
+        if number not in self.out_of_sync:
+            self._fire(number, "doubted").quiet_until = quiet_until
 
     def mark_all(self, quiet_until: float) -> None:
         """The port was lost and is back: what any node owes may still come."""
-        for node in self.nodes.values():
-            node.quiet_until = quiet_until
-            node.silences = 0
-        self.out_of_sync.update(self.nodes)
+        for number in self.nodes:
+            node = self._fire(number, "doubted")
+            node.quiet_until, node.silences = quiet_until, 0
 
-    def confirm(self, due: Expected, *, probe: bool) -> None:
-        """This reply was accepted. A node that owes others is in sync again only after a probe."""
-        node = self.of(due.node)
-        node.length = due.length
-        if probe:
-            node.owed.clear()
-        if not node.owed:
-            self.out_of_sync.discard(due.node)
-            node.silences = 0
+    def confirm(self, number: int, *, probe: bool) -> None:
+        """A reply of this node was accepted. A node that owes others is in sync again only after a probe."""
+        if number in self.out_of_sync:
+            self._fire(number, "probed" if probe else "answered")
 
     def take_owed(self, lane: int, key: Key, length: int) -> bool:
         """Whether a node owes a reply of this kind; it is settled then."""
@@ -140,6 +153,11 @@ class SyncTable:
         node.silences += 1
         node.quiet_until = now
         node.probe_at = now + min(quiet * 2.0 ** min(node.silences, 10), LONGEST_BACK_OFF)
+
+    def is_put_off(self, number: int, now: float) -> bool:
+        """A group does not wait for this node now: it was silent lately."""
+        node = self.nodes[number]
+        return bool(node.silences) and now < node.probe_at
 
 
 def kind_of(probe: Request[bool]) -> Kind:

@@ -1,7 +1,13 @@
-"""Running procedures: a tree of coroutines, and what each of them waits for. No I/O and no clock."""
+"""Running procedures: a tree of tasks, and what each of them waits for. No I/O and no clock.
+
+A task has a stack of coroutines: its procedure, and above it the policy of the request that it awaits, if that is in
+trouble. What a task awaits is an attempt in `sending` or on the wire, a timer, or its children.
+"""
 
 from __future__ import annotations
 
+from bisect import bisect_left, insort
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from math import inf
@@ -10,10 +16,11 @@ from types import CoroutineType
 from typing import Any, Final, Generic, TypeVar
 
 from motorbus.bus import failures
+from motorbus.bus.attempt import Attempt
 from motorbus.bus.engine import Engine
-from motorbus.bus.jobs import ExclusiveJob, Job, RateJob, RequestJob, Since
-from motorbus.bus.positions import GATED
-from motorbus.core.request import Notification, Priority, Request, Step
+from motorbus.bus.nodes import GATED
+from motorbus.bus.policy import carry_out
+from motorbus.core.request import Notification, Priority, Request, Response, Step
 from motorbus.core.steps import (
     Emit,
     Exclusive,
@@ -50,12 +57,12 @@ class _Stepping(local):
     active = False
 
 
-_STEPPING: Final = _Stepping()
+STEPPING: Final = _Stepping()
 
 
 def check_outside() -> None:
     """Raise RequestError inside of a procedure: a call that waits there would wait for itself."""
-    if _STEPPING.active:
+    if STEPPING.active:
         raise RequestError(
             "a bus or a device method was called inside of a procedure",
             expected="a step, or the driver function: `await feetech.Servo.position.function(servo)`",
@@ -75,49 +82,84 @@ def starting(*runnables: object) -> Iterator[None]:
         raise
 
 
-class Timer(Job):
-    """Waits for a moment, or for a notification."""
+class Timer:
+    """A task sleeps until this moment (s), or until a notification that `listener` takes."""
 
-    def __init__(self, settled: Callable[[], None] | None, until: float) -> None:
-        super().__init__(settled=settled)
+    __slots__ = ("listener", "task", "until")
+
+    def __init__(self, task: Task, until: float) -> None:
+        self.task = task
         self.until = until
         self.listener: Callable[[Notification], None] | None = None
 
 
+class Pause:
+    """A task waits until nothing is in flight: to set the rate, or to have the bus alone (`tune` is None)."""
+
+    __slots__ = ("priority", "task", "tune")
+
+    def __init__(self, task: Task, tune: SetBitrate | None = None) -> None:
+        self.task = task
+        self.tune = tune
+        self.priority = Priority.POLL if tune is None else Priority.CONFIGURATION
+
+
 class Task:
-    """One procedure, and the one thing that it waits for: a job, or its children.
+    """One procedure of a tree, and the one thing that it waits for."""
 
-    `started`: nothing more to start; it may still wait for exclusive use. `entered`: its code has begun.
-    `joins_one`: the value of its only child is its value, not a tuple. `claims`: its end releases exclusive use.
-    `checked`: the reads that the interlock requires precede its request. `exempt`: the cancellation was thrown into it,
-    or must not be, as for the end of a guard and what that starts.
-    """
+    __slots__ = (
+        "checked",
+        "children",
+        "claims",
+        "entered",
+        "error",
+        "exempt",
+        "finished",
+        "joins_one",
+        "owner",
+        "parent",
+        "procedure",
+        "stack",
+        "stop_since",
+        "tree",
+        "value",
+        "waits_for",
+    )
 
-    def __init__(self, procedure: Runnable[Any], parent: Task | None = None) -> None:
-        self.procedure = procedure
+    def __init__(self, tree: Tree[Any], procedure: Runnable[Any], parent: Task | None = None) -> None:
         if not isinstance(procedure, Step | CoroutineType):
             raise RequestError(
                 f"{procedure!r} is neither a procedure nor a step",
                 expected="a coroutine of steps, or a step, as feetech.Servo.position.function(servo)",
                 advice="nothing was sent",
             )
-        self.coroutine = procedure.__await__() if isinstance(procedure, Step) else procedure
-        self.owner: object = None if parent is None else parent.owner
-        self.job: Job | None = None
+        self.tree = tree
+        self.procedure = procedure
+        self.parent = parent
+        coroutine = procedure.__await__() if isinstance(procedure, Step) else procedure
+        self.stack: list[tuple[Any, Request[Any] | None]] = [(coroutine, None)]
+        """Its coroutine, and above it the policy of a request."""
         self.children: list[Task] = []
-        self.joins_one = False
-        self.claims = False
-        self.checked = False
-        self.started = self.entered = self.finished = False
+        self.waits_for: Attempt | Timer | Pause | None = None
+        self.owner: Task | None = None if parent is None else parent.owner
+        """It runs inside of the exclusive use of this task."""
+        self.stop_since = tree.since
+        """Epoch from which a stop of its nodes withdraws its present request."""
+        self.claims = False  # its end releases exclusive use
+        self.joins_one = False  # the value of its only child is its value, not a tuple
+        self.checked = False  # the reads that the interlock requires precede its request
+        self.entered = False  # its code has begun
+        self.finished = False
         self.exempt: bool = parent is not None and parent.exempt
+        """The cancellation was thrown into it, or must not be, as for the end of a guard and what that starts."""
         self.value: Any = None
         self.error: BaseException | None = None
 
 
-class TaskTree(Generic[T]):
-    """Runs one procedure on the engine of one bus. `report` gets its events; it was called at `since`, else now.
+class Tree(Generic[T]):
+    """Runs one procedure on the engine of one bus. `report` gets its events; it was called at epoch `since`, else now.
 
-    `settled` is called when something it waits for has ended, so that `advance` has something to do.
+    `wake` is called when another thread has ended something that it waits for.
     """
 
     def __init__(
@@ -127,14 +169,14 @@ class TaskTree(Generic[T]):
         *,
         now: Callable[[], float],
         report: Notify | None = None,
-        settled: Callable[[], None] | None = None,
-        since: Since | None = None,
+        wake: Callable[[], None] | None = None,
+        since: int = -1,
     ) -> None:
         self.engine = engine
         self.now = now
         self.report = report
-        self.settled = settled
-        self.since = since or engine.since
+        self.wake = wake
+        self.since = since if since >= 0 else engine.nodes.epoch
         self.has_ordered = False
         """It has sent a motion, torque or stop request: from now on only stops after its next request end that."""
         self.cancellation: BaseException | None = None
@@ -144,32 +186,42 @@ class TaskTree(Generic[T]):
         """s; from then on every step of the clean-up fails."""
         self.extension = 0.0
         """s by which sleeps of the clean-up may still extend `deadline`."""
+        self.ready: deque[tuple[Task, Any, BaseException | None]] = deque()
+        """Tasks that can go on, with the value or error of what they have waited for."""
+        self.sending: list[Attempt | Pause] = []
+        """What is to be sent, by priority, then in order."""
         self.timers: list[Timer] = []
-        self.root = Task(procedure)
+        self.finished = False
+        """The procedure has ended."""
+        self.root = Task(self, procedure)
+        self.ready.append((self.root, None, None))
         engine.end_sleeps.append(self.end_sleeps)
 
     # -- forward -----------------------------------------------------------------------------------------------
 
     def advance(self) -> bool:
         """Step every task that can go on; True when the procedure has ended."""
-        now = self.now()
+        if self.timers or self.deadline < inf:
+            self._expire(self.now())
+        while self.ready:
+            self._step(*self.ready.popleft())
+            if self.interruption is not None and self.cancellation is None:
+                self.cancel(self.interruption)
+        return self.finished
+
+    def _expire(self, now: float) -> None:
         for timer in tuple(self.timers):
             if timer.until <= now:
                 self._end(timer, None if timer.listener is not None else now)
         if now >= self.deadline:
             for task in self._waiting(self.root):
-                if isinstance(task.job, Timer) and task.job in self.timers:
-                    self._end(task.job, error=failures.abandoned())
-                elif task.job is not None:
-                    self.engine.cancel(task.job)
-        while self._step_tree(self.root):
-            if self.interruption is not None and self.cancellation is None:
-                self.cancel(self.interruption)
-        return self.root.finished
+                if task.waits_for is not None:
+                    self._drop_wait(task)
+                    self.ready.append((task, None, failures.abandoned()))
 
     def next_moment(self) -> float:
         """The moment (s) at which `advance` has something to do by itself; inf when there is none."""
-        if self.root.finished:
+        if self.finished:
             return inf
         return min([self.deadline, *(timer.until for timer in self.timers)])
 
@@ -202,54 +254,56 @@ class TaskTree(Generic[T]):
         _add_note(self.cancellation, self.root.error)
         return self.cancellation
 
-    def _end(self, timer: Timer, value: Any = None, error: BaseException | None = None) -> None:
-        self.timers.remove(timer)
-        if timer.listener is not None:
-            self.engine.notification_handlers.remove(timer.listener)
-        timer.settle(value, error)
-
-    def _step_tree(self, task: Task) -> bool:
-        """Step this task or those below; True when something has moved."""
+    def _step(self, task: Task, value: Any, error: BaseException | None) -> None:
         if task.finished:
-            return False
-        if not task.started:
-            task.started = True
-            self._resume(task)
-        elif task.job is not None:
-            if not task.job.done:
-                return False
-            job, task.job = task.job, None
-            self._resume(task, job.value, job.error)
-        elif task.children and all(child.finished for child in task.children):
-            self._join(task)
-        else:
-            moved = [self._step_tree(child) for child in task.children]
-            return any(moved)
-        return True
-
-    def _resume(self, task: Task, value: Any = None, error: BaseException | None = None) -> None:
+            return
+        task.waits_for = None
         task.entered = True
-        outer, _STEPPING.active = _STEPPING.active, True
+        coroutine, request = task.stack[-1]
+        outer, STEPPING.active = STEPPING.active, True
         try:
-            step = task.coroutine.send(value) if error is None else task.coroutine.throw(error)
+            step = coroutine.send(value) if error is None else coroutine.throw(error)
         except StopIteration as end:
-            _STEPPING.active = outer
-            self._finish(task, end.value)
+            STEPPING.active = outer
+            task.stack.pop()
+            if request is None:
+                self._finish(task, end.value)
+            else:
+                self._decode(task, request, end.value)
         except BaseException as failure:
-            _STEPPING.active = outer
-            self._finish(task, error=failure)
+            STEPPING.active = outer
+            task.stack.pop()
+            if request is None:
+                self._finish(task, error=failure)
+            else:
+                self.ready.append((task, None, failure))
         else:
-            _STEPPING.active = outer
+            STEPPING.active = outer
             self._begin(task, step)
+
+    def _decode(self, task: Task, request: Request[Any], answer: Response) -> None:
+        try:
+            value = decode(self.engine, request, answer)
+        except Exception as error:  # a refusal of the device, or an error of the driver
+            self.ready.append((task, None, error))
+        else:
+            self.ready.append((task, value, None))
 
     def _finish(self, task: Task, value: Any = None, error: BaseException | None = None) -> None:
         task.value, task.error, task.finished = value, error, True
         if error is not None and not isinstance(error, Exception) and task is not self.root:
             self.interruption = error
-        if task is self.root and self.end_sleeps in self.engine.end_sleeps:
+        if task.claims and self.engine.exclusive is task.owner:
+            self.engine.exclusive = None
+        if task is self.root:
+            self.finished = True
+            self._forget()
+        elif task.parent is not None and all(child.finished for child in task.parent.children):
+            self._join(task.parent)
+
+    def _forget(self) -> None:
+        if self.end_sleeps in self.engine.end_sleeps:
             self.engine.end_sleeps.remove(self.end_sleeps)
-        if task.claims:
-            self.engine.release(task.owner)
 
     def _join(self, task: Task) -> None:
         """All children have ended: their values, or the first error, go to the parent; a cancellation goes first."""
@@ -258,103 +312,148 @@ class TaskTree(Generic[T]):
             for child in children:
                 _add_note(self.cancellation, child.error)
             task.exempt = True
-            self._resume(task, error=self.cancellation)
+            self.ready.append((task, None, self.cancellation))
             return
         errors = [child.error for child in children if child.error is not None]
-        errors.sort(key=lambda error: isinstance(error, Exception))  # an interrupt is raised first
         if errors:
+            errors.sort(key=lambda error: isinstance(error, Exception))  # an interrupt is raised first
             for other in errors[1:]:
                 if str(other) != str(errors[0]):
                     errors[0].add_note(f"also: {str(other) or type(other).__name__}")
-            self._resume(task, error=errors[0])
+            self.ready.append((task, None, errors[0]))
         else:
             values = tuple(child.value for child in children)
-            self._resume(task, values[0] if task.joins_one else values)
+            self.ready.append((task, values[0] if task.joins_one else values, None))
 
     # -- steps -------------------------------------------------------------------------------------------------
 
     def _begin(self, task: Task, step: Step[Any]) -> None:
         if isinstance(step, Request):
             self._begin_request(task, step)
+        elif isinstance(step, Attempt):
+            step.direct = False
+            self._queue(task, step)
         elif isinstance(step, Gather):
-            task.joins_one = False
-            try:
-                task.children = [Task(procedure, task) for procedure in step.runnables]
-            except RequestError as error:
-                discard(step)
-                self._resume(task, error=error)
-                return
-            if not task.children:
-                task.job = Job()
-                task.job.settle(())
-        elif isinstance(step, Exclusive):
-            child = Task(step.runnable, task)
-            child.claims = child.owner is None  # what is nested belongs to the outermost
-            child.owner = child.owner or child
-            task.children, task.joins_one = [child], True
-            child.started = True
-            child.job = ExclusiveJob(child.owner, self.settled)
-            self.engine.submit(child.job, self.now())
-        elif isinstance(step, Shielded):
-            child = Task(step.runnable, task)
-            child.exempt = True
-            task.children, task.joins_one = [child], True
+            self._start(task, step, step.runnables)
+        elif isinstance(step, Exclusive | Shielded):
+            self._start(task, step, (step.runnable,))
         elif isinstance(step, Emit):
             self._report(task, step.event)
-        elif isinstance(step, WaitFor):
-            self._listen(task, step)
-        elif isinstance(step, Sleep):
-            task.job = timer = Timer(self.settled, self.now() + step.seconds)
-            self.timers.append(timer)
-            if LONG_SLEEP <= step.seconds <= self.extension:
-                self.extension -= step.seconds
-                self.deadline += step.seconds
+        elif isinstance(step, Sleep | WaitFor):
+            self._sleep(task, step, self.now())
         elif isinstance(step, SetBitrate):
-            task.job = RateJob(step, task.owner, self.settled)
-            self.engine.submit(task.job, self.now())
+            task.waits_for = pause = Pause(task, step)
+            self.sending.append(pause)
         else:
-            self._resume(task, error=_not_a_step(step))
+            self.ready.append((task, None, _not_a_step(step)))
+
+    def _start(self, task: Task, step: Step[Any], runnables: Sequence[Runnable[Any]]) -> None:
+        """Start the children of a task."""
+        task.joins_one = not isinstance(step, Gather)
+        try:
+            task.children = [Task(self, one, task) for one in runnables]
+        except RequestError as error:
+            discard(step)
+            self.ready.append((task, None, error))
+            return
+        if not task.children:
+            self.ready.append((task, (), None))
+        for child in task.children:
+            child.exempt = child.exempt or isinstance(step, Shielded)
+            if isinstance(step, Exclusive) and child.owner is None:  # what is nested belongs to the outermost
+                child.claims, child.owner = True, child
+                child.waits_for = pause = Pause(child)
+                self._enqueue(pause)
+            else:
+                self.ready.append((child, None, None))
 
     def _begin_request(self, task: Task, request: Request[Any]) -> None:
-        interlock = self.engine.interlock
-        reads: Sequence[Runnable[Any]] = ()
-        if (
-            interlock is not None
-            and request.effect in GATED
-            and request.priority is not Priority.STOP
-            and not task.checked
-        ):
-            reads = interlock.required_reads(request)
-        if reads and interlock is not None:
-            child = Task(_read_first(interlock.required_reads, reads, request), task)
-            child.checked = True
-            task.children, task.joins_one = [child], True
+        engine = self.engine
+        if request.effect in GATED:
+            if self._reads_first(task, request):
+                return
+            task.stop_since = engine.nodes.epoch if self.has_ordered else self.since
+            self.has_ordered = True
+            try:
+                engine.check_stops(request, self.since, task.stop_since)
+            except MotorbusError as error:
+                self.ready.append((task, None, error))
+                return
+        if self.deadline < inf and self.now() >= self.deadline:
+            self.ready.append((task, None, failures.abandoned()))
             return
-        since = self.since
-        if self.has_ordered:
-            since = since._replace(stops=self.engine.positions.stops)
-        self.has_ordered |= request.effect in GATED
-        task.job = job = RequestJob(request, task.owner, self.settled, since)
-        if self.now() >= self.deadline:
-            job.settle(error=failures.abandoned())
+        if request.priority is Priority.STOP:
+            engine.note_stop(request)
+        excluded = engine.put_off(request, self.now()) if engine.sync.out_of_sync else ()
+        if excluded is None:
+            self._push(task, request, None)
+            return
+        attempt = engine.attempt(request)
+        if attempt.task is not None:  # another task sends the same kept request
+            attempt = Attempt(request)
+        attempt.direct, attempt.excluded = True, excluded
+        self._queue(task, attempt)
+
+    def _queue(self, task: Task, attempt: Attempt) -> None:
+        task.waits_for, attempt.task = attempt, task
+        attempt.since, attempt.stop_since, attempt.write_until = self.since, task.stop_since, 0.0
+        self._enqueue(attempt)
+
+    def _enqueue(self, one: Attempt | Pause) -> None:
+        if not self.sending or _priority(one) >= _priority(self.sending[-1]):
+            self.sending.append(one)
         else:
-            self.engine.submit(job, self.now())
+            insort(self.sending, one, key=_priority)
+
+    def put_back(self, attempt: Attempt) -> None:
+        """The link was full: this attempt leaves before others of its priority."""
+        self.sending.insert(bisect_left(self.sending, _priority(attempt), key=_priority), attempt)
+
+    def _push(self, task: Task, request: Request[Any], attempt: Attempt | None) -> None:
+        """Let the policy carry out the request that this task awaits."""
+        task.stack.append((carry_out(self.engine, request, attempt), request))
+        self.ready.append((task, None, None))
+
+    def _reads_first(self, task: Task, request: Request[Any]) -> bool:
+        """Whether the interlock requires reads before this request; they are carried out, then the request."""
+        interlock = self.engine.interlock
+        if interlock is None or task.checked or request.effect not in GATED:
+            return False
+        if request.priority is Priority.STOP or not (reads := interlock.required_reads(request)):
+            return False
+        child = Task(self, _read_first(interlock.required_reads, reads, request), task)
+        child.checked = True
+        task.children, task.joins_one = [child], True
+        self.ready.append((child, None, None))
+        return True
 
     def _report(self, task: Task, event: object) -> None:
         """The report has been handed over before the next step; what it raises is raised in the task."""
-        task.job = Job()
+        error: Exception | None = None
         try:
             if self.report is not None:
                 self.report(event)
             elif isinstance(event, JournalEntry):
                 raise _no_journal(event)
-        except Exception as error:
-            task.job.settle(error=error)
-        task.job.settle()
+        except Exception as raised:
+            error = raised
+        self.ready.append((task, None, error))
 
-    def _listen(self, task: Task, step: WaitFor) -> None:
-        task.job = timer = Timer(self.settled, self.now() + step.until)
+    def _sleep(self, task: Task, step: Sleep | WaitFor, now: float) -> None:
+        if now >= self.deadline:
+            self.ready.append((task, None, failures.abandoned()))
+        elif isinstance(step, WaitFor):
+            self._listen(Timer(task, now + step.until), step)
+        elif step.seconds <= 0.0:
+            self.ready.append((task, now, None))
+        else:
+            if LONG_SLEEP <= step.seconds <= self.extension:
+                self.extension -= step.seconds
+                self.deadline += step.seconds
+            task.waits_for = timer = Timer(task, now + step.seconds)
+            self.timers.append(timer)
 
+    def _listen(self, timer: Timer, step: WaitFor) -> None:
         def listen(notice: Notification) -> None:
             try:
                 if step.match(notice):
@@ -363,8 +462,59 @@ class TaskTree(Generic[T]):
                 self._end(timer, error=error)
 
         timer.listener = listen
+        timer.task.waits_for = timer
         self.engine.notification_handlers.append(listen)
         self.timers.append(timer)
+
+    def _end(self, timer: Timer, value: Any = None, error: BaseException | None = None) -> None:
+        self._remove(timer)
+        self.ready.append((timer.task, value, error))
+        if self.wake is not None:
+            self.wake()
+
+    def _remove(self, timer: Timer) -> None:
+        self.timers.remove(timer)
+        if timer.listener is not None:
+            self.engine.notification_handlers.remove(timer.listener)
+
+    # -- what was sent -----------------------------------------------------------------------------------------
+
+    def end(self, attempt: Attempt) -> None:
+        """An attempt of one of these tasks has ended."""
+        task, attempt.task = attempt.task, None
+        request = attempt.request
+        if attempt.error is not None:
+            self.ready.append((task, None, attempt.error))
+        elif not attempt.direct:
+            self.ready.append((task, attempt, None))
+        elif attempt.accepted is None:
+            self._push(task, request, attempt)
+        else:
+            self._decode(task, request, attempt.accepted)
+
+    def adopt(self, attempt: Attempt) -> None:
+        """The procedure is a request whose first attempt is on the wire, or has failed."""
+        task = self.root
+        self.ready.clear()
+        task.entered = True
+        task.stack[-1][0].send(None)
+        task.waits_for, attempt.task = attempt, task
+        self.has_ordered = attempt.request.effect in GATED
+
+    def fail(self, error: BaseException) -> None:
+        """The link is lost: everything that waits to be sent fails."""
+        sending, self.sending = self.sending, []
+        for one in sending:
+            task, one.task = one.task, None
+            self.ready.append((task, None, error))
+
+    def send_back(self, attempt: Attempt) -> None:
+        """A node of this attempt came out of sync before it could leave."""
+        task, attempt.task = attempt.task, None
+        if attempt.direct:
+            self._push(task, attempt.request, None)
+        else:
+            self.ready.append((task, None, None))
 
     # -- cancelled ---------------------------------------------------------------------------------------------
 
@@ -380,51 +530,72 @@ class TaskTree(Generic[T]):
             self.deadline = min(self.deadline, self.now() + SECOND_TIMEOUT)
 
     def end_sleeps(self, error: BaseException | None = None) -> None:
-        """Let every sleep end at once, with this error if there is one."""
+        """Let every sleep end at once, with this error if there is one; from any thread that has the turn."""
         for timer in tuple(self.timers):
             self._end(timer, self.now(), error)
 
     def drop(self) -> None:
         """End the procedure where it stands; nothing that its clean-up asks for is carried out."""
-        if self.end_sleeps in self.engine.end_sleeps:
-            self.engine.end_sleeps.remove(self.end_sleeps)
+        self.finished = True
+        self._forget()
         for task in self._waiting(self.root):
-            self._cancel_job(task)
-            if task.claims:
-                self.engine.release(task.owner)
+            self._drop_wait(task)
+            if task.claims and self.engine.exclusive is task.owner:
+                self.engine.exclusive = None
             task.finished = True
             discard(task.procedure)
-            with suppress(RuntimeError):  # it awaits a step where it is closed
-                task.coroutine.close()
+            for coroutine, _ in reversed(task.stack):
+                with suppress(RuntimeError):  # it awaits a step where it is closed
+                    coroutine.close()
 
     def _cancel(self, task: Task) -> None:
         if task.finished or task.exempt:
             return
         if not task.entered:
-            self._cancel_job(task)
+            self._drop_wait(task)
             discard(task.procedure)
             self._finish(task, error=self.cancellation)
-        elif task.children and not all(child.finished for child in task.children):
-            for child in task.children:
-                self._cancel(child)
         elif task.children:
-            self._join(task)
+            for child in tuple(task.children):
+                self._cancel(child)
         else:
             task.exempt = True
-            self._cancel_job(task)
-            self._resume(task, error=self.cancellation)
+            self._drop_wait(task)
+            self.ready.append((task, None, self.cancellation))
 
-    def _cancel_job(self, task: Task) -> None:
-        job, task.job = task.job, None
-        if isinstance(job, Timer) and job in self.timers:
-            self._end(job)
-        elif job is not None:
-            self.engine.cancel(job)
+    def _drop_wait(self, task: Task) -> None:
+        """A task waits no more. A request in flight keeps its lane until its reply or its deadline."""
+        wait, task.waits_for = task.waits_for, None
+        if isinstance(wait, Timer):
+            if wait in self.timers:
+                self._remove(wait)
+        elif wait is not None:
+            wait.task = None
+            if wait in self.sending:
+                self.sending.remove(wait)
+        self.ready = deque(one for one in self.ready if one[0] is not task)
 
     def _waiting(self, task: Task) -> list[Task]:
         if task.finished:
             return []
         return [task, *(leaf for child in task.children for leaf in self._waiting(child))]
+
+
+def decode(engine: Engine, request: Request[Any], answer: Response) -> Any:
+    """The value of an answered request; the stop that it acknowledges is noted if it is no refusal."""
+    value = answer if request.decode is None else request.decode(answer)
+    if request.effect in GATED and request.expected:
+        engine.nodes.acknowledge(request, answer)
+    return value
+
+
+def in_order(trees: Sequence[Tree[Any]]) -> list[Attempt | Pause]:
+    """What these trees are to send, by priority."""
+    return sorted([one for tree in trees for one in tree.sending], key=_priority)
+
+
+def _priority(one: Attempt | Pause) -> int:
+    return one.request.priority if isinstance(one, Attempt) else one.priority
 
 
 async def _read_first(required: Callable[[Request[Any]], Any], reads: Any, request: Request[T]) -> T:

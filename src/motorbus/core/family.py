@@ -325,6 +325,8 @@ class BusDriver(Protocol):
     family: Family
     window: int  # maximum number of lanes in flight
     full_duplex: bool  # a stop waits only for the request being sent, not for its reply
+    probe_after: int
+    """Equal replies in a row after which a node is probed: a copied reply would answer each next request. 0: never."""
 
     def air_time(self, request: Request[Any], rate: int) -> float:
         """Time (s) on the wire of the request and all expected replies, with the gaps of the protocol."""

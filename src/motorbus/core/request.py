@@ -138,7 +138,7 @@ class Step(Generic[T_co]):
 
 @dataclass(slots=True, eq=False, repr=False)
 class Request(Step[T_co]):
-    """One request and its expected replies. It is immutable, except for `prepared`, and may be sent again."""
+    """One request and its expected replies. It is immutable, except for `attempt`, and may be sent again."""
 
     wire: Final[Data]
     expected: Final[tuple[Expected, ...] | Any_] = ()
@@ -159,12 +159,9 @@ class Request(Step[T_co]):
     """Checked before each attempt that moves or switches torque, as for stops or changed settings."""
     deferred: Final[Deferred | None] = None
     """Its setpoints wait in the node, or it makes waiting setpoints take effect."""
-    alternate: Callable[[], Request[T_co]] | None = None
-    """Makes an equivalent request with replies of another length. The bus alternates where replies carry no number, so
-    that a second copy of the last reply is not taken for the next one."""
     decode_exact: ExactDecoder[T_co] | None = None
     """Fast path of `decode` for a request that is kept: decodes the bytes of all expected replies at once."""
-    prepared: Any = field(default=None, init=False)  # state that a bus keeps for it
+    attempt: Any = field(default=None, init=False)  # that a bus keeps for a request with `decode_exact`
 
     group: ClassVar[Any] = None
     prechecked: ClassVar[bool] = False
@@ -176,8 +173,8 @@ class Request(Step[T_co]):
         return [setpoint.node for setpoint in self.setpoints]
 
     def with_decoder(self, decode: Callable[[Response], T]) -> Request[T]:
-        """The same request with another `decode`, without `alternate` and `decode_exact`."""
-        own = ("wire", "expected", "decode", "alternate", "decode_exact", "prepared")
+        """The same request with another `decode`, without `decode_exact`."""
+        own = ("wire", "expected", "decode", "decode_exact", "attempt")
         rest = [name for name in Request.__slots__ if name not in own]
         return Request(self.wire, self.expected, decode, **{name: getattr(self, name) for name in rest})
 
@@ -230,9 +227,8 @@ class SetpointWrite(Request[None]):
     repeatable = False  # type: ignore[misc]
     reports_position = False  # type: ignore[misc]
     deferred = None  # type: ignore[misc]
-    alternate = None
     decode_exact = None
-    prepared = None
+    attempt = None
 
     def __init__(self, wire: bytes, group: SetpointGroup, raws: Sequence[int]) -> None:
         self.wire = wire  # type: ignore[misc]

@@ -49,8 +49,7 @@ class StreamLink:
         self._descriptor = -1
         self._receive = self._send = self._poll = _raise_closed
 
-    def now(self) -> float:
-        return monotonic()
+    now = staticmethod(monotonic)
 
     def send(self, data: bytes) -> int:
         """Send what fits into the buffer; the number of bytes. Raises LinkLost."""

@@ -137,7 +137,7 @@ class Command:
         if isinstance(request, SetpointWrite):
             aimed: Any = request.with_group(self._aim_of(request.group))
             return aimed  # type: ignore[no-any-return]
-        own, other = request.precondition, request.alternate
+        own = request.precondition
         return Request(
             request.wire,
             request.expected,
@@ -150,7 +150,6 @@ class Command:
             repeatable=request.repeatable,
             reports_position=request.reports_position,
             precondition=self._refusal if own is None else partial(self._either, own),
-            alternate=None if other is None else lambda: self.guarded(other()),
         )
 
     def _aim_of(self, aim: SetpointGroup) -> SetpointGroup:

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from contextlib import suppress
-from functools import partial
 from threading import Event, Thread
 from typing import Any, Final
 
-from motorbus.bus.background import BackgroundTask
+from motorbus.bus.running import run_here
+from motorbus.bus.tasks import Tree
 from motorbus.core.steps import Sleep, catch
 from motorbus.errors import MotorbusError
 from motorbus.motion.body import Body
@@ -41,13 +41,11 @@ class Watchdog:
         self._posts = {name: _Post(lease.losses - lost) for name in body.buses}
 
     def start(self) -> None:
-        """Watch each bus: in a thread, in virtual time as a background task of the bus."""
+        """Watch each bus: in a thread, in virtual time beside the procedures of the program."""
         self._lease.watchers.append(self._wake)
         for name, bus in self._body.buses.items():
-            post = self._posts[name]
             if bus.link.virtual:
-                post.along = BackgroundTask(bus, partial(self._watching, name))
-                post.along.along()
+                self._posts[name].tree = bus.watch(self._watch_along(name))
             else:
                 Thread(target=self._watch, args=(name,), name=f"motorbus lease {name}", daemon=True).start()
 
@@ -57,9 +55,10 @@ class Watchdog:
         if self._wake in self._lease.watchers:
             self._lease.watchers.remove(self._wake)
         self._wake()
-        for post in self._posts.values():
-            if post.along is not None:
-                post.along.drop()
+        for name, post in self._posts.items():
+            if post.tree is not None:
+                self._body.buses[name].unwatch(post.tree)
+                post.tree = None
 
     def busy(self, bus: str) -> bool:
         """Whether the lease was lost and the stop has not been sent on this bus yet."""
@@ -69,8 +68,8 @@ class Watchdog:
     def _wake(self) -> None:
         for post in self._posts.values():
             post.woken.set()
-            if post.along is not None:
-                post.along.hurry()
+            if post.tree is not None:
+                post.tree.end_sleeps()
 
     # -- when ----------------------------------------------------------------------------------------------------------
 
@@ -97,8 +96,8 @@ class Watchdog:
 
     # -- what ----------------------------------------------------------------------------------------------------------
 
-    async def _watching(self, bus: str) -> None:
-        while not self._over.is_set():
+    async def _watch_along(self, bus: str) -> None:
+        while True:
             if self._late(bus):
                 await self._stopping(bus)
             await catch(Sleep(self._left(bus)))
@@ -111,7 +110,7 @@ class Watchdog:
             try:
                 if self._late(bus):
                     there = self._body.buses[bus]
-                    BackgroundTask(there, partial(self._stopping, bus)).carried()
+                    run_here(there, self._stopping(bus))
                 left = self._left(bus)
             except Exception as error:  # the bus cannot be used: try again later
                 with suppress(Exception):  # this thread must not end
@@ -165,7 +164,7 @@ class _Post:
         self.failed: frozenset[str] = frozenset()
         self.again = 0.0
         self.woken = Event()
-        self.along: BackgroundTask[None] | None = None
+        self.tree: Tree[None] | None = None  # in virtual time
 
     def take(self, loss: int, failed: Iterable[str], again: float) -> None:
         """The stop was sent."""

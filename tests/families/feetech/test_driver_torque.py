@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motorbus import Robot
-from motorbus.bus.positions import LastPositions, addressed
+from motorbus.bus.nodes import Nodes, addressed
 from motorbus.core.request import Effect, Priority
 from motorbus.core.steps import Sleep, gather
 from motorbus.errors import ChecksumError, MotorbusError, OutcomeUnknown, RequestError, VerificationFailed
@@ -43,12 +43,12 @@ def test_a_stranger_is_let_go_with_one_packet_that_passes_everyone() -> None:
 
 
 def test_each_frame_names_whom_it_lets_go_so_that_nobody_else_counts_as_stopped() -> None:
-    silent, known = prepared(2, at_8=0), LastPositions(FAMILY.open(), 1_000_000)
+    silent, known = prepared(2, at_8=0), Nodes(FAMILY.open(), 1_000_000)
     (let_go, _) = watch(disable_torque(silent), unheard(off(2)), reads(2, 40, 0)).requests
     assert addressed(let_go) == {2}
     (together,) = all_limp(as_nodes([2, 3]))
-    known.sent(together)
-    assert [known.stop_count(node) for node in (1, 2, 3)] == [0, 1, 1]
+    known.stopped(together)
+    assert [known.last_stop(node) for node in (1, 2, 3)] == [0, 1, 1]
     assert not known  # whether there is anybody the answers tell
 
 

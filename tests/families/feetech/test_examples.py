@@ -282,7 +282,7 @@ def test_a_goal_outside_the_limits_moves_nothing(bus: Bus, goal: float) -> None:
     with pytest.raises(motorbus.LimitExceeded):
         bus.run(motorbus.feetech.sync_write_positions([servo], [goal]))
     sent, _ = wire.take()
-    assert sent == ["FF FF 01 04 02 00 29 CF"]  # move() reads the limits of this moment; nothing is written
+    assert sent == ["FF FF 01 04 02 00 28 D0"]  # move() reads the limits of this moment; nothing is written
 
 
 def test_a_scan_over_rates_leaves_the_bus_at_its_own(sim: Simulation) -> None:

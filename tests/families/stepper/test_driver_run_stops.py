@@ -70,13 +70,7 @@ def test_stop_first_stops_what_may_run_and_waits_until_it_has_slowed_down() -> N
         there.simulated.switch(notice_fault="none")
         there.sent()
         ran = there.go(stop_first=True)
-        assert there.sent() == [
-            *STOPS,
-            READ_1,
-            READ_1,
-            READ_1,
-            START_1,
-        ]  # the first of these is the bus's own, after a stop
+        assert there.sent() == [*STOPS, READ_1, READ_1, START_1]
         assert ran.outcome is Outcome.COMPLETED
         assert ran.seconds == pytest.approx(ran.predicted.seconds, abs=0.01)
 

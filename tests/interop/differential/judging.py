@@ -66,8 +66,8 @@ def _class(
         names: Iterator[str] = _taken(decoder, case, node, others[node], why)
     elif node not in others:
         names = _left(decoder, case, node, mine[node], others)
-    else:
-        names = iter(())
+    else:  # they take the echo for the answer
+        names = iter(["echo"] if case.stream.startswith(case.request.packet()) else [])
     return next(names, UNEXPLAINED)
 
 
@@ -78,7 +78,7 @@ def _taken(decoder: Decoder, case: Case, node: int, value: Any, why: str) -> Ite
     request, stream = case.request, case.stream
     size = dict(request.due())[node] - wire.OVERHEAD
     said = [one for one in packets(stream) if one.node == node]
-    if why == "echo" and request.packet() in stream:
+    if request.packet() in stream:
         yield "echo"
     if any(len(one.data) == size and _is(case, one, value, decoder) for one in said) and _has_more(case):
         yield "more-than-the-answer"
@@ -124,6 +124,8 @@ def _left(decoder: Decoder, case: Case, node: int, value: Any, others: Mapping[i
     ]
     if not said:
         return
+    if stream.startswith(case.request.packet()):
+        yield "echo"
     if decoder is not RUST and said[0].error > SDK_MOST_ERROR:
         yield "error-above-0x7f"
     if case.request.kind == "sync_read":

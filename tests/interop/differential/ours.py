@@ -18,7 +18,7 @@ def decoded(case: Case) -> Outcome:
     exchange: Request[Response] = Request(
         request.packet(), tuple(Expected(node, node, length) for node, length in request.due())
     )
-    answer, fault = Tries(FEETECH, 1_000_000, echo=False).answered(exchange, [case.stream])
+    answer, fault = Tries(FEETECH, 1_000_000).answered(exchange, [case.stream])
     if answer is None:
         return Outcome(None, fault)
     replies = [wire.decode_status(reply.data) for reply in answer.replies]

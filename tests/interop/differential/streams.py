@@ -18,7 +18,7 @@ from motorbus.families.feetech.simulator import MODELS
 from motorbus.families.feetech.table import CONTROL, TABLES
 from motorbus.link.memory import MemoryLink
 from tests.interop.differential.cases import Case, Request
-from tests.support.world import exclude_echo, make_bus
+from tests.support.world import make_bus
 
 IDS: Final = (1, 2, 3)
 AS_RECORDED: Final = "as recorded"
@@ -35,7 +35,6 @@ def _session(name: str) -> Iterator[Case]:
     bus = make_bus(
         MemoryLink(FAMILY.simulator(IDS, model), rate=MODELS[model].shipped_rate), FAMILY.open(), gate=False
     )
-    exclude_echo(bus)
     trace = bus.trace.subscribe()
     for request in _requests(name):
         exchange: core_request.Request[object] = core_request.Request(

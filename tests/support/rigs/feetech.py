@@ -10,7 +10,7 @@ from motorbus.families.feetech import FAMILY, wire
 from motorbus.families.feetech.simulator import FeetechBus
 from motorbus.link.base import Line, PerfectLine
 from motorbus.link.memory import MemoryLink
-from tests.support.world import exclude_echo, make_bus
+from tests.support.world import make_bus
 
 IDS = (1, 2, 3, 4, 5, 6)
 FEEDBACK = 15  # bytes from 56 on
@@ -33,7 +33,6 @@ class Rig:
         self.servos = self.simulator.nodes
         self.link = MemoryLink(self.simulator, line=self.line, **self.options)
         self.bus = make_bus(self.link, FAMILY.open())
-        exclude_echo(self.bus)
 
     def put(self, line: Line) -> None:
         """Another line between host and servos."""

@@ -125,6 +125,7 @@ class StepperDriver:
 
     window = 1
     full_duplex = True
+    probe_after = 0  # assumption: a controller sends no reply twice; its probe takes 0.24 s
 
     def __init__(self, family: Family, motor: object = wire.MOTOR, dump_order: object = "little") -> None:
         self.family = family

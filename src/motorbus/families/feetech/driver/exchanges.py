@@ -82,7 +82,6 @@ def read_block(
 ) -> Request[T]:
     """READ `count` bytes from `address` on; the value is what `take` makes of them.
 
-    Its other form reads one byte more and leaves it unused: the length is all in a reply that tells it from the last.
     One that is kept says by `whole` what a packet with so many bytes of data comes to; see `Request`.
     """
 
@@ -91,21 +90,17 @@ def read_block(
         node.heard(frame[4], answer.at)
         return take(frame[5 : 5 + count])
 
-    def exchange(count: int, other: int) -> Request[T]:
-        request, dues = _question(node, address, count)
-        return Request(
-            request,
-            dues,
-            read,
-            priority=priority,
-            reply_within=timeout,
-            repeatable=True,
-            reports_position=told_by({node.node: node}, address, count),
-            alternate=lambda: exchange(other, count),
-            decode_exact=whole(count),
-        )
-
-    return exchange(count, another(address, count))
+    request, dues = _question(node, address, count)
+    return Request(
+        request,
+        dues,
+        read,
+        priority=priority,
+        reply_within=timeout,
+        repeatable=True,
+        reports_position=told_by({node.node: node}, address, count),
+        decode_exact=whole(count),
+    )
 
 
 def _question(node: Node, address: int, count: int) -> tuple[bytes, tuple[Expected, ...]]:
@@ -134,11 +129,6 @@ def places(nodes: Mapping[int, Node], answer: Response) -> dict[int, float]:
             if row.unit:
                 found[node.node] = float(node.value(row, row.decode(reply.data[5 : 5 + row.size])))
     return found
-
-
-def another(address: int, count: int) -> int:
-    """One byte more than `count`, or less where the table of a servo, or what a packet can carry, ends."""
-    return count + 1 if address + count <= LAST and count < MOST else count - 1
 
 
 def acknowledged(

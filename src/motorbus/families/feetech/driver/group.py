@@ -18,7 +18,6 @@ from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech import wire
 from motorbus.families.feetech.driver.exchanges import (
     Block,
-    another,
     changed_since,
     read_block,
     told_by,
@@ -131,28 +130,20 @@ def sync_exchange(
     places: Callable[[Response], Mapping[int, float]] | None = None,
     whole: Callable[[int], ExactDecoder[T] | None] = lambda _: None,
 ) -> Request[T]:
-    """SYNC READ one block of each of these, in this order; its other form reads a byte more (see `read_block`), where
-    there is one more to read.
+    """SYNC READ one block of each of these, in this order.
 
-    `read` must make do with either, and so must `places`, which says where they are by what was read last. `whole` as
-    for `read_block`.
+    `places` says where they are by what was read last. `whole` as for `read_block`.
     """
     by_id = {node.node: node for node in nodes}
     ids = list(by_id)
-
-    def exchange(count: int, other: int | None) -> Request[T]:
-        return Request(
-            wire.sync_read(address, count, ids),
-            tuple(Expected(id, id, wire.OVERHEAD + count) for id in ids),
-            read,
-            repeatable=True,
-            reports_position=places or told_by(by_id, address, count),
-            alternate=None if other is None else lambda: exchange(other, count),
-            decode_exact=whole(count),
-        )
-
-    more = another(address, count)
-    return exchange(count, more if more > count else None)
+    return Request(
+        wire.sync_read(address, count, ids),
+        tuple(Expected(id, id, wire.OVERHEAD + count) for id in ids),
+        read,
+        repeatable=True,
+        reports_position=places or told_by(by_id, address, count),
+        decode_exact=whole(count),
+    )
 
 
 async def collected(

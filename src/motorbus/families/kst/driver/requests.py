@@ -9,8 +9,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Final, TypeVar
 
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.register import Register
-from motorbus.core.request import Effect, Precondition, Priority, Request, Response, TimeoutClass
+from motorbus.core.request import (
+    Data,
+    Effect,
+    ExactDecoder,
+    Precondition,
+    Priority,
+    Request,
+    Response,
+    TimeoutClass,
+)
 from motorbus.core.setpoint import Setpoint
 from motorbus.errors import DeviceError, UnexpectedReply
 from motorbus.families.kst import sdo
@@ -24,6 +34,7 @@ CHANGES_POSITION: Final = frozenset(("mid_point", "negative_limit", "positive_li
 as torque on."""
 UNSIZED_REFUSED: Final = frozenset((0x0504_0001, 0x0607_0010, 0x0607_0012, 0x0607_0013))
 """Abort codes that may mean "state the length"."""
+SDO_HEAD: Final = 4  # specifier, index and sub-index
 ABSENT: Final = frozenset((0x0601_0000, 0x0601_0001, 0x0602_0000, 0x0609_0011))
 """Abort codes of an object that cannot be read."""
 
@@ -36,6 +47,7 @@ def upload(
     priority: Priority = Priority.POLL,
     reply_within: TimeoutClass = TimeoutClass.REPLY,
     reports_position: bool | Callable[[Response], Mapping[int, float]] = False,
+    decode_exact: ExactDecoder[T] | None = None,
 ) -> Request[T]:
     """Read an object; `decode` gets the response, which may be an abort."""
     return Request(
@@ -47,6 +59,7 @@ def upload(
         reply_within=reply_within,
         repeatable=True,
         reports_position=reports_position,
+        decode_exact=decode_exact,
     )
 
 
@@ -64,7 +77,24 @@ def read_register(
             return {}
         return {node.node: float(row.to_value(row.decode(reply.data[: row.size])))}
 
-    return upload(node, row, decode, reports_position=reports_position and positions)
+    def decode_exact(frame: Data, at: float) -> T | None:
+        if type(frame) is not CanFrame or frame.id != reply.id or frame.extended is not reply.extended:
+            return None
+        if len(frame.data) != sdo.LENGTH or frame.data[:SDO_HEAD] != reply.data[:SDO_HEAD]:
+            return None
+        node.at = at
+        return take(row.decode(frame.data[SDO_HEAD : SDO_HEAD + row.size]))
+
+    reply = node.settings.format(
+        sdo.encode_upload_reply(node.node, row.address, row.subindex or 0, bytes(row.size))
+    )
+    return upload(
+        node,
+        row,
+        decode,
+        reports_position=reports_position and positions,
+        decode_exact=decode_exact if reports_position else None,
+    )
 
 
 def value_bytes(node: Node, row: Register, reply: SdoReply) -> bytes:

@@ -1,4 +1,4 @@
-"""What an emergency stop needs to know: which nodes are there, their last positions, and the stops sent to each.
+"""What a bus remembers of its nodes for the emergency stop and the gate: their last positions, orders and stops.
 
 A node is known once it has answered or was ordered to move. Its position counts while it is fresh and no order to this
 node has left since: a goal at an old position would be an order to move back.
@@ -8,10 +8,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
-from motorbus.bus.jobs import StopCounts
-from motorbus.bus.prepared import Prepared
 from motorbus.core.family import BusDriver, Stop
 from motorbus.core.request import ANY, Effect, Expected, Priority, Request, Response
 from motorbus.core.setpoint import Setpoint, Stays
@@ -26,61 +24,56 @@ ENDLESS: Final = ("velocity", "load", "current")
 Reading = tuple[Request[Any], Response]
 
 
-class LastPositions(Mapping[int, Reading]):
+class Source(Protocol):
+    """An accepted request whose reply begins with a position. `orders`: how many orders had left before it."""
+
+    orders: int
+
+    def reading(self) -> Reading: ...
+
+
+class Nodes(Mapping[int, Reading]):
     """By node, the last request that read a position and its reply.
 
-    `rate` is the bit rate (bit/s) at which a node answered last. `orders` and `stop_total` count all orders and stops
-    sent. `latest` is the source of each reading. `nodes` and `stops` are replaced, never changed: the stop thread reads
-    them at any time.
+    `known` are the nodes that exist, `rate` is the bit rate (bit/s) at which one answered last. `epoch` counts stops,
+    latches and lost ports. `known` and `stops` are replaced, never changed: the stop thread reads them at any time.
     """
 
     def __init__(self, driver: BusDriver, rate: int) -> None:
         self.driver = driver
         self.rate = rate
-        self.nodes: frozenset[int] = frozenset()
-        self.orders = self.stop_total = 0
-        self.stops: StopCounts = {}
-        self.latest: dict[int, Prepared | tuple[Request[Any], Response, int]] = {}
+        self.known: frozenset[int] = frozenset()
+        self.orders = 0
+        self.epoch = self.stopped_all = 0
+        self.stops: dict[int, int] = {}
+        """By node, the epoch of its last stop; `stopped_all` is that of the last stop of all."""
+        self.sources: dict[int, Source] = {}
         self._ordered: dict[tuple[int, ...], int] = {}  # by the nodes that an order was for (empty: all)
         self._accepted: Counter[int] = Counter()
-        self._acknowledged: dict[int, Response] = {}  # the reply to the last order of a node
         self._stop_replies: dict[int, set[Expected]] = {}  # of a stop that takes several requests
 
     # -- positions ---------------------------------------------------------------------------------------------
 
     def __getitem__(self, node: int) -> Reading:
-        return self._reading(node)[:2]
+        return self.sources[node].reading()
 
     def __iter__(self) -> Iterator[int]:
-        return iter(tuple(self.latest))
+        return iter(tuple(self.sources))
 
     def __len__(self) -> int:
-        return len(self.latest)
-
-    def _reading(self, node: int) -> tuple[Request[Any], Response, int]:
-        latest = self.latest[node]
-        return latest.reading() if isinstance(latest, Prepared) else latest
-
-    def answered(self, nodes: Iterable[int], request: Request[Any], answer: Response, rate: int) -> None:
-        """These nodes answered this request."""
-        self.rate = rate
-        self.add(nodes)
-        if request.effect in GATED:
-            self._acknowledged.update(dict.fromkeys(nodes, answer))
-        if request.reports_position and not _is_refusal(request, answer):
-            self.latest.update(dict.fromkeys(nodes, (request, answer, self.orders)))
+        return len(self.sources)
 
     def add(self, nodes: Iterable[int]) -> None:
         """These nodes exist."""
-        if not self.nodes.issuperset(nodes):
-            self.nodes = self.nodes.union(nodes)
+        if not self.known.issuperset(nodes):
+            self.known = self.known.union(nodes)
 
     def fresh(self, now: float) -> dict[int, Response | None]:
         """Every known node with its last position, None where it is older than `FRESH` or an order has left since."""
-        found: dict[int, Response | None] = dict.fromkeys(sorted(self.nodes))
-        for node in self:
-            _, answer, orders = self._reading(node)
-            if now - answer.at < FRESH and orders >= self._last_order(node):
+        found: dict[int, Response | None] = dict.fromkeys(sorted(self.known))
+        for node, source in tuple(self.sources.items()):
+            answer = source.reading()[1]
+            if now - answer.at < FRESH and source.orders >= self._last_order(node):
                 found[node] = answer
         return found
 
@@ -89,78 +82,75 @@ class LastPositions(Mapping[int, Reading]):
         orders = tuple(self._ordered.items())  # the stop thread may ask while an order leaves
         return max((number for nodes, number in orders if not nodes or node in nodes), default=0)
 
-    def forget(self) -> None:
-        """The devices may have restarted: no position or acknowledgement counts any more."""
-        self.latest.clear()
-        self._acknowledged.clear()
-        self._stop_replies.clear()
-
     # -- orders and stops --------------------------------------------------------------------------------------
 
-    def sent(self, request: Request[Any]) -> None:
-        """A request leaves that may move something, or stops it.
-
-        The last position and acknowledgement of the nodes of an order (none: all) count no longer.
-        """
-        if request.priority is Priority.STOP:
-            if request.effect in GATED:
-                stops = Counter(self.stops)
-                stops.update(addressed(request) or (None,))
-                self.stops, self.stop_total = stops, self.stop_total + 1
-            return
+    def ordered(self, request: Request[Any]) -> None:
+        """An order leaves: positions read and stops acknowledged before it count no longer for its nodes."""
         nodes = tuple(request.setpoint_nodes)
-        if not self.nodes.issuperset(nodes):
-            self.add(nodes)
+        if not self.known.issuperset(nodes):
+            self.known = self.known.union(nodes)
         if request.effect in GATED:
             if request.expected:
                 nodes = tuple(addressed(request))
             self.orders += 1
             self._ordered[nodes] = self.orders
-            for replies in (self._acknowledged, self._stop_replies):
-                for node in (nodes or self.nodes) if replies else ():
-                    replies.pop(node, None)
+            for node in (nodes or self.known) if self._stop_replies else ():
+                self._stop_replies.pop(node, None)
 
-    def stop_count(self, node: int) -> int:
-        """Number of stops sent to this node, those for all nodes included."""
-        return self.stops.get(node, 0) + self.stops.get(None, 0)
-
-    def is_stopped(self, request: Request[Any], before: StopCounts) -> bool:
-        """A stop for a node that this request addresses was sent since `stops` was `before`."""
-        if before is self.stops:
-            return False
+    def stopped(self, request: Request[Any]) -> None:
+        """A stop leaves: motion of its nodes that waits to be sent is withdrawn."""
+        self.epoch += 1
         nodes = addressed(request)
-        return not nodes or any(before.get(node, 0) != self.stops.get(node, 0) for node in (*nodes, None))
+        if nodes:
+            self.stops = self.stops | dict.fromkeys(nodes, self.epoch)
+        else:
+            self.stopped_all = self.epoch
 
-    def frames(self, now: float) -> Stop:
+    def last_stop(self, node: int) -> int:
+        """The epoch of the last stop of this node."""
+        return max(self.stops.get(node, 0), self.stopped_all)
+
+    def is_stopped(self, request: Request[Any], since: int) -> bool:
+        """A node of this request, which moves something, was stopped after this epoch."""
+        nodes = addressed(request) or self.stops.keys()
+        return self.stopped_all > since or any(self.stops.get(node, 0) > since for node in nodes)
+
+    def forget(self) -> None:
+        """The devices may have restarted: no position or acknowledgement counts any more."""
+        self.sources.clear()
+        self._stop_replies.clear()
+
+    # -- acknowledged stops ------------------------------------------------------------------------------------
+
+    def stop_requests(self, now: float) -> Stop:
         """Requests that stop all known nodes; without positions where the family fails to use them."""
         try:
             return self.driver.stop(self.fresh(now))
         except Exception:  # the stop must go out
-            return self.driver.stop(dict.fromkeys(sorted(self.nodes)))
-
-    def accept(self, request: Request[Any], answer: Response) -> None:
-        """This request was answered and not refused: nodes that it stops have accepted a stop."""
-        if request.effect not in GATED or request.expected is ANY:
-            return
-        answered = [due for due in request.expected if self._acknowledged.get(due.node) is answer]
-        if request.priority is Priority.STOP:
-            for due in answered:
-                replies = self._stop_replies.setdefault(due.node, set())
-                replies.add(due)
-                if len(replies) >= self._stop_reply_count(due.node):
-                    self.accepted(due.node)
-        elif request.deferred is None:
-            resting = {goal.node for goal in request.setpoints if rests(goal)}
-            for due in answered:
-                if due.node in resting:
-                    self.accepted(due.node)
+            return self.driver.stop(dict.fromkeys(sorted(self.known)))
 
     def forget_stop_replies(self) -> None:
         """A new stop begins: replies to an earlier one do not count for it."""
         self._stop_replies.clear()
 
-    def accepted(self, node: int) -> None:
-        """This node acknowledged a stop."""
+    def acknowledge(self, request: Request[Any], answer: Response) -> None:
+        """This request was answered and not refused: nodes that it stops have accepted a stop."""
+        if request.effect not in GATED or request.expected is ANY:
+            return
+        answered = [due for due in request.expected if due.node not in answer.missing]
+        if request.priority is Priority.STOP:
+            for due in answered:
+                replies = self._stop_replies.setdefault(due.node, set())
+                replies.add(due)
+                if len(replies) >= self._stop_reply_count(due.node):
+                    self._accept(due.node)
+        elif request.deferred is None:
+            resting = {goal.node for goal in request.setpoints if rests(goal)}
+            for due in answered:
+                if due.node in resting:
+                    self._accept(due.node)
+
+    def _accept(self, node: int) -> None:
         self._stop_replies.pop(node, None)
         self._accepted[node] += 1
 
@@ -170,16 +160,9 @@ class LastPositions(Mapping[int, Reading]):
 
     def _stop_reply_count(self, node: int) -> int:
         """Number of different replies that this node gives to the requests of a stop."""
-        requests = self.driver.stop(dict.fromkeys(sorted(self.nodes))).requests
+        requests = self.driver.stop(dict.fromkeys(sorted(self.known))).requests
         gated = [one.expected for one in requests if one.effect in GATED and one.expected is not ANY]
         return max(1, len({due for dues in gated for due in dues if due.node == node}))
-
-
-def _is_refusal(request: Request[Any], answer: Response) -> bool:
-    """The only reply has the length of a refusal."""
-    if request.expected is ANY or len(request.expected) != 1 or not answer.replies:
-        return False
-    return len(answer.replies[0].data) == request.expected[0].refusal
 
 
 def rests(goal: Setpoint) -> bool:
@@ -196,7 +179,14 @@ def moves(request: Request[Any]) -> bool:
 
 def addressed(request: Request[Any]) -> set[int]:
     """Nodes that answer this request or are ordered something by it; empty for all nodes."""
-    nodes = {goal.node for goal in request.setpoints}
+    nodes = set(request.setpoint_nodes)
     if request.expected is not ANY:
         nodes.update(due.node for due in request.expected)
     return nodes
+
+
+def is_refusal(request: Request[Any], answer: Response) -> bool:
+    """The only reply has the length of a refusal."""
+    if request.expected is ANY or len(request.expected) != 1 or not answer.replies:
+        return False
+    return len(answer.replies[0].data) == request.expected[0].refusal
