@@ -203,3 +203,16 @@ def test_garbage_on_the_line_does_not_hold_the_stop() -> None:
     outcome = bus.estop()
     assert torque_offs(responder)[0] == 254
     assert set(outcome.acknowledged) | set(outcome.silent) == {1, 2}
+
+
+def test_many_triggers_are_one_stop_and_return_at_once(tmp_path: Path) -> None:
+    bus, responder = served(tmp_path / "stop")
+    responder.dead = {1}
+    begun = time.monotonic()
+    for _ in range(40):
+        bus.trigger_estop()
+    assert time.monotonic() - begun < 0.2
+    while bus.engine.stopping or bus.turn.held or not bus.latched:
+        time.sleep(0.01)
+    assert time.monotonic() - begun < 2 * STOP_TIMEOUT
+    bus.close()

@@ -111,6 +111,8 @@ class Call:
 
     def obey(self) -> None:
         """Carry out what was asked; the caller has the turn."""
+        if self.loop.is_closed() and self.tree.cancellation is None:
+            self.tree.cancel(asyncio.CancelledError())
         while self.requests:
             error = self.requests.popleft()
             if error is not None:
@@ -122,13 +124,14 @@ class Call:
 async def _finish(calls: Iterable[Call]) -> None:
     """Wait until all have ended. A cancellation, or an error that is none of ours, cancels them; they clean up."""
     calls = list(calls)
+    cancellation: BaseException | None = None
     try:
         while going := [call.ended for call in calls if not call.ended.done()]:
             error: BaseException | None = None
             try:
                 await asyncio.wait(going, return_when=asyncio.FIRST_COMPLETED)
-            except asyncio.CancelledError as cancellation:
-                error = cancellation
+            except asyncio.CancelledError as cancelled:
+                error = cancellation = cancelled
             else:
                 if len(calls) > 1:
                     ended = [call for call in calls if call.ended in going and call.ended.done()]
@@ -140,6 +143,8 @@ async def _finish(calls: Iterable[Call]) -> None:
         for call in calls:
             call.ask(None)
         raise
+    if cancellation is not None and all(call.tree.cancellation is None for call in calls):
+        raise cancellation  # all had ended before
 
 
 async def run_on(procedures: Mapping[AsyncBus, Runnable[Any]]) -> dict[AsyncBus, Any]:
@@ -239,20 +244,26 @@ class _Pump:
     def add(self, call: Call) -> None:
         """Run this procedure, beside those that run."""
         self._calls.append(call)
-        if self._task is None or self._task.done():
+        if self._task is None:
             self._task = call.loop.create_task(self._work())
 
     async def _work(self) -> None:
         parts: dict[BaseBus, Part] = {}
+        failure: BaseException | None = None
         try:
             while self._calls:
                 self._step(parts)
                 with contextlib.suppress(asyncio.CancelledError):  # the loop ends: what runs cleans up first
                     await asyncio.sleep(0)
+        except BaseException as error:  # a fault of a bus: no call waits for ever
+            failure = error
         finally:
+            self._task = None
             for call in self._calls:
                 call.tree.drop()
+                call.tree.cancellation = failure
                 _set_result(call.ended)
+            self._calls.clear()
             for part in parts.values():
                 part.trees = []
                 part.release_turn()

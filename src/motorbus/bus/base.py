@@ -184,7 +184,7 @@ class BaseBus:
                     tree.send_back(one)
                     return 0.0
                 engine.check(one.request, one.since, one.stop_since, now)
-            except MotorbusError as error:
+            except Exception as error:  # also of the gate or of the driver
                 one.error = error
                 tree.end(one)
             else:
@@ -406,9 +406,13 @@ class BaseBus:
 
     def latch(self) -> None:
         """Refuse motion and torque until `reset`, as after an emergency stop; sends nothing."""
-        with self.turn:
+        self.engine.announce_stop(asked_by())
+        self.turn.acquire(Priority.STOP)
+        try:
             self.engine.latch(self.link.now(), asked_by())
+        finally:
             self.engine.stop_sent()
+            self.turn.release()
 
     def reset(self) -> None:
         """Take the latch off. Nothing is sent and nothing moves."""

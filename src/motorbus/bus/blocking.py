@@ -73,7 +73,7 @@ class Bus(BaseBus):
                     try:
                         value = self.finish(started)
                     except tolerated as error:
-                        value = error
+                        value = self._lost(error) if isinstance(error, LinkLost) else error
                     if value is not PENDING:
                         return (decode_order(order, started.sent_at) if order else None), value
                 part, tree = self.continue_with(request, order, started, since, tolerated)
@@ -129,6 +129,7 @@ class Bus(BaseBus):
         attempt = engine.attempt(request)
         attempt.excluded, attempt.task, attempt.direct = excluded, None, True
         attempt.since = attempt.stop_since = since
+        attempt.write_until = 0.0
         engine.begin(attempt, now)
         try:
             link.write(wire)
@@ -136,6 +137,7 @@ class Bus(BaseBus):
             raise
         except LinkError as error:
             if not engine.not_written(attempt, error):
+                self.hand_over()
                 raise
             return None
         if engine.window > 1 or not attempt.in_flight:
@@ -148,13 +150,12 @@ class Bus(BaseBus):
         if attempt.in_flight:
             chunks = link.read(attempt.deadline)
             if chunks and request.decode_exact is not None and not request.effect and not attempt.excluded:
-                data = chunks[0]
-                if type(data) is bytes and (len(data) != attempt.size or len(chunks) > 1):
-                    data = self._rest_of(attempt, chunks)
-                value = engine.accept(attempt, data, link.now())
-                if value is not PENDING:
-                    return value
-                chunks = [data]
+                if type(chunks[0]) is bytes and (len(chunks) > 1 or len(chunks[0]) != attempt.size):
+                    chunks = [self._rest_of(attempt, chunks)]
+                if len(chunks) == 1:
+                    value = engine.accept(attempt, chunks[0], link.now())
+                    if value is not PENDING:
+                        return value
             engine.feed(chunks, link.now(), attempt.sent_at)
             if attempt.accepted is None:
                 return PENDING
@@ -302,6 +303,9 @@ class _Batch:
                 self.attempt = bus.start(requests[-1], self.order, self.since)
             except LinkLost as error:
                 self.value = bus._lost(error)
+                return False
+            except LinkError as error:  # a part of it may have been sent
+                self.value = error
                 return False
             except MotorbusError:  # it is refused: the task says so
                 pass

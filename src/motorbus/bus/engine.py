@@ -195,7 +195,7 @@ class Engine:
         if not must_sync(request):
             return ()
         nodes = tuple(self.sync.doubtful(request))
-        put_off = request.expected is not ANY and len(request.expected) > 1
+        put_off = request.expected is not ANY and len(nodes) < len(request.expected)
         if nodes and not (put_off and all(self.sync.is_put_off(node, now) for node in nodes)):
             return None
         return nodes
@@ -249,7 +249,9 @@ class Engine:
         if request.decode_exact is None:
             return Attempt(request)
         attempt: Attempt | None = request.attempt
-        if attempt is None or attempt.timing is not self._timing or attempt.in_flight:
+        if attempt is not None and (attempt.in_flight or attempt.task is not None):
+            return Attempt(request)  # another caller has sent it, or waits to send it
+        if attempt is None or attempt.timing is not self._timing:
             attempt = request.attempt = Attempt(request)
             self.measure(attempt)
         return attempt
@@ -533,6 +535,8 @@ class Engine:
         nodes = attempt.nodes
         if answer.missing:
             nodes = tuple([node for node in nodes if node not in answer.missing])
+            for node in answer.missing if request.reports_position else ():
+                self.nodes.sources.pop(node, None)  # its source may be this attempt, which has no reply of it
         if request.priority is not Priority.STOP and self.sync.out_of_sync:
             self._confirm(attempt, nodes)  # an earlier reply may follow a stop, which puts no node in sync
         reads = request.reports_position and not is_refusal(request, answer)

@@ -43,9 +43,20 @@ async def carry_out(engine: Engine, request: Request[Any], attempt: Attempt | No
             if len(request.expected) == 1:  # type: ignore[arg-type]  # never ANY here
                 raise _error(engine, request, failed, tries, sent)
             excluded += (node,)
-        attempt = await Attempt(
-            request, excluded=excluded, is_probed=is_probed
-        )  # None: a node came out of sync before it left
+        if excluded and len(excluded) == len(request.expected):  # type: ignore[arg-type]
+            return Response((), excluded, await Sleep(0))
+        attempt = await Attempt(request, excluded=excluded, is_probed=is_probed)
+        if attempt is None:  # a node came out of sync before it left
+            tries += 1
+            if tries > RETRIES:
+                raise _error(engine, request, _doubted(request), tries, sent)
+
+
+def _doubted(request: Request[Any]) -> Attempt:
+    """The failed attempt of a request that never left: data that were not expected came before it, each time."""
+    attempt = Attempt(request)
+    attempt.fault = "surplus"
+    return attempt
 
 
 def _may_repeat(request: Request[Any]) -> bool:

@@ -13,6 +13,7 @@ import atexit
 import contextlib
 import json
 import os
+import select
 import socket
 import time
 from collections.abc import Sequence
@@ -77,6 +78,7 @@ class EmergencyStop:
         with self._starting:
             if self._thread is None and not self._closed:
                 self._sockets = self._sockets or open_socket(self.socket_path)
+                self._sockets[1].setblocking(False)
                 thread = Thread(target=self._serve, args=self._sockets[:1], name="motorbus stop", daemon=True)
                 try:
                     thread.start()
@@ -179,19 +181,28 @@ class EmergencyStop:
     def _serve(self, ear: socket.socket) -> None:
         while True:
             try:
-                data, address = ear.recvfrom(LONGEST)
-                word, _, about = data.strip().partition(b" ")
-                if word == b"estop":
-                    outcome = self._outcome(client_name(about))
-                    if address:
-                        ear.sendto(json.dumps(outcome._asdict()).encode(), address)
-                elif STOP in data and not data.strip(STOP + END):
-                    self._outcome()
+                self._serve_all(ear, _receive(ear))
                 if self._closed:
                     return
             except OSError:  # the client is gone, or the socket was closed
                 if self._closed:
                     return
+
+    def _serve_all(self, ear: socket.socket, received: list[tuple[bytes, Any]]) -> None:
+        """One stop for all who ask now."""
+        clients = [
+            (about, address)
+            for word, _, about, address in (
+                (*data.strip().partition(b" "), address) for data, address in received
+            )
+            if word == b"estop"
+        ]
+        if clients or any(STOP in data and not data.strip(STOP + END) for data, _ in received):
+            outcome = self._outcome(client_name(clients[0][0]) if clients else "")
+            for _, address in clients:
+                if address:
+                    with contextlib.suppress(OSError):  # the client is gone
+                        ear.sendto(json.dumps(outcome._asdict()).encode(), address)
 
     def _outcome(self, client: str = "") -> StopOutcome:
         try:
@@ -213,3 +224,11 @@ class EmergencyStop:
         if self._sockets and self.socket_path is not None:
             self.socket_path.unlink(missing_ok=True)
         self._sockets = None
+
+
+def _receive(ear: socket.socket) -> list[tuple[bytes, Any]]:
+    """Wait for a datagram; all that are there, with their senders."""
+    received = [ear.recvfrom(LONGEST)]
+    while received[-1][0] and select.select((ear,), (), (), 0.0)[0]:
+        received.append(ear.recvfrom(LONGEST))
+    return received

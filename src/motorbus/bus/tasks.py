@@ -279,7 +279,10 @@ class Tree(Generic[T]):
                 self.ready.append((task, None, failure))
         else:
             STEPPING.active = outer
-            self._begin(task, step)
+            try:
+                self._begin(task, step)
+            except Exception as failure:  # of the gate or of the driver
+                self.ready.append((task, None, failure))
 
     def _decode(self, task: Task, request: Request[Any], answer: Response) -> None:
         try:
@@ -389,8 +392,6 @@ class Tree(Generic[T]):
             self._push(task, request, None)
             return
         attempt = engine.attempt(request)
-        if attempt.task is not None:  # another task sends the same kept request
-            attempt = Attempt(request)
         attempt.direct, attempt.excluded = True, excluded
         self._queue(task, attempt)
 
@@ -543,9 +544,10 @@ class Tree(Generic[T]):
             if task.claims and self.engine.exclusive is task.owner:
                 self.engine.exclusive = None
             task.finished = True
-            discard(task.procedure)
+            with suppress(Exception):
+                discard(task.procedure)
             for coroutine, _ in reversed(task.stack):
-                with suppress(RuntimeError):  # it awaits a step where it is closed
+                with suppress(Exception):  # it raises, or awaits a step, where it is closed
                     coroutine.close()
 
     def _cancel(self, task: Task) -> None:

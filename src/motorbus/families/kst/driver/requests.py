@@ -77,6 +77,10 @@ def read_register(
             return {}
         return {node.node: float(row.to_value(row.decode(reply.data[: row.size])))}
 
+    reply = node.settings.format(
+        sdo.encode_upload_reply(node.node, row.address, row.subindex or 0, bytes(row.size))
+    )
+
     def decode_exact(frame: Data, at: float) -> T | None:
         if type(frame) is not CanFrame or frame.id != reply.id or frame.extended is not reply.extended:
             return None
@@ -85,9 +89,6 @@ def read_register(
         node.at = at
         return take(row.decode(frame.data[SDO_HEAD : SDO_HEAD + row.size]))
 
-    reply = node.settings.format(
-        sdo.encode_upload_reply(node.node, row.address, row.subindex or 0, bytes(row.size))
-    )
     return upload(
         node,
         row,
