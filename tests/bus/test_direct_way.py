@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from typing import Any
 
 import pytest
@@ -15,7 +16,6 @@ from motorbus.core.request import Data, Effect, Request
 from motorbus.core.steps import Emit, Sleep, gather
 from motorbus.errors import LinkError, LinkFull, LinkLost, MotorbusError, UnexpectedReply
 from motorbus.link.base import Delivery, Side
-import contextlib
 
 BEAT = CanFrame(0x702, b"\x05")
 

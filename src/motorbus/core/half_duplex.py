@@ -21,7 +21,7 @@ class HalfDuplexSerial(BusDriver):
 
     window = 1
     full_duplex = False
-    probe_after = 64
+    probe_after = 128
     ids: ClassVar[Sequence[int]] = range(1, 254)  # all ids that a device can have
     delays: ClassVar[Mapping[TimeoutClass, float]] = {
         TimeoutClass.REPLY: 0.005,

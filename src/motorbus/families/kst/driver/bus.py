@@ -58,7 +58,7 @@ class KstDriver:
     window = 16
     """Four to ten nodes in flight fill any CAN bus."""
     full_duplex = False
-    probe_after = 64
+    probe_after = 128
 
     def __init__(self, family: Family, **settings: object) -> None:
         self.family = family
