@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import time
 from typing import Any
 
 import pytest
@@ -160,6 +161,29 @@ def test_a_kept_request_waits_for_a_full_link_each_time(monkeypatch: pytest.Monk
         for times in (2, 1, 1):
             full += [True] * times
             assert servo.position() == here
+
+
+def test_replies_that_wait_for_a_late_host_are_in_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    with motorbus.simulate("feetech", ids="1-6", clock="real") as sim, motorbus.open(sim.url) as bus:
+        servos = [feetech.Servo(bus, node) for node in range(1, 7)]
+        for servo in servos:
+            servo.prepare()
+        read, write = feetech.sync_read_positions(servos), bus.link.write
+        bus.run(read)
+
+        def stall(data: Data) -> None:
+            write(data)
+            time.sleep(0.06)
+
+        monkeypatch.setattr(bus.link, "write", stall)
+
+        async def task() -> Any:
+            return await read
+
+        for _ in range(3):
+            assert bus.run(read).missing == ()
+            assert bus.run(task()).missing == ()
+        assert bus.statistics.other["late"] == 0
 
 
 # -- the worker of an asyncio bus ------------------------------------------------------------------------------

@@ -331,8 +331,8 @@ def test_a_foreign_reply_is_no_answer(engine: Engine, foreign: bytes) -> None:
 
 @pytest.mark.parametrize("way", ["direct", "as a task"])
 @pytest.mark.parametrize("family", ["feetech", "kst"])
-def test_a_copied_reply_passes_for_at_most_64_next_ones(family: str, way: str) -> None:
-    """No byte of a reply tells it from the last one, so after every 64th equal reply its node is probed."""
+def test_a_copied_reply_passes_for_at_most_128_next_ones(family: str, way: str) -> None:
+    """No byte of a reply tells it from the last one, so after every 128th equal reply its node is probed."""
     engine = Engine(family, answer=Servos())
     count = 0
 

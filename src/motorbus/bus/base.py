@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 from pathlib import Path
 from threading import Condition
-from typing import Any
+from typing import Any, Final
 
 from motorbus.bus import failures
 from motorbus.bus.attempt import Attempt
@@ -28,6 +28,10 @@ from motorbus.link.memory import MemoryLink
 
 IDLE = 0.25
 """s; the longest wait for data before the caller looks at its procedure again."""
+
+
+MOST_READS: Final = 64
+"""Reads of what a late host finds, before it takes the rest for late."""
 
 
 class BaseBus:
@@ -257,7 +261,14 @@ class BaseBus:
             return
         try:
             looked = link.now()
+            overdue = looked >= engine.next_deadline()
             chunks = link.read(min(until, engine.next_deadline(), looked + IDLE))
+            for _ in range(
+                MOST_READS if overdue and chunks else 0
+            ):  # the host was late: all that is there is in time
+                if not (more := link.read(-inf)):
+                    break
+                chunks = [*chunks, *more]
             engine.feed(chunks, link.now(), looked)
         except LinkError as error:
             self._fail(self._lost(error), trees)

@@ -10,8 +10,6 @@ common commands it may offer
     say(event)                                                 what an event of its operations says, "" if nothing
     sample(one)                                                what there is to watch of a device without telemetry:
                                                                words by name
-    demo(bus, seconds, picture, output)                        shows what these devices do in so many s, draws a picture
-                                                               of it, and prints what came of it
     as_written(driver, read, withheld, request)                the reply to a request after frames that a dry run has
                                                                withheld, b"" if they make no difference; None: unknown
     meaning(row, raw)                                          what a raw value says in words, where the row cannot tell

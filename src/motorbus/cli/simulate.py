@@ -71,7 +71,7 @@ Examples:
 )
 
 Flag = Annotated[bool, Parameter(negative="")]
-Faults = Annotated[str | None, Parameter(help="What goes wrong: a script, a file or pipe with one, or help.")]
+Faults = Annotated[str | None, Parameter(help="What goes wrong: a script, or a file with one, or help.")]
 Switched = Annotated[
     tuple[str, ...], Parameter(help="NAME=VALUE, how they behave where real ones differ.", negative="")
 ]

@@ -129,16 +129,15 @@ def test_profiles_have_the_values_of_their_sources() -> None:
             one.limit,
             one.current_scale,
             one.nmt,
-            one.report_forms,
             (one.mid_point_value, one.mid_point_wait, one.flash_wait),
         )
         for one in PROFILES.values()
     }
     assert found == {
-        "kst": ("KST", 10, 900, 0.01, "none", (), (0, 0.15, 0.15)),
-        "kst-ext": ("KST", 10, 1000, 0.01, "vendor", ("sdo",), (0, 0.15, 0.15)),
-        "kingmax": ("Kingmax", 10, 1000, 0.01, "vendor", ("sdo",), (0, 0.15, 0.15)),
-        "xqpower": ("XQPOWER", 18, 800, 0.001, "standard", ("sdo", "pdo"), (1, 0.5, 0.15)),
+        "kst": ("KST", 10, 900, 0.01, "none", (0, 0.15, 0.15)),
+        "kst-ext": ("KST", 10, 1000, 0.01, "vendor", (0, 0.15, 0.15)),
+        "kingmax": ("Kingmax", 10, 1000, 0.01, "vendor", (0, 0.15, 0.15)),
+        "xqpower": ("XQPOWER", 18, 800, 0.001, "standard", (1, 0.5, 0.15)),
     }
     for one in PROFILES.values():
         assert (one.table, one.status_row) == (TABLES[one.name], one.table.at(0x6005, 0))

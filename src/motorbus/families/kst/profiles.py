@@ -177,8 +177,7 @@ class Profile:
     `counts_per_degree` is exact. `current_scale` is A per count of the status. `nmt` says how reports (and at XQPOWER
     motion) are started: "none", "vendor" (CAN id = node, `01 00`) or "standard" (CAN id 0, `01 node`). `flash_wait` is
     how long a node is left alone after a save, `mid_point_wait` after a new mid point (s), which is set by writing
-    `mid_point_value`. `report_forms` are the ids on which reports come, of "sdo" (0x580 + node) and "pdo"
-    (0x180 + node); `conflicts` is where sources disagree.
+    `mid_point_value`. `conflicts` is where sources disagree.
     """
 
     table: RegisterMap
@@ -189,7 +188,6 @@ class Profile:
     flash_wait: float = 0.15
     mid_point_value: int = 0
     mid_point_wait: float = 0.15
-    report_forms: tuple[str, ...]
     source: str
     conflicts: str
 
@@ -221,7 +219,6 @@ _KST = Profile(
     table=KST,
     vendor="KST",
     nmt="none",
-    report_forms=(),
     source=f"{MANUAL}; the wait after a save: {FLIGHT}",
     conflicts="the manual has one frame for position (command 6) and status (command 7); it prints CAN ids of four "
     "bytes and calls the frames standard",
@@ -230,7 +227,6 @@ _KST_EXT = replace(
     _KST,
     table=KST_EXT,
     nmt="vendor",
-    report_forms=("sdo",),
     source=f"{FLIGHT}; {DEMO}; the rest: {MANUAL}",
     conflicts="range ±100° where the manual has ±90°; status at 0x6005 where the manual has 0x6002; version at 0x100B "
     "where the manual has 0x100A; the demo driver uses 29-bit ids, the others 11-bit ones",
@@ -251,7 +247,6 @@ _XQPOWER = replace(
     nmt="standard",
     mid_point_value=1,
     mid_point_wait=0.5,
-    report_forms=("sdo", "pdo"),
     source=f"{XQPOWER_DRIVER}; node id, bit rate, save and version are taken over from the {MANUAL}",
     conflicts="18 counts per degree and 1 mA where the others have 10 and 0.01 A; position writes are ignored until "
     "it has been started; the firmware driver writes everything by 0x22, the tools 0x2200 and 0x3009 with a length",

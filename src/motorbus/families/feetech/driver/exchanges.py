@@ -41,10 +41,6 @@ T = TypeVar("T")
 
 PRESENT: Final = 56
 """Where feedback begins in every map: the present position."""
-LAST: Final = 255
-"""The highest address of a register."""
-MOST: Final = 253
-"""Bytes of data in a status packet at most."""
 ACKNOWLEDGED: Final = wire.OVERHEAD
 """Bytes of a status packet without parameters, which answers PING and every write."""
 settings_of_now: Final = attrgetter("settings")

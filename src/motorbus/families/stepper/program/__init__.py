@@ -21,7 +21,6 @@ from motorbus.families.stepper.execution import USUAL, Behaviour
 from motorbus.families.stepper.program import dumps, text
 from motorbus.families.stepper.program.lint import RULES, USUALLY, Conditions, Finding, Rule, lint, net_units
 from motorbus.families.stepper.program.plan import Estimate, Plan, StepPlan, duration, estimate, plan
-from motorbus.families.stepper.program.schema import schema
 from motorbus.families.stepper.program.source import read
 from motorbus.families.stepper.table import BLANK, Order, Project, encode_image
 
@@ -125,5 +124,4 @@ __all__ = [
     "lint",
     "net_units",
     "plan",
-    "schema",
 ]
