@@ -183,7 +183,7 @@ def _commands() -> Iterator[str]:
 def _aborts() -> Iterator[str]:
     yield "## Abort codes\n"
     yield "A servo refuses a request with one of these codes. `motorbus decode` explains each:"
-    yield f"`{DECODE_TESTS}::test_abort_code_is_decoded_in_both_byte_orders`. The simulator sends 13 of them:"
+    yield f"`{DECODE_TESTS}::test_abort_code_is_decoded_in_both_byte_orders`. The simulator sends 12 of them:"
     yield f"`{MANUAL_TESTS}::test_servo_sends_abort_codes_of_the_list`.\n"
     yield from listed(("code", "meaning"), [[f"0x{code:08X}", text] for code, text in ABORTS.items()])
 

@@ -30,8 +30,8 @@ IDLE = 0.25
 """s; the longest wait for data before the caller looks at its procedure again."""
 
 
-MOST_READS: Final = 64
-"""Reads of what a late host finds, before it takes the rest for late."""
+DRAIN: Final = 0.005
+"""s for which a late host reads what is there before it takes the rest for late; a link that waits takes longer."""
 
 
 class BaseBus:
@@ -263,11 +263,9 @@ class BaseBus:
             looked = link.now()
             overdue = looked >= engine.next_deadline()
             chunks = link.read(min(until, engine.next_deadline(), looked + IDLE))
-            for _ in range(
-                MOST_READS if overdue and chunks else 0
-            ):  # the host was late: all that is there is in time
-                if not (more := link.read(-inf)):
-                    break
+            more = chunks
+            while overdue and more and link.now() < looked + DRAIN:
+                more = link.read(-inf)
                 chunks = [*chunks, *more]
             engine.feed(chunks, link.now(), looked)
         except LinkError as error:
