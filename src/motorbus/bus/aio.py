@@ -49,7 +49,7 @@ class AsyncBus(BaseBus):
         """Let the worker of this bus run the procedure."""
         if self.link.virtual:
             self.check_thread()
-            worker: _Worker | _Pump = _Pump.of_loop()
+            worker: _Worker | _LoopWorker = _LoopWorker.of_loop()
         else:
             worker = self._worker = self._worker or _Worker(self.settled)
         call = Call(self, procedure, report)
@@ -57,7 +57,7 @@ class AsyncBus(BaseBus):
         return call
 
     def _drop(self) -> None:
-        self._hang_up()
+        self._close_port()
         if self._worker is not None:
             self._worker.end()
 
@@ -83,15 +83,16 @@ class Owned:
 
 
 class Call:
-    """A procedure that a worker runs; `ended` is set in the loop. `requests` are for the worker: errors to cancel it
-    with, None to drop it.
+    """A procedure that a worker runs; `ended` is set in the loop.
+
+    `cancellations` are errors with which the worker cancels it, None to end it where it stands.
     """
 
     def __init__(self, bus: AsyncBus, procedure: Runnable[Any], report: Notify | None) -> None:
         self.bus = bus
         self.loop = asyncio.get_running_loop()
         self.ended: asyncio.Future[None] = self.loop.create_future()
-        self.requests: deque[BaseException | None] = deque()
+        self.cancellations: deque[BaseException | None] = deque()
         observer = report or bus.report
         if observer is not None and not bus.link.virtual:
             observer = partial(_call_in, self.loop, observer)
@@ -104,17 +105,17 @@ class Call:
         with self.bus.settled:
             self.bus.settled.notify_all()
 
-    def ask(self, request: BaseException | None) -> None:
+    def request_end(self, request: BaseException | None) -> None:
         """Cancel the procedure with this error; None: end it where it stands."""
-        self.requests.append(request)
+        self.cancellations.append(request)
         self.wake()
 
-    def obey(self) -> None:
+    def end_as_requested(self) -> None:
         """Carry out what was asked; the caller has the turn."""
         if self.loop.is_closed() and self.tree.cancellation is None:
             self.tree.cancel(asyncio.CancelledError())
-        while self.requests:
-            error = self.requests.popleft()
+        while self.cancellations:
+            error = self.cancellations.popleft()
             if error is not None:
                 self.tree.cancel(error)
             elif not self.tree.finished:
@@ -138,10 +139,10 @@ async def _finish(calls: Iterable[Call]) -> None:
                     error = next(filter(None, (call.tree.foreign_error() for call in ended)), None)
             if error is not None:
                 for call in calls:
-                    call.ask(error)
+                    call.request_end(error)
     except BaseException:  # the coroutine was closed: nothing is sent any more
         for call in calls:
-            call.ask(None)
+            call.request_end(None)
         raise
     if cancellation is not None and all(call.tree.cancellation is None for call in calls):
         raise cancellation  # all had ended before
@@ -227,17 +228,17 @@ def _set_result(future: asyncio.Future[None]) -> None:
         future.set_result(None)
 
 
-class _Pump:
+class _LoopWorker:
     """A task of the loop that runs the procedures of all its buses in virtual time."""
 
-    _of: Final[WeakKeyDictionary[asyncio.AbstractEventLoop, _Pump]] = WeakKeyDictionary()
+    _of: Final[WeakKeyDictionary[asyncio.AbstractEventLoop, _LoopWorker]] = WeakKeyDictionary()
 
     def __init__(self) -> None:
         self._calls: list[Call] = []
         self._task: asyncio.Task[None] | None = None
 
     @classmethod
-    def of_loop(cls) -> _Pump:
+    def of_loop(cls) -> _LoopWorker:
         """That of the running loop."""
         return cls._of.setdefault(asyncio.get_running_loop(), cls())
 

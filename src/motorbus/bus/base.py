@@ -76,7 +76,7 @@ class BaseBus:
         """Subscribe to what devices send without a request."""
         self.positions: Mapping[int, Reading] = self.engine.nodes
         """The last request that read a position and its reply, by node."""
-        self.lock = self.turn = Turn()
+        self.turn = Turn()
         """Held while a request is in flight, or the state of this bus is read or changed as a whole."""
         self.settled = Condition()
         """Notified when something ends that a sleeping thread waits for."""
@@ -101,7 +101,7 @@ class BaseBus:
             warnings.warn(f"{self!r} was not closed", ResourceWarning, source=self, stacklevel=2)
 
     def _drop(self) -> None:
-        self._hang_up()
+        self._close_port()
 
     @property
     def family(self) -> Family:
@@ -427,7 +427,7 @@ class BaseBus:
         """Take the latch off. Nothing is sent and nothing moves."""
         self.engine.reset()
 
-    def _hang_up(self) -> None:
+    def _close_port(self) -> None:
         """End the stop thread, then give the port back."""
         self._open = False
         self.stopper.close()

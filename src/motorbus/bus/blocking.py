@@ -109,7 +109,7 @@ class Bus(BaseBus):
                 engine.check(order, since, since, now)
             except MotorbusError:  # the general path says so
                 return None
-            engine.lead(order, now)
+            engine.begin_order(order, now)
             wire = order.wire + wire
         if request.priority is Priority.STOP:
             engine.note_stop(request)
@@ -164,7 +164,7 @@ class Bus(BaseBus):
         part = Part(self)
         tree = part.add(procedure, since=since)
         if attempt is not None:
-            tree.adopt(attempt)
+            tree.continue_from(attempt)
             self.hand_over()
         return part, tree
 
@@ -182,7 +182,7 @@ class Bus(BaseBus):
 
     def close(self) -> None:
         """Give the port back. Nothing is sent: devices keep doing what they were ordered."""
-        self._hang_up()
+        self._close_port()
         if self._defers_signals:
             self._defers_signals = False
             INTERRUPTS.uninstall()

@@ -104,7 +104,7 @@ class Part:
             for tree in self.trees:
                 tree.cancel(error)
         for call in self.calls:
-            call.obey()
+            call.end_as_requested()
         stepped = self._stepped
         while True:
             for tree in stepped:
@@ -167,7 +167,7 @@ class Part:
         return (
             bool(self.inbox or self.cancellations)
             or any(tree.ready for tree in self.trees)
-            or any(call.requests for call in self.calls)
+            or any(call.cancellations for call in self.calls)
         )
 
 

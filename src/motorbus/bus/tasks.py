@@ -493,7 +493,7 @@ class Tree(Generic[T]):
         else:
             self._decode(task, request, attempt.accepted)
 
-    def adopt(self, attempt: Attempt) -> None:
+    def continue_from(self, attempt: Attempt) -> None:
         """The procedure is a request whose first attempt is on the wire, or has failed."""
         task = self.root
         self.ready.clear()
