@@ -216,6 +216,7 @@ def _advance(
         for call in calls:
             call.tree.drop()
             call.tree.cancellation = error
+        part.finished = True
     ended = [call for call in calls if call.tree.finished]
     calls[:] = [call for call in calls if not call.tree.finished]
     part.trees = [call.tree for call in calls]
@@ -266,7 +267,7 @@ class _LoopWorker:
                 _set_result(call.ended)
             self._calls.clear()
             for part in parts.values():
-                part.trees = []
+                part.finished = True
                 part.release_turn()
 
     def _step(self, parts: dict[BaseBus, Part]) -> None:

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from motorbus.bus import failures
 from motorbus.bus.attempt import Attempt
-from motorbus.bus.engine import Engine
+from motorbus.bus.engine import DIRECT, Engine
 from motorbus.bus.interlock import Interlock
 from motorbus.bus.nodes import Reading
 from motorbus.bus.stop import EmergencyStop
@@ -30,8 +30,8 @@ IDLE = 0.25
 """s; the longest wait for data before the caller looks at its procedure again."""
 
 
-DRAIN: Final = 0.005
-"""s for which a late host reads what is there before it takes the rest for late; a link that waits takes longer."""
+DRAIN: Final = 32
+"""Reads by which a late host takes what is there before it takes the rest for late."""
 
 
 class BaseBus:
@@ -261,12 +261,15 @@ class BaseBus:
             return
         try:
             looked = link.now()
-            overdue = looked >= engine.next_deadline()
-            chunks = link.read(min(until, engine.next_deadline(), looked + IDLE))
-            more = chunks
-            while overdue and more and link.now() < looked + DRAIN:
-                more = link.read(-inf)
+            deadline = engine.next_deadline()
+            overdue = looked >= deadline
+            chunks = link.read(min(until, deadline, looked + IDLE))
+            reads = (
+                0 if not overdue else DRAIN if engine.latency < DIRECT else 1
+            )  # an adapter gives all at once
+            while reads and chunks and (more := link.read(-inf)):
                 chunks = [*chunks, *more]
+                reads -= 1
             engine.feed(chunks, link.now(), looked)
         except LinkError as error:
             self._fail(self._lost(error), trees)

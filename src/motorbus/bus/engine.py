@@ -157,7 +157,10 @@ class Engine:
 
     def next_deadline(self) -> float:
         """The next moment (s) at which an attempt in flight ends; inf when there is none."""
-        return min([attempt.deadline for attempt in self.in_flight.values()], default=inf)
+        deadline = inf
+        for attempt in self.in_flight.values():
+            deadline = min(deadline, attempt.deadline)
+        return deadline
 
     # -- what may leave ----------------------------------------------------------------------------------------
 

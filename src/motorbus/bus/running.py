@@ -61,6 +61,8 @@ class Part:
         self.inbox = inbox
         self.calls: Sequence[Any] = ()
         self.trees: list[Tree[Any]] = []
+        self.finished = True
+        """Every procedure had ended after the last `advance`."""
         self.is_sleeping = self.holds_turn = self.blocked = False
         self.sends_at = inf
         self.cancellations: list[BaseException] = []
@@ -77,12 +79,8 @@ class Part:
             since=since,
         )
         self.trees.append(tree)
+        self.finished = False
         return tree
-
-    @property
-    def finished(self) -> bool:
-        """Every procedure has ended."""
-        return all(tree.finished for tree in self.trees)
 
     def wake(self) -> None:
         """End `_sleep`; from any thread."""
@@ -109,6 +107,7 @@ class Part:
         while True:
             for tree in stepped:
                 tree.advance()
+            self.finished = all(tree.finished for tree in self.trees)
             if self.finished:
                 self.release_turn()
                 return True
@@ -131,19 +130,17 @@ class Part:
 
         A tree that waits for a notice keeps it until another thread wants it.
         """
+        if not self.holds_turn:
+            return
         engine = self.bus.engine
-        free = (
-            self.is_idle
-            and engine.exclusive is None
-            and (not engine.notification_handlers or self.bus.turn.wanted)
-        )
-        if self.holds_turn and (free or self.finished or self.bus.waits_for_stop):
+        waits = engine.exclusive is not None or (engine.notification_handlers and not self.bus.turn.wanted)
+        if self.finished or self.bus.waits_for_stop or (not waits and self.is_idle):
             self.holds_turn = False
             self.bus.turn.release()
 
     def next_moment(self) -> float:
         """When (s) a tree can go on by itself, or more may be sent."""
-        return min([self.sends_at, *[tree.next_moment() for tree in self._stepped]])
+        return min(self.sends_at, *[tree.next_moment() for tree in self._stepped])
 
     def wait(self) -> None:
         """Wait for data, a deadline, or the next moment of a tree; without the turn sleep for at most `IDLE`."""

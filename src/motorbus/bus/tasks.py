@@ -223,7 +223,10 @@ class Tree(Generic[T]):
         """The moment (s) at which `advance` has something to do by itself; inf when there is none."""
         if self.finished:
             return inf
-        return min([self.deadline, *(timer.until for timer in self.timers)])
+        moment = self.deadline
+        for timer in self.timers:
+            moment = min(moment, timer.until)
+        return moment
 
     def result(self) -> T:
         """What the procedure returned; raises its error, or the cancellation."""
