@@ -12,7 +12,8 @@ import signal
 from collections import deque
 from collections.abc import Callable, Coroutine, Iterable, Mapping
 from functools import partial
-from threading import Condition, Thread
+from queue import SimpleQueue
+from threading import Thread
 from typing import Any, Final, Self, TypeVar
 from weakref import WeakKeyDictionary
 
@@ -51,8 +52,8 @@ class AsyncBus(BaseBus):
             self.check_thread()
             worker: _Worker | _LoopWorker = _LoopWorker.of_loop()
         else:
-            worker = self._worker = self._worker or _Worker(self.settled)
-        call = Call(self, procedure, report)
+            worker = self._worker = self._worker or _Worker()
+        call = Call(self, procedure, report, worker.wake)
         worker.add(call)
         return call
 
@@ -88,8 +89,11 @@ class Call:
     `cancellations` are errors with which the worker cancels it, None to end it where it stands.
     """
 
-    def __init__(self, bus: AsyncBus, procedure: Runnable[Any], report: Notify | None) -> None:
+    def __init__(
+        self, bus: AsyncBus, procedure: Runnable[Any], report: Notify | None, wake: Callable[[], None]
+    ) -> None:
         self.bus = bus
+        self.wake = wake
         self.loop = asyncio.get_running_loop()
         self.ended: asyncio.Future[None] = self.loop.create_future()
         self.cancellations: deque[BaseException | None] = deque()
@@ -97,13 +101,8 @@ class Call:
         if observer is not None and not bus.link.virtual:
             observer = partial(_call_in, self.loop, observer)
         self.tree: Tree[Any] = Tree(
-            bus.engine, procedure, now=bus.link.now, report=bus.event_sink(observer), wake=self.wake
+            bus.engine, procedure, now=bus.link.now, report=bus.event_sink(observer), wake=wake
         )
-
-    def wake(self) -> None:
-        """Let the worker look at it."""
-        with self.bus.settled:
-            self.bus.settled.notify_all()
 
     def request_end(self, request: BaseException | None) -> None:
         """Cancel the procedure with this error; None: end it where it stands."""
@@ -163,8 +162,8 @@ async def run_on(procedures: Mapping[AsyncBus, Runnable[Any]]) -> dict[AsyncBus,
 class _Worker:
     """A thread that runs the procedures of one bus, which it keeps alive only while it has some."""
 
-    def __init__(self, settled: Condition) -> None:
-        self._settled = settled
+    def __init__(self) -> None:
+        self._wakes: SimpleQueue[None] = SimpleQueue()
         self._inbox: deque[Call] = deque()
         self._ended = False
         Thread(target=self._work, name="motorbus asyncio", daemon=True).start()
@@ -172,26 +171,30 @@ class _Worker:
     def add(self, call: Call) -> None:
         """Run this procedure, beside those that run."""
         self._inbox.append(call)
-        call.wake()
+        self.wake()
+
+    def wake(self) -> None:
+        """Let the thread look at its procedures; from any thread."""
+        if self._wakes.empty():
+            self._wakes.put(None)
 
     def end(self) -> None:
         """Let the thread end when its procedures have."""
-        with self._settled:
-            self._ended = True
-            self._settled.notify_all()
+        self._ended = True
+        self.wake()
 
     def _work(self) -> None:
         while True:
-            with self._settled:
-                self._settled.wait_for(lambda: self._inbox or self._ended)
+            while not (self._inbox or self._ended):
+                self._wakes.get()
             if not self._inbox:
                 return
-            _serve(self._inbox)
+            _serve(self._inbox, self._wakes)
 
 
-def _serve(inbox: deque[Call]) -> None:
+def _serve(inbox: deque[Call], wakes: SimpleQueue[None]) -> None:
     """Run procedures of one bus until all have ended; the last of them is reported when nothing here holds the bus."""
-    part: Part | None = Part(inbox[0].bus, inbox)
+    part: Part | None = Part(inbox[0].bus, inbox, wakes)
     calls: list[Call] = []
     while part is not None:
         ended = _advance(part, inbox, calls)
@@ -248,6 +251,9 @@ class _LoopWorker:
         self._calls.append(call)
         if self._task is None:
             self._task = call.loop.create_task(self._work())
+
+    def wake(self) -> None:
+        """It looks at its procedures in every turn of the loop."""
 
     async def _work(self) -> None:
         parts: dict[BaseBus, Part] = {}

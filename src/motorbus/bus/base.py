@@ -7,7 +7,6 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 from pathlib import Path
-from threading import Condition
 from typing import Any, Final
 
 from motorbus.bus import failures
@@ -78,8 +77,6 @@ class BaseBus:
         """The last request that read a position and its reply, by node."""
         self.turn = Turn()
         """Held while a request is in flight, or the state of this bus is read or changed as a whole."""
-        self.settled = Condition()
-        """Notified when something ends that a sleeping thread waits for."""
         self.stopper = EmergencyStop(self, stop_socket)
         self.engine.interlock = interlock
         self.engine.before_motion = self._start_stopper

@@ -6,6 +6,7 @@ import contextlib
 import time
 from collections.abc import Collection, Mapping, Sequence
 from math import inf
+from queue import Empty, SimpleQueue
 from typing import Any, Final, TypeVar
 
 from motorbus.bus.base import IDLE, BaseBus, check_clocks
@@ -52,18 +53,21 @@ class Part:
     """The procedures of this thread on one bus. `blocked`: another thread had the turn of the bus.
 
     `sends_at` is when (s) more may be sent. `cancellations` are thrown into the trees when this thread has the turn.
-    `calls` are those of a worker, `inbox` its next ones.
+    `calls` are those of a worker, `inbox` its next ones. An entry of `wakes` ends a sleep.
     """
 
-    def __init__(self, bus: BaseBus, inbox: Collection[Any] = ()) -> None:
+    def __init__(
+        self, bus: BaseBus, inbox: Collection[Any] = (), wakes: SimpleQueue[None] | None = None
+    ) -> None:
         bus.check_thread()
         self.bus = bus
         self.inbox = inbox
+        self.wakes: SimpleQueue[None] = wakes or SimpleQueue()
         self.calls: Sequence[Any] = ()
         self.trees: list[Tree[Any]] = []
         self.finished = True
         """Every procedure had ended after the last `advance`."""
-        self.is_sleeping = self.holds_turn = self.blocked = False
+        self.holds_turn = self.blocked = False
         self.sends_at = inf
         self.cancellations: list[BaseException] = []
 
@@ -84,9 +88,8 @@ class Part:
 
     def wake(self) -> None:
         """End `_sleep`; from any thread."""
-        if self.is_sleeping:
-            with self.bus.settled:
-                self.bus.settled.notify_all()
+        if self.wakes.empty():
+            self.wakes.put(None)
 
     def advance(self, timeout: float) -> bool:
         """Step the trees and send; True when all have ended.
@@ -153,12 +156,9 @@ class Part:
 
     def _sleep(self, seconds: float) -> None:
         """Sleep this long, or until something that a tree waits for has ended."""
-        with self.bus.settled:
-            self.is_sleeping = True
-            try:
-                self.bus.settled.wait_for(self._can_advance, max(0.0, seconds))
-            finally:
-                self.is_sleeping = False
+        if not self._can_advance():
+            with contextlib.suppress(Empty):
+                self.wakes.get(timeout=max(0.0, seconds))
 
     def _can_advance(self) -> bool:
         return (
