@@ -10,11 +10,13 @@ import socket
 from collections.abc import Callable, Iterator
 from select import select
 from threading import Event, Thread
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
 from motorbus.core.request import Data
-from motorbus.link.can import CanLink
+from motorbus.link import url
+from motorbus.link.can import PythonCanLink
+from motorbus.link.slcan import SlcanLink
 from motorbus.simulation.adapter import Adapter
 from motorbus.simulation.pty import PtyMaster
 from motorbus.simulation.slcan import SlcanAdapter
@@ -202,11 +204,13 @@ def socketcand_server() -> Iterator[Peer]:
         yield peer
 
 
+CanLink: TypeAlias = PythonCanLink | SlcanLink
+
+
 def open_can(peer: Peer | str, rate: int = 0, **options: object) -> CanLink:
     """As a session opens it."""
-    return CanLink(
-        peer if isinstance(peer, str) else peer.url, rate=rate, default_rate=500_000, options=options
-    )
+    port = peer if isinstance(peer, str) else peer.url
+    return url.open_can(port, rate=rate, default_rate=500_000, options=options)
 
 
 def some(link: CanLink, count: int = 1, seconds: float = 30.0) -> list[Data]:

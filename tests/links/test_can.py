@@ -14,11 +14,12 @@ import pytest
 
 from motorbus.core.can_frame import ERROR_FLAG, CanFrame
 from motorbus.errors import LinkError, LinkFull, LinkLost, PortBusy, PortNotFound, RequestError
-from motorbus.link.can import BUS_OFF, CanLink, kernel_queue
+from motorbus.link.can import BUS_OFF, kernel_queue
 from tests.links.can_peer import (
     LONG_PING,
     PING,
     PONG,
+    CanLink,
     Peer,
     on_terminal,
     open_can,
@@ -166,11 +167,11 @@ def test_remote_error_and_fd_frames() -> None:
     ("url", "error", "words"),
     [
         ("can://slcan/dev/no-such-adapter", PortNotFound, "there is no such port"),
-        ("can://socketcand/127.0.0.1", RequestError, "HOST:PORT/CHANNEL"),
+        ("can://socketcand/127.0.0.1", RequestError, "does not name an interface and its channel"),
         ("can://pcan/PCAN_USBBUS1", LinkError, "driver of pcan is missing"),
         ("can://gs_usb/0", LinkError, r'pip install "python-can\[gs-usb\]"'),
         ("can://slcam/dev/ttyACM0", RequestError, "has no interface 'slcam'"),
-        ("can:///can0", RequestError, "the interface is missing"),
+        ("can:///can0", RequestError, "does not name an interface"),
     ],
 )
 def test_channels_that_cannot_be_opened(url: str, error: type[Exception], words: str) -> None:

@@ -102,8 +102,7 @@ def test_an_unplugged_adapter_is_a_lost_link() -> None:
     link.close()
 
 
-@pytest.mark.parametrize(("at", "options"), [("@abc", {}), ("", {"tty_baudrate": "fast"}), ("@0", {})])
-def test_a_rate_that_is_no_number_is_refused_in_words(at: str, options: dict[str, Any]) -> None:
-    with on_terminal() as peer, pytest.raises(RequestError, match="not a rate of the serial line") as caught:
-        open_can(f"{peer.url}{at}", **options)
-    assert "tty_baudrate=1000000" in str(caught.value)
+@pytest.mark.parametrize("baud", ["@abc", "@0"])
+def test_a_rate_that_is_no_number_is_refused_in_words(baud: str) -> None:
+    with on_terminal() as peer, pytest.raises(RequestError, match="not a rate of the serial line"):
+        open_can(f"{peer.url}{baud}")
