@@ -13,16 +13,10 @@ from motorbus.link.lock import holders
 from motorbus.link.serial import SerialLink, ports
 from motorbus.link.stream import wait_any
 from motorbus.simulation.pty import PtyMaster
-from tests.links.other import other_process, run
+from tests.links.other import HOLD_OPEN, other_process, run
 from tests.links.usb import usb_port
 
 PING = bytes.fromhex("ff ff 01 02 01 fb")
-HOLD_OPEN = """
-import os, sys
-held = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
-print("ready", flush=True)
-sys.stdin.read()
-"""
 HOLD_LINK = """
 import sys
 from motorbus.link.serial import SerialLink
