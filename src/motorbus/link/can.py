@@ -53,6 +53,7 @@ _KERNEL_ERRORS: Final = ("socketcan", "socketcand")
 _IDENTIFIER: Final = ERROR_FLAG - 1
 _FULL: Final = (errno.ENOBUFS, errno.EAGAIN)
 _FULL_TEXTS: Final = ("full", "overflow", "could not send message to one or more")
+_SWITCHES: Final[Mapping[object, bool]] = {"yes": True, "on": True, "no": False, "off": False}
 LISTEN_ONLY: Final[Mapping[str, Mapping[str, Any]]] = {
     "slcan": {},  # by a command
     "socketcan": {},  # by the kernel
@@ -143,9 +144,11 @@ def python_can(port: str) -> ModuleType:
 class CanLink:
     """An open CAN channel; a subclass opens it in `configure` and closes it in `shut`.
 
-    `lock_name`, `device` and `no_wire` are those of `CanAddress`; `is_locked`: nothing else may use the channel.
-    `queue` is the number of frames that it takes at once, 0 if unknown. Raises PortBusy, LinkError for a mode that the
-    adapter does not have, and what `configure` raises.
+    `options` are `listen_only` (yes, no) and what the subclass knows. `shared`: the caller takes part beside a host of
+    this machine, as simulated devices do, so SocketCAN is not locked. Other arguments are those of `open_link`.
+    `lock_name`, `device` and `no_wire` are those of `CanAddress`. `queue` is the number of frames that the adapter
+    takes at once, 0 if unknown. Raises RequestError for a bad option, PortNotFound, PortBusy, or LinkError: for a rate
+    or mode that the adapter does not have, a missing driver, a refusal.
     """
 
     paced = False  # adapters do not report when a frame was on the wire
@@ -159,27 +162,42 @@ class CanLink:
     def __init__(
         self,
         address: CanAddress,
-        rate: int,
         *,
-        listen_only: bool,
+        rate: int = 0,
+        default_rate: int = 0,
+        options: Mapping[str, object] | None = None,
+        shared: bool = False,
         lock: PortLock | None = None,
-        is_locked: bool = True,
+        connect_time: float | None = None,
     ) -> None:
         self.name = address.name
         self.address = address
         self.no_wire, self.lock_name, self.device = address.no_wire, address.lock_name, address.device
-        self.rate, self.listen_only = rate, listen_only
+        self.options = {name: _SWITCHES.get(value, value) for name, value in (options or {}).items()}
+        self.connect_time = connect_time
+        listen_only = self.options.pop("listen_only", False)
+        if not isinstance(listen_only, bool):
+            raise RequestError(f"listen_only={listen_only}: neither yes nor no", expected="yes or no")
+        self.rate, self.listen_only = rate or default_rate, listen_only
+        if self.rate <= 0:
+            raise RequestError(
+                f"{self.name}: the bit rate is missing", expected="bitrate=500000, for example"
+            )
         self._check_mode(listen_only)
-        with opening(self.lock_name, lock) if is_locked else nullcontext(PortLock(self.name)) as self.lock:
+        is_kernel = address.interface == "socketcan"
+        if is_kernel:
+            self._check_kernel(rate)
+        is_free = not self.lock_name or (shared and is_kernel)
+        with nullcontext(PortLock(self.name)) if is_free else opening(self.lock_name, lock) as self.lock:
             self.open_port()
             try:
-                self.configure(rate, listen_only)
+                self.configure(self.rate, listen_only)
             except BaseException:
                 self.shut()
                 raise
 
     def open_port(self) -> None:
-        """Open the port of the adapter, where it has one apart from its channel."""
+        """Prepare for `configure`: open the serial port of the adapter, where that is apart from its channel."""
 
     def configure(self, rate: int, listen_only: bool) -> None:
         """Open the channel again, at this rate in bit/s. Raises LinkError for a rate or mode that it refuses."""
@@ -201,6 +219,14 @@ class CanLink:
                 expected=f"listen_only with one of {', '.join(LISTEN_ONLY)}",
                 advice="leave out listen_only where nothing else is on the bus",
             )
+
+    def _check_kernel(self, rate: int) -> None:
+        """Take over the settings of a SocketCAN interface. Raises LinkError where they are not this rate and mode."""
+        self.queue = kernel_queue(self.address.channel)
+        actual = kernel_rate(self.address, rate, self.listen_only)
+        if actual is None:
+            self.warnings = (f"the kernel did not tell the bit rate; {self.rate} bit/s is assumed",)
+        self.rate = actual or self.rate
 
     def write(self, data: Data) -> None:
         assert isinstance(data, CanFrame)
@@ -241,29 +267,17 @@ class CanLink:
 
 
 class PythonCanLink(CanLink):
-    """A channel of python-can; `options` are arguments of `can.Bus`. `rate` is 0 when not given.
+    """A channel of python-can; `options` are arguments of `can.Bus`.
 
-    `shared`: the caller takes part beside a host of this machine, as simulated devices do, so SocketCAN is not locked.
-    `read` waits in short slices, so that another thread can close the link. Raises RequestError for an unknown
-    interface or option, PortNotFound, PortBusy, LinkError.
+    `read` waits in short slices, so that another thread can close the link.
     """
 
-    def __init__(
-        self,
-        address: CanAddress,
-        rate: int,
-        default_rate: int,
-        options: Mapping[str, object],
-        *,
-        listen_only: bool,
-        shared: bool = False,
-        lock: PortLock | None = None,
-    ) -> None:
-        interface = address.interface
-        self._settings = {**options, **address.options}
-        self._can: Any = python_can(address.name)
-        self._bus: Any = None
-        self._descriptor: int | None = None
+    _bus: Any = None
+    _descriptor: int | None = None
+
+    def open_port(self) -> None:
+        interface = self.address.interface
+        self._can: Any = python_can(self.name)
         self._access = Lock()
         self._waits = interface in _WAITING  # so a read takes one frame
         if interface in SHARED:
@@ -272,20 +286,11 @@ class PythonCanLink(CanLink):
             self.latency += SERIAL_WAIT
             wait = f"waits up to {1000 * SERIAL_WAIT:.0f} ms for a frame, so requests are slow"
             self.warnings = (f"python-can's {interface} {wait}",)
-        if interface == "socketcan":
-            self.queue = kernel_queue(address.channel)
-            actual = kernel_rate(address, rate, listen_only)
-            if actual is None:
-                self.warnings = (f"the kernel did not tell the bit rate; {rate or default_rate} is assumed",)
-            rate = actual or rate
-        is_locked = interface not in SHARED and not (shared and interface == "socketcan")
-        super().__init__(
-            address, rate or default_rate, listen_only=listen_only, lock=lock, is_locked=is_locked
-        )
 
     def configure(self, rate: int, listen_only: bool) -> None:
         self.shut()
-        address, settings = self.address, dict(self._settings)
+        address = self.address
+        settings = {**self.options, **address.options}
         if address.sets_rate and "f_clock" not in settings:  # a bit timing of python-can
             settings["bitrate"] = rate
         if listen_only:

@@ -15,7 +15,7 @@ from motorbus.core import units
 from motorbus.core.can_frame import REMOTE_FLAG, CanFrame
 from motorbus.core.request import Data
 from motorbus.errors import LinkError, RequestError
-from motorbus.link.can import CanAddress, CanLink
+from motorbus.link.can import CanLink
 from motorbus.link.errors import full
 from motorbus.link.lock import PortLock
 from motorbus.link.serial import open_stream
@@ -134,27 +134,19 @@ class SlcanLink(CanLink):
     come later than `FIRST_REPLY` is used as one without replies: what it refuses is not noticed.
     """
 
-    def __init__(
-        self,
-        address: CanAddress,
-        rate: int,
-        *,
-        listen_only: bool,
-        lock: PortLock | None = None,
-        connect_time: float | None = None,
-    ) -> None:
-        self._connect_time = connect_time
-        self._codec = SlcanCodec()
-        self._reported = 0, 0
-        self._unfinished = False
-        """A line was sent in part. It must not become a frame later, so `CANCEL` is sent after it."""
-        super().__init__(address, rate, listen_only=listen_only, lock=lock)
+    _reported = 0, 0
+    _unfinished = False
+    """A line was sent in part. It must not become a frame later, so `CANCEL` is sent after it."""
 
     def open_port(self) -> None:
+        if self.options:
+            name = next(iter(self.options))
+            raise RequestError(f"{self.name}: slcan has no option {name!r}", expected="listen_only")
+        self._codec = SlcanCodec()
         port, _, text = self.address.channel.partition("@")
         baud = _read_baud(self.name, text or DEFAULT_BAUD)
         lock = PortLock(port)  # not acquired: this link has locked the port
-        self._stream = stream = open_stream(port, rate=baud, lock=lock, connect_time=self._connect_time)
+        self._stream = stream = open_stream(port, rate=baud, lock=lock, connect_time=self.connect_time)
         self.latency, self.warnings, self.fileno = stream.latency, stream.warnings, stream.fileno
         if stream.paced:  # one line each way on the serial line; adapters with their own USB are faster
             self.latency += 2 * LINE_BITS / baud

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from motorbus.errors import RequestError
 from motorbus.link.base import Link
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 SERIAL_PORTS = "a device such as /dev/ttyACM0 or COM7, socket://HOST:PORT or rfc2217://HOST:PORT"
 CAN_CHANNELS = "can://INTERFACE/CHANNEL, as can://slcan/dev/ttyACM0 or can://socketcan/can0"
-SWITCHES: Final[Mapping[object, bool]] = {"yes": True, "on": True, "no": False, "off": False}
 
 
 def open_link(
@@ -66,36 +65,10 @@ def open_link(
     return link
 
 
-def open_can(
-    port: str,
-    *,
-    rate: int = 0,
-    default_rate: int = 0,
-    options: Mapping[str, object] | None = None,
-    shared: bool = False,
-    lock: PortLock | None = None,
-    connect_time: float | None = None,
-) -> PythonCanLink | SlcanLink:
-    """Open a CAN channel. `options` are `listen_only` and arguments of `can.Bus`; `shared`: see `PythonCanLink`.
-
-    Other arguments and errors as for `open_link`.
-    """
+def open_can(port: str, **settings: Any) -> PythonCanLink | SlcanLink:
+    """Open a CAN channel; `settings` and errors are those of `CanLink`."""
     from motorbus.link.can import PythonCanLink, read_address
     from motorbus.link.slcan import SlcanLink
 
     address = read_address(port)
-    given = {name: SWITCHES.get(value, value) for name, value in (options or {}).items()}
-    listen_only = given.pop("listen_only", False)
-    if not isinstance(listen_only, bool):
-        raise RequestError(f"listen_only={listen_only}: neither yes nor no", expected="yes or no")
-    if rate <= 0 and default_rate <= 0:
-        raise RequestError(f"{port}: the bit rate is missing", expected="bitrate=500000, for example")
-    if address.interface != "slcan":
-        return PythonCanLink(
-            address, rate, default_rate, given, listen_only=listen_only, shared=shared, lock=lock
-        )
-    if given:
-        raise RequestError(f"{port}: slcan has no option {next(iter(given))!r}", expected="listen_only")
-    return SlcanLink(
-        address, rate or default_rate, listen_only=listen_only, lock=lock, connect_time=connect_time
-    )
+    return (SlcanLink if address.interface == "slcan" else PythonCanLink)(address, **settings)
