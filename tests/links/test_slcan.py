@@ -102,6 +102,16 @@ def test_an_unplugged_adapter_is_a_lost_link() -> None:
     link.close()
 
 
+def test_s7_means_two_rates_so_it_is_not_used() -> None:
+    with on_terminal() as peer:
+        with pytest.raises(LinkError, match="no bit rate of 750000"):
+            open_can(peer, 750_000)
+        assert not peer.adapter.open
+        link = open_can(peer, 800_000)
+        assert (link.rate, peer.adapter.bitrate) == (800_000, 800_000)
+        link.close()
+
+
 @pytest.mark.parametrize("baud", ["@abc", "@0"])
 def test_a_rate_that_is_no_number_is_refused_in_words(baud: str) -> None:
     with on_terminal() as peer, pytest.raises(RequestError, match="not a rate of the serial line"):
