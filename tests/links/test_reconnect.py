@@ -113,9 +113,6 @@ def test_l12_a_terminal_that_another_program_uses_is_not_taken(tmp_path: Path, m
     link.close()
 
 
-# -- adapters ------------------------------------------------------------------------------------------------------
-
-
 def test_l12_an_adapter_is_found_under_another_name(usb: Usb, master: PtyMaster, other: PtyMaster) -> None:
     link = adapter(master, usb)
     names: list[str] = []
@@ -166,9 +163,6 @@ def test_the_present_rate_is_kept(usb: Usb, master: PtyMaster) -> None:
     link.close()
 
 
-# -- servers -------------------------------------------------------------------------------------------------------
-
-
 def test_l12_a_server_is_found_at_its_address() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
@@ -188,8 +182,6 @@ def test_l12_a_server_is_found_at_its_address() -> None:
         far.close()
         link.close()
 
-
-# -- who has the port ----------------------------------------------------------------------------------------------
 
 TRY_LOCK = """
 import sys
@@ -213,9 +205,6 @@ def test_l13_the_lock_is_kept_while_the_port_is_gone(tmp_path: Path, master: Pty
     link.close()
     with PortLock(name):
         pass
-
-
-# -- identity of an adapter ------------------------------------------------------------------------------------
 
 
 def test_without_a_serial_number_the_same_kind_under_the_same_name_counts(tmp_path: Path) -> None:
