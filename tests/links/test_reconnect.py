@@ -78,29 +78,6 @@ def pulled(link: Reconnecting, master: PtyMaster) -> None:
         link.read(link.now() + SOON)
 
 
-# -- pseudo-terminals ----------------------------------------------------------------------------------------------
-
-
-def test_l12_a_terminal_is_found_behind_its_link(tmp_path: Path, master: PtyMaster) -> None:
-    master.symlink(tmp_path / "simulator")
-    (tmp_path / "bus").symlink_to("simulator")
-    link = opened(str(tmp_path / "bus"))
-    passes(link, master)
-    master.unplug()
-    with pytest.raises(LinkLost):
-        link.read(link.now() + SOON)
-    with pytest.raises(LinkLost, match="there is no such port") as caught:
-        link.renew(1)
-    assert "looked for again" in caught.value.advice
-    with pytest.raises(LinkLost):
-        link.write(b"never")
-    master.plug()
-    link.rest(link.now() + 30)
-    link.renew(1)
-    passes(link, master)
-    link.close()
-
-
 def test_l12_a_terminal_that_another_program_uses_is_not_taken(tmp_path: Path, master: PtyMaster) -> None:
     """A link of a killed simulator leads to a terminal whose number a shell has now."""
     path = tmp_path / "bus"
@@ -171,8 +148,9 @@ def test_l12_a_server_is_found_at_its_address() -> None:
         far.close()
         with pytest.raises(LinkLost):
             link.read(link.now() + SOON)
-    with pytest.raises(LinkLost, match="cannot be reached"):
+    with pytest.raises(LinkLost, match="cannot be reached") as caught:
         link.renew(1)
+    assert "looked for again" in caught.value.advice
     with socket.create_server(("127.0.0.1", port)) as server:
         link.rest(link.now() + 30)
         link.renew(1)
@@ -224,3 +202,15 @@ def test_without_a_serial_number_the_same_kind_under_the_same_name_counts(tmp_pa
     with pytest.raises(PortNotFound):
         find_adapter("bus", str(path), mine, list)
     assert find_adapter("bus", str(path), None, list) == str(path)
+
+
+def test_the_ports_of_one_adapter_are_told_apart() -> None:
+    def lister(first: int) -> Callable[[], list[Any]]:
+        names = [f"/dev/ttyUSB{first + number}" for number in (0, 1)]
+        return lambda: [
+            usb_port(device=name, resolved_device=name, interface_num=number)
+            for number, name in enumerate(names)
+        ]
+
+    second = list_adapters(lister(0))["/dev/ttyUSB1"]
+    assert find_adapter("bus", "/dev/ttyUSB1", second, lister(1)) == "/dev/ttyUSB2"
