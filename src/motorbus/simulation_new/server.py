@@ -116,7 +116,7 @@ class Server:
 
     def unwatch(self, descriptor: int) -> None:
         """End the watch of this descriptor, if there is one."""
-        if descriptor in self._selector.get_map():
+        if descriptor in (self._selector.get_map() or ()):  # None once the server is closed
             self._selector.unregister(descriptor)
 
     def step(self, timeout: float = MAX_WAIT) -> None:
@@ -204,22 +204,23 @@ class Server:
     def _send(self, client: Client | CanChannel, found: list[Data]) -> None:
         rates = [client.rate(), *(one.rate() for one in self.clients)]
         self.wire.tune(next((rate for rate in rates if rate is not None), self._rate))
+        now = self._clock()  # frames that a program sends at once compete for the bus
         for data in found:
-            self.wire.send(data, self._clock(), client)
+            self.wire.send(data, now, client)
 
     def _drop_gone(self) -> None:
         for client in [one for one in self.clients if one.gone]:
-            self._remove(client)
+            self._unwatch(client)
+            self.clients.remove(client)
+            client.close()
             for port in self._ports:
                 if isinstance(port, TcpPort):
                     self._attach(port)
 
-    def _remove(self, client: Client | CanChannel) -> None:
+    def _unwatch(self, client: Client | CanChannel) -> None:
         descriptor = client.fileno()
         if descriptor is not None:
             self.unwatch(descriptor)
-        self.clients.remove(client)
-        client.close()
 
     # -- the ports -----------------------------------------------------------------------------------------------
 
@@ -230,13 +231,16 @@ class Server:
 
     def _detach(self, until: float) -> None:
         """Close all ports until this moment (s)."""
-        for client in tuple(self.clients):
-            self._remove(client)
+        for client in self.clients:
+            self._unwatch(client)
         for port in self._ports:
             if isinstance(port, TcpPort):
                 self.unwatch(port.fileno())
             if not isinstance(port, CanChannel):
-                port.unplug()
+                port.unplug()  # before its programs, which would come back at once
+        for client in self.clients:
+            client.close()
+        self.clients.clear()
         self._unplug_for, self._plug_at = None, until
 
 

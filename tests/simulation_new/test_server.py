@@ -1,0 +1,234 @@
+"""Simulated devices on real ports: rates, pace, programs that come and go, ports that are unplugged."""
+
+from __future__ import annotations
+
+import os
+import termios
+import time
+from pathlib import Path
+
+import pytest
+
+from motorbus import families
+from motorbus.core.family import Simulator
+from motorbus.errors import LinkError, PortBusy, RequestError
+from motorbus.families.feetech.simulator import simulate
+from motorbus.simulation_new.endpoints import PtyPort, TcpPort, parse_endpoint
+from motorbus.simulation_new.server import Server
+from tests.simulation_new.programs import PING_1, PONG_1, Program, on_pty, on_tcp, serving
+
+UNLOCK = "FF FF 01 04 03 37 00 C0"
+SLOW_WRITE = "FF FF 01 04 03 0D 41 A9"  # EEPROM: 20 ms
+READ_25 = b"t62584002600000000000\r"
+REPLY_25 = b"t5A584B02600000000000\r"
+OPEN = b"C\rS6\rO\r"
+
+
+def servos(*ids: int) -> Simulator:
+    return families.load("kst").simulator(ids or (0x25,))
+
+
+def set_rate(program: Program, code: int) -> None:
+    settings = termios.tcgetattr(program.descriptor)
+    settings[4] = settings[5] = code
+    termios.tcsetattr(program.descriptor, termios.TCSANOW, settings)
+
+
+# Serial lines.
+
+
+def test_programs_of_a_terminal_come_and_go() -> None:
+    port = PtyPort()
+    with serving(simulate((1,)), port):
+        for _ in range(3):
+            with on_pty(port) as program:
+                assert program.ask(PING_1, 6) == PONG_1
+
+
+def test_a_second_program_of_a_tcp_port_waits_for_the_first() -> None:
+    port = TcpPort()
+    with serving(simulate((1,)), port), on_tcp(port) as second:
+        pass
+    port = TcpPort()
+    with serving(simulate((1,)), port):
+        with on_tcp(port) as first:
+            assert first.ask(PING_1, 6) == PONG_1
+            with on_tcp(port) as second:
+                second.send(PING_1)
+                assert first.ask(PING_1, 6) == PONG_1
+                assert second.receive(1, 0.0) == ""
+        with on_tcp(port) as third:
+            assert third.ask(PING_1, 6) == PONG_1
+
+
+def test_devices_follow_the_rate_that_the_program_sets() -> None:
+    port = PtyPort()
+    with serving(simulate((1,)), port), on_pty(port) as program:
+        assert program.ask(PING_1, 6) == PONG_1, "the terminal has the rate of the devices at first"
+        set_rate(program, termios.B115200)
+        program.send(PING_1)
+        assert program.receive(1, 0.3) == ""
+        set_rate(program, termios.B1000000)
+        assert program.ask(PING_1, 6) == PONG_1
+
+
+def test_an_eeprom_write_is_acknowledged_after_a_later_ping_of_another_servo() -> None:
+    port = PtyPort()
+    with serving(simulate((1, 2)), port), on_pty(port) as program:
+        assert program.ask(UNLOCK, 6) == PONG_1
+        assert program.ask(f"{SLOW_WRITE} FF FF 02 02 01 FA", 12) == f"FF FF 02 02 00 FB {PONG_1}"
+
+
+def test_a_program_that_does_not_read_holds_nothing_up() -> None:
+    port = PtyPort()
+    with serving(simulate((1,)), port) as server, on_pty(port) as program:
+        for _ in range(300):  # 259 bytes each
+            program.send("FF FF 01 04 02 00 FD FB")
+        deadline = time.monotonic() + 20
+        while not server.lost:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+    assert server.lost > 0
+
+
+def test_pace_lets_each_byte_take_its_air_time() -> None:
+    port = PtyPort()
+    with serving(simulate((1,)), port, pace=True, rate=1_000_000) as server, on_pty(port) as program:
+        server.wire.rate = 1_000  # 10 ms a byte; the devices keep their rate
+        server.wire.tune = lambda rate: None  # type: ignore[method-assign]
+        start = time.monotonic()
+        assert program.ask(PING_1, 6) == PONG_1
+        assert 0.12 <= time.monotonic() - start < 0.5
+
+
+# CAN.
+
+
+@pytest.mark.parametrize("on_terminal", [True, False])
+def test_slcan_from_open_to_close(on_terminal: bool) -> None:
+    port: PtyPort | TcpPort = PtyPort() if on_terminal else TcpPort()
+    with serving(servos(), port, slcan=True, rate=500_000):
+        for _ in range(2):
+            with on_pty(port) if isinstance(port, PtyPort) else on_tcp(port) as program:
+                program.say(OPEN, b"\r\r\r")
+                program.say(READ_25, b"z\r" + REPLY_25)
+                program.say(b"C\r", b"\r")
+
+
+def test_programs_on_a_can_bus_receive_the_frames_of_the_others() -> None:
+    terminal, tcp = PtyPort(), TcpPort()
+    with (
+        serving(servos(), terminal, tcp, slcan=True, rate=500_000),
+        on_pty(terminal) as one,
+        on_tcp(tcp) as other,
+    ):
+        for program in (one, other):
+            program.say(OPEN, b"\r\r\r")
+        one.say(READ_25, b"z\r" + REPLY_25)
+        other.say(b"", READ_25 + REPLY_25)
+        other.say(b"t1231FF\r", b"z\r")
+        one.say(b"", b"t1231FF\r")
+
+
+def test_servos_follow_the_rate_of_the_adapter() -> None:
+    port = PtyPort()
+    with serving(servos(), port, slcan=True, rate=500_000), on_pty(port) as program:
+        program.say(b"C\rS5\rO\r", b"\r\r\r")
+        program.say(READ_25, b"z\r")
+        assert program.receive(1, 0.3) == ""
+        program.say(OPEN, b"\r\r\r")
+        program.say(READ_25, b"z\r" + REPLY_25)
+
+
+# Unplugged ports.
+
+
+def test_an_unplugged_terminal_hangs_up_and_is_back_behind_its_link(tmp_path: Path) -> None:
+    port = PtyPort(tmp_path / "bus")
+    with serving(simulate((1,)), port, faults="exchange 2: unplug 0.2") as server:
+        with on_pty(port) as program:
+            assert program.ask(PING_1, 6) == PONG_1
+            assert program.ask(PING_1, 6) == ""
+        deadline = time.monotonic() + 20
+        while not port.link.exists():  # type: ignore[union-attr]
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        with on_pty(port) as program:
+            assert program.ask(PING_1, 6) == PONG_1
+        assert server.faults.count == 1
+    assert not os.path.lexists(tmp_path / "bus")
+
+
+def test_an_unplugged_tcp_port_refuses_until_it_is_back() -> None:
+    port = TcpPort()
+    with serving(simulate((1,)), port, faults="exchange 1: unplug 0.3"):
+        with on_tcp(port) as program:
+            assert program.ask(PING_1, 6) == ""
+            with pytest.raises(ConnectionRefusedError), on_tcp(port):
+                pass
+        deadline = time.monotonic() + 20
+        while True:
+            try:
+                with on_tcp(port) as program:
+                    assert program.ask(PING_1, 6) == PONG_1
+                    break
+            except ConnectionRefusedError:
+                assert time.monotonic() < deadline
+                time.sleep(0.01)
+
+
+def test_a_terminal_without_a_link_cannot_be_unplugged() -> None:
+    port = PtyPort()
+    server = Server(simulate((1,)), port, rate=1_000_000)
+    with pytest.raises(RequestError, match="cannot be unplugged"):
+        server.set_faults("at 1 s: unplug 1")
+    server.close()
+
+
+# Names of ports.
+
+
+def test_a_link_replaces_only_what_a_simulator_left(tmp_path: Path) -> None:
+    left, file, foreign = tmp_path / "left", tmp_path / "file", tmp_path / "foreign"
+    left.symlink_to("/dev/pts/99999")
+    file.touch()
+    foreign.symlink_to(file)
+    for path in (file, foreign):
+        with pytest.raises(RequestError, match="exists already"):
+            PtyPort(path)
+    port = PtyPort(left)
+    assert str(left.readlink()) == port.terminal
+    with pytest.raises(RequestError, match="exists already"):
+        PtyPort(left)
+    port.close()
+    port.close()
+    assert not os.path.lexists(left)
+    with pytest.raises(LinkError):
+        PtyPort(tmp_path / "no" / "folder")
+
+
+def test_a_tcp_port_is_open_once() -> None:
+    port = TcpPort()
+    with pytest.raises(PortBusy):
+        TcpPort(port.host, port.port)
+    port.close()
+
+
+@pytest.mark.parametrize(
+    ("text", "endpoint"),
+    [
+        ("4000", ("127.0.0.1", 4000)),
+        (":0", ("127.0.0.1", 0)),
+        ("10.0.0.7:80", ("10.0.0.7", 80)),
+        ("[::1]:1", ("::1", 1)),
+        ("host", None),
+        ("1:65536", None),
+        ("1:٣", None),
+    ],
+)
+def test_endpoints(text: str, endpoint: tuple[str, int] | None) -> None:
+    if endpoint is None:
+        with pytest.raises(RequestError, match="not a TCP endpoint"):
+            parse_endpoint(text)
+    else:
+        assert parse_endpoint(text) == endpoint
