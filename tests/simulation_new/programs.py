@@ -11,8 +11,9 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 
 from motorbus.core.family import Simulator
-from motorbus.simulation_new.endpoints import PtyPort, TcpPort
+from motorbus.simulation_new.pty import PtyMaster
 from motorbus.simulation_new.server import Server, ServerThread
+from motorbus.simulation_new.tcp import TcpPort
 
 LIMIT = 20.0  # s
 RATE = 1_000_000
@@ -56,7 +57,7 @@ class Program:
 @contextmanager
 def serving(
     simulator: Simulator,
-    *ports: PtyPort | TcpPort,
+    *ports: PtyMaster | TcpPort,
     slcan: bool = False,
     rate: int = RATE,
     pace: bool = False,
@@ -72,7 +73,7 @@ def serving(
 
 
 @contextmanager
-def on_pty(port: PtyPort) -> Iterator[Program]:
+def on_pty(port: PtyMaster) -> Iterator[Program]:
     """A program that opens a pseudo-terminal in raw mode."""
     descriptor = os.open(port.name, os.O_RDWR | os.O_NOCTTY)
     tty.setraw(descriptor)

@@ -21,7 +21,7 @@ from motorbus.families.feetech.simulator import simulate
 from motorbus.session_new import open as open_bus
 from motorbus.session_new import simulate as simulate_bus
 from motorbus.simulation_new.control import HELP, MAX_CLIENTS, MAX_LINE, WORDS, ControlSocket, carry_out
-from motorbus.simulation_new.endpoints import PtyPort
+from motorbus.simulation_new.pty import PtyMaster
 from motorbus.simulation_new.server import Server, ServerThread
 from tests.simulation_new.programs import LIMIT
 
@@ -86,7 +86,7 @@ def ask(connection: socket.socket, line: str) -> dict[str, Any]:
 )
 def test_an_order_that_is_refused(line: str, message: str) -> None:
     bus = simulate((1,))
-    port = PtyPort()
+    port = PtyMaster()
     server = Server(bus, port, rate=1_000_000)
     reply = carry_out(server, line)
     server.close()

@@ -28,6 +28,7 @@ REQUEST, REPLY = b"request", b"reply"
         ("1%: drop", Fault("drop", percent=1.0)),
         ("0.5 % to device : corrupt", Fault("corrupt", percent=0.5, to=Side.DEVICE)),
         ("exchange 17: delay 0.2", Fault("delay", exchange=17, seconds=0.2)),
+        ("1%: delay 0.01-0.3", Fault("delay", percent=1.0, seconds=0.01, until=0.3)),
         ("exchange 3: echo", Fault("echo", exchange=3, to=Side.DEVICE)),
         ("at 2.5 s: unplug 0.5", Fault("unplug", moment=2.5, to=Side.DEVICE, seconds=0.5)),
         ("at 0s: power-cycle 0x25", Fault("power-cycle", moment=0.0, to=Side.DEVICE, node=0x25)),
@@ -60,6 +61,8 @@ def test_a_script_has_lines_comments_and_a_seed() -> None:
         ("at -1 s: drop", "0 or more"),
         ("1%: delay", "delay SECONDS"),
         ("1%: delay 0", "not possible"),
+        ("1%: delay 0.3-0.1", "range does not fit"),
+        ("at 1 s: unplug 1-2", "range does not fit"),
         ("1%: drop 3", "do not fit"),
         ("at 1 s: unplug 1 2", "do not fit"),
         ("1%: power-cycle x", "not a number"),
@@ -92,7 +95,8 @@ def faults(draw: st.DrawFn) -> Fault:
     side = draw(st.sampled_from(Side)) if kind.packet and name != "echo" else Side.DEVICE
     seconds = float(f"{draw(st.floats(1e-6, LONGEST)):.15g}") if kind.seconds else 0.0
     node = draw(st.none() | st.integers(0, 500)) if kind.node else None
-    return Fault(name, to=side, seconds=seconds, node=node, **place)
+    until = LONGEST if kind.until and seconds < LONGEST and draw(st.booleans()) else 0.0
+    return Fault(name, to=side, seconds=seconds, until=until, node=node, **place)
 
 
 @given(faults())
@@ -226,7 +230,7 @@ def test_an_unplugged_port_is_lost_and_back_in_time() -> None:
 @pytest.mark.parametrize(
     "script",
     [
-        "seed 8; 2%: corrupt; 5%: delay 0.01; 3% to device: drop; 2%: duplicate",
+        "seed 8; 2%: corrupt; 5%: delay 0.01-0.3; 3% to device: drop; 2%: duplicate",
         "seed 9; 6%: brown-out 0.05; 6%: power-cycle; exchange 40: unplug 0.2",
     ],
 )

@@ -13,9 +13,10 @@ from motorbus.simulation.clients import CanClient, Door
 from motorbus.simulation.listener import TcpListener
 from motorbus.simulation.listener import TcpPort as OldTcpPort
 from motorbus.simulation.mount import Mount
-from motorbus.simulation.pty import PtyMaster
+from motorbus.simulation.pty import PtyMaster as OldPtyMaster
 from motorbus.simulation.slcan import SlcanAdapter as OldAdapter
-from motorbus.simulation_new.endpoints import PtyPort, TcpPort
+from motorbus.simulation_new.pty import PtyMaster
+from motorbus.simulation_new.tcp import TcpPort
 from tests.simulation_new.programs import Program, on_pty, on_tcp, serving
 from tests.support.mounts import served
 
@@ -56,7 +57,7 @@ def old(family: str, terminal: bool) -> Iterator[Program]:
     with ExitStack() as stack:
         place: Any
         if terminal:
-            place = master = stack.enter_context(closing(PtyMaster()))
+            place = master = stack.enter_context(closing(OldPtyMaster()))
             place = CanClient(master, OldAdapter()) if is_can else master
         elif is_can:
             place = stack.enter_context(closing(Door(OldTcpPort(), OldAdapter)))
@@ -65,8 +66,8 @@ def old(family: str, terminal: bool) -> Iterator[Program]:
         simulator.tune(RATES[family])
         stack.enter_context(served(Mount(simulator, place, rate=RATES[family])))
         if terminal:
-            port = PtyPort.__new__(PtyPort)
-            port.link, port.terminal = None, master.slave_name
+            port = PtyMaster.__new__(PtyMaster)
+            port.link, port.slave_name = None, master.slave_name
             yield stack.enter_context(on_pty(port))
         else:
             yield stack.enter_context(on_tcp(place.port if is_can else place))
@@ -75,7 +76,7 @@ def old(family: str, terminal: bool) -> Iterator[Program]:
 @contextmanager
 def new(family: str, terminal: bool) -> Iterator[Program]:
     simulator = families.load(family).simulator(IDS[family])
-    port: Any = PtyPort() if terminal else TcpPort()
+    port: Any = PtyMaster() if terminal else TcpPort()
     with (
         serving(simulator, port, slcan=family == "kst", rate=RATES[family]),
         on_pty(port) if terminal else on_tcp(port) as program,

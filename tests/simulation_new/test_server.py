@@ -13,8 +13,9 @@ from motorbus import families
 from motorbus.core.family import Simulator
 from motorbus.errors import LinkError, PortBusy, RequestError
 from motorbus.families.feetech.simulator import simulate
-from motorbus.simulation_new.endpoints import PtyPort, TcpPort, parse_endpoint
+from motorbus.simulation_new.pty import PtyMaster
 from motorbus.simulation_new.server import Server
+from motorbus.simulation_new.tcp import TcpPort, parse_endpoint
 from tests.simulation_new.programs import PING_1, PONG_1, Program, on_pty, on_tcp, serving
 
 UNLOCK = "FF FF 01 04 03 37 00 C0"
@@ -38,7 +39,7 @@ def set_rate(program: Program, code: int) -> None:
 
 
 def test_programs_of_a_terminal_come_and_go() -> None:
-    port = PtyPort()
+    port = PtyMaster()
     with serving(simulate((1,)), port):
         for _ in range(3):
             with on_pty(port) as program:
@@ -62,7 +63,7 @@ def test_a_second_program_of_a_tcp_port_waits_for_the_first() -> None:
 
 
 def test_devices_follow_the_rate_that_the_program_sets() -> None:
-    port = PtyPort()
+    port = PtyMaster()
     with serving(simulate((1,)), port), on_pty(port) as program:
         assert program.ask(PING_1, 6) == PONG_1, "the terminal has the rate of the devices at first"
         set_rate(program, termios.B115200)
@@ -73,14 +74,14 @@ def test_devices_follow_the_rate_that_the_program_sets() -> None:
 
 
 def test_an_eeprom_write_is_acknowledged_after_a_later_ping_of_another_servo() -> None:
-    port = PtyPort()
+    port = PtyMaster()
     with serving(simulate((1, 2)), port), on_pty(port) as program:
         assert program.ask(UNLOCK, 6) == PONG_1
         assert program.ask(f"{SLOW_WRITE} FF FF 02 02 01 FA", 12) == f"FF FF 02 02 00 FB {PONG_1}"
 
 
 def test_a_program_that_does_not_read_holds_nothing_up() -> None:
-    port = PtyPort()
+    port = PtyMaster()
     with serving(simulate((1,)), port) as server, on_pty(port) as program:
         for _ in range(300):  # 259 bytes each
             program.send("FF FF 01 04 02 00 FD FB")
@@ -92,7 +93,7 @@ def test_a_program_that_does_not_read_holds_nothing_up() -> None:
 
 
 def test_pace_lets_each_byte_take_its_air_time() -> None:
-    port = PtyPort()
+    port = PtyMaster()
     with serving(simulate((1,)), port, pace=True, rate=1_000_000) as server, on_pty(port) as program:
         server.wire.rate = 1_000  # 10 ms a byte; the devices keep their rate
         server.wire.tune = lambda rate: None  # type: ignore[method-assign]
@@ -106,17 +107,17 @@ def test_pace_lets_each_byte_take_its_air_time() -> None:
 
 @pytest.mark.parametrize("on_terminal", [True, False])
 def test_slcan_from_open_to_close(on_terminal: bool) -> None:
-    port: PtyPort | TcpPort = PtyPort() if on_terminal else TcpPort()
+    port: PtyMaster | TcpPort = PtyMaster() if on_terminal else TcpPort()
     with serving(servos(), port, slcan=True, rate=500_000):
         for _ in range(2):
-            with on_pty(port) if isinstance(port, PtyPort) else on_tcp(port) as program:
+            with on_pty(port) if isinstance(port, PtyMaster) else on_tcp(port) as program:
                 program.say(OPEN, b"\r\r\r")
                 program.say(READ_25, b"z\r" + REPLY_25)
                 program.say(b"C\r", b"\r")
 
 
 def test_programs_on_a_can_bus_receive_the_frames_of_the_others() -> None:
-    terminal, tcp = PtyPort(), TcpPort()
+    terminal, tcp = PtyMaster(), TcpPort()
     with (
         serving(servos(), terminal, tcp, slcan=True, rate=500_000),
         on_pty(terminal) as one,
@@ -131,7 +132,7 @@ def test_programs_on_a_can_bus_receive_the_frames_of_the_others() -> None:
 
 
 def test_servos_follow_the_rate_of_the_adapter() -> None:
-    port = PtyPort()
+    port = PtyMaster()
     with serving(servos(), port, slcan=True, rate=500_000), on_pty(port) as program:
         program.say(b"C\rS5\rO\r", b"\r\r\r")
         program.say(READ_25, b"z\r")
@@ -144,7 +145,7 @@ def test_servos_follow_the_rate_of_the_adapter() -> None:
 
 
 def test_an_unplugged_terminal_hangs_up_and_is_back_behind_its_link(tmp_path: Path) -> None:
-    port = PtyPort(tmp_path / "bus")
+    port = PtyMaster(tmp_path / "bus")
     with serving(simulate((1,)), port, faults="exchange 2: unplug 0.2") as server:
         with on_pty(port) as program:
             assert program.ask(PING_1, 6) == PONG_1
@@ -178,7 +179,7 @@ def test_an_unplugged_tcp_port_refuses_until_it_is_back() -> None:
 
 
 def test_a_terminal_without_a_link_cannot_be_unplugged() -> None:
-    port = PtyPort()
+    port = PtyMaster()
     server = Server(simulate((1,)), port, rate=1_000_000)
     with pytest.raises(RequestError, match="cannot be unplugged"):
         server.set_faults("at 1 s: unplug 1")
@@ -195,16 +196,16 @@ def test_a_link_replaces_only_what_a_simulator_left(tmp_path: Path) -> None:
     foreign.symlink_to(file)
     for path in (file, foreign):
         with pytest.raises(RequestError, match="exists already"):
-            PtyPort(path)
-    port = PtyPort(left)
-    assert str(left.readlink()) == port.terminal
+            PtyMaster(path)
+    port = PtyMaster(left)
+    assert str(left.readlink()) == port.slave_name
     with pytest.raises(RequestError, match="exists already"):
-        PtyPort(left)
+        PtyMaster(left)
     port.close()
     port.close()
     assert not os.path.lexists(left)
     with pytest.raises(LinkError):
-        PtyPort(tmp_path / "no" / "folder")
+        PtyMaster(tmp_path / "no" / "folder")
 
 
 def test_a_tcp_port_is_open_once() -> None:

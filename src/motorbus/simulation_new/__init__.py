@@ -4,6 +4,6 @@ What a device does is in the `simulator` of its family. Here are the clock, the 
 socket.
 """
 
-from motorbus.simulation_new.simulation import Simulation, find
+from motorbus.simulation_new.named import Simulation, find
 
 __all__ = ["Simulation", "find"]

@@ -18,7 +18,7 @@ SCHEME: Final = "can://"
 
 
 class CanChannel:
-    """A CAN channel with all its programs and devices; the interface is that of `endpoints.Client`.
+    """A CAN channel with all its programs and devices; the interface is that of `clients.Client`.
 
     `rate` is in bit/s from the user (0: not given), `default_rate` that of the devices; `options` are for the adapter.
     `has_wire`: real devices may be on it. Raises RequestError for another port, and what opening a CAN link raises.

@@ -28,24 +28,29 @@ EXAMPLE: Final = "for example `1%: corrupt; exchange 17: drop; at 2.5 s: unplug 
 
 
 class Kind(NamedTuple):
-    """What a fault does, and its arguments: `seconds` is required, `node` is optional."""
+    """What a fault does, and its arguments: `seconds` is required, `until` and `node` are optional."""
 
     help: str
     seconds: bool = False
+    until: bool = False
     node: bool = False
     packet: bool = True  # it happens to a packet; else to a port or to devices
 
     @property
     def form(self) -> str:
         """The arguments as text."""
-        return " SECONDS" * self.seconds + " [ID]" * self.node
+        return " SECONDS" * self.seconds + "[-SECONDS]" * self.until + " [ID]" * self.node
 
 
 KINDS: Final = {
     "drop": Kind("the packet is lost"),
     "corrupt": Kind("one byte is changed; a CAN frame is lost and the adapter reports an error"),
     "duplicate": Kind("the packet arrives twice"),
-    "delay": Kind("the packet arrives later; later packets do not overtake it", seconds=True),
+    "delay": Kind(
+        "the packet arrives later, by a time in this range; later packets do not overtake it",
+        seconds=True,
+        until=True,
+    ),
     "echo": Kind("the host receives the packet that it sent"),
     "unplug": Kind("the port is away; packets under way are lost", seconds=True, packet=False),
     "power-cycle": Kind("the devices restart", node=True, packet=False),
@@ -68,6 +73,7 @@ class Fault(NamedTuple):
     moment: float | None = None
     to: Side = Side.HOST  # receiver of the packet
     seconds: float = 0.0
+    until: float = 0.0  # end of a range that begins at `seconds`; 0: no range
     node: int | None = None  # None: all devices
 
     def __str__(self) -> str:
@@ -76,6 +82,7 @@ class Fault(NamedTuple):
             place = f"at {self.moment:.15g} s"
         side = f" to {self.to.value}" if self.to is not _usual_side(self.kind) else ""
         seconds = f" {self.seconds:.15g}" if self.seconds else ""
+        seconds += f"-{self.until:.15g}" if self.until else ""
         node = f" {self.node}" if self.node is not None else ""
         return f"{place}{side}: {self.kind}{seconds}{node}"
 
@@ -127,11 +134,11 @@ def _parse_fault(text: str) -> Fault:
             expected=f"one of {', '.join(KINDS)}",
             advice=f"did you mean {near[0]}?" if near else EXAMPLE,
         )
-    seconds, node = _parse_arguments(name, arguments, text)
+    seconds, until, node = _parse_arguments(name, arguments, text)
     to = Side(match["to"]) if match["to"] else _usual_side(name)
     if to is not _usual_side(name) and (name == "echo" or not KINDS[name].packet):
         raise RequestError(f"fault {text!r}: {name} has no direction", expected="no `to`")
-    found = Fault(name, to=to, seconds=seconds, node=node)
+    found = Fault(name, to=to, seconds=seconds, until=until, node=node)
     if match["percent"]:
         return found._replace(percent=_number(match["percent"], 100.0, text))
     if match["moment"]:
@@ -142,16 +149,23 @@ def _parse_fault(text: str) -> Fault:
     return found._replace(exchange=exchange)
 
 
-def _parse_arguments(name: str, words: list[str], text: str) -> tuple[float, int | None]:
+def _parse_arguments(name: str, words: list[str], text: str) -> tuple[float, float, int | None]:
+    """`seconds`, `until` and `node` of a fault."""
     kind = KINDS[name]
-    seconds = _number(words.pop(0), LONGEST, text) if kind.seconds and words else 0.0
+    seconds = until = 0.0
+    if kind.seconds and words:
+        low, *high = re.split(r"(?<!e)-", words.pop(0), maxsplit=1)
+        seconds = _number(low, LONGEST, text)
+        until = _number(high[0], LONGEST, text) if high else 0.0
     try:
         node = units.whole(words.pop(0)) if kind.node and words else None
     except ValueError:
         raise RequestError(f"fault {text!r}: the id is not a number", expected=f"{name}{kind.form}") from None
+    if until and (not kind.until or until <= seconds):
+        raise RequestError(f"fault {text!r}: the range does not fit", expected=f"{name}{kind.form}")
     if words or (kind.seconds and not seconds):
         raise RequestError(f"fault {text!r}: the arguments do not fit", expected=f"{name}{kind.form}")
-    return seconds, node
+    return seconds, until, node
 
 
 def _number(word: str, limit: float, text: str, *, is_zero_valid: bool = False) -> float:

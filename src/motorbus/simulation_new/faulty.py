@@ -148,7 +148,7 @@ class FaultyBus:
                 case "duplicate":
                     copies += copies
                 case "delay":
-                    delay += fault.seconds
+                    delay += random.uniform(fault.seconds, fault.until or fault.seconds)
                 case "echo":
                     echo = True
         arrival = self._not_before[to] = max(at + delay, self._not_before[to])

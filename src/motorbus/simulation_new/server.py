@@ -16,10 +16,12 @@ from motorbus.core.family import Simulator
 from motorbus.core.request import Data
 from motorbus.errors import RequestError
 from motorbus.simulation_new.can_channel import CanChannel
-from motorbus.simulation_new.endpoints import Client, PtyPort, TcpPort
+from motorbus.simulation_new.clients import Client
 from motorbus.simulation_new.faults import Script, parse
 from motorbus.simulation_new.faulty import FaultyBus
+from motorbus.simulation_new.pty import PtyMaster
 from motorbus.simulation_new.slcan import SlcanAdapter
+from motorbus.simulation_new.tcp import TcpPort
 from motorbus.simulation_new.wire import Wire
 
 MAX_CLIENTS: Final = 16
@@ -29,7 +31,7 @@ RETRY: Final = 0.01
 SLICE: Final = 0.05
 """s of waiting for a channel without a descriptor before the other ports are looked at."""
 
-Port: TypeAlias = PtyPort | TcpPort | CanChannel
+Port: TypeAlias = PtyMaster | TcpPort | CanChannel
 
 
 class Server:
@@ -165,7 +167,7 @@ class Server:
         """Let programs come by this port."""
         if isinstance(port, TcpPort):
             self.watch(port.fileno(), partial(self._accept, port))
-        elif isinstance(port, PtyPort):
+        elif isinstance(port, PtyMaster):
             if not self._slcan:
                 port.set_rate(self._rate)
             self._add(Client(port, SlcanAdapter() if self._slcan else None))
