@@ -1,9 +1,8 @@
-"""The crash journal: the state of a guarded change of a device, on disk before the next step of the change.
+"""The crash journal: each state of a guarded change of a device is on disk before the next frame of the change leaves.
 
-After a crash a servo may have an unknown id, and a controller another project than its owner wrote. So a change is
-recorded before it begins, at each step and at its end; each record is on disk before the next frame leaves. There is
-one file per port, beside its lock. The holder of the lock is the only writer. A file holds one change: the next change
-replaces it, and none begins while another is unfinished.
+After a crash a servo may have an unknown id, and a controller a borrowed project. There is one file per port, beside
+its lock, and the holder of the lock is the only writer. A file holds one change: the next change replaces it, and none
+begins while another one is unfinished.
 """
 
 from __future__ import annotations
@@ -24,9 +23,9 @@ FORMAT: Final = 1
 
 
 class Change(NamedTuple):
-    """A guarded change that is not over: on which bus, by which verb, with which facts, since when (UTC).
+    """An unfinished change: its bus, driver function, facts and begin (UTC).
 
-    `facts` are those of its intent, and "reached", the states it has come to.
+    `facts` are those of its intent, and "reached": its states so far, in order.
     """
 
     bus: str
@@ -36,40 +35,50 @@ class Change(NamedTuple):
 
     @property
     def what(self) -> str:
-        """What is unfinished, in words; "" when its facts do not say, and its verb has to."""
-        return self._words("what")
+        """What is unfinished, for the user; "" when the facts have no text."""
+        return self._text("what")
 
     @property
     def cause(self) -> str:
-        """Why it is unfinished, in words; "" when its facts do not say."""
-        return self._words("cause")
+        """Why it is unfinished, for the user; "" when the facts have no text."""
+        return self._text("cause")
 
     @property
     def advice(self) -> str:
-        """What ends it, in words; "" when its facts do not say: then recover does."""
-        return self._words("advice").replace("{bus}", self.bus)
-
-    def _words(self, name: str) -> str:
-        said = self.facts.get(name)
-        return said if isinstance(said, str) else ""
+        """How to end it, for the user; "" when the facts have no text."""
+        return self._text("advice").replace("{bus}", self.bus)
 
     @property
     def node(self) -> int:
-        """The id that the device had when it began. Raises RequestError for a record that does not say."""
+        """The id of the device when the change began. Raises RequestError for a record without one."""
         node = self.facts.get("node")
         if isinstance(node, bool) or not isinstance(node, int):
             raise RequestError(
                 f"the journal of {self.bus} does not say which device was to change",
-                cause="something else wrote it, or it was damaged",
-                advice=_FORGET.format(self.bus),
+                cause="another program wrote it, or it was damaged",
+                advice=f"if every device of that bus is in order, `motorbus recover {self.bus} --forget` removes it",
             )
         return node
 
+    def describe(self) -> str:
+        """What is unfinished, and since when."""
+        what = self.what or f"{self.verb}() of #{self.facts.get('node')}"
+        return f"{what}, begun {self.begun},"
+
+    def remedy(self) -> str:
+        """What the user does to end it."""
+        effect = "gives it back" if self.what else "finishes it or takes it back"
+        return self.advice or f"`motorbus recover {self.bus}` {effect}"
+
+    def _text(self, name: str) -> str:
+        text = self.facts.get(name)
+        return text if isinstance(text, str) else ""
+
 
 class BusJournal:
-    """The journal of one bus, by its address; called with a `core.steps.JournalEntry` it records it.
+    """The journal of one bus, named by its address; a call with a `JournalEntry` records it.
 
-    Without a `path` it is kept in memory: simulated devices of this process are gone with it.
+    Without a `path` it is kept in memory, for simulated devices of this process.
     """
 
     def __init__(self, bus: str, path: Path | None = None) -> None:
@@ -78,47 +87,47 @@ class BusJournal:
         self._memory = b""
 
     def __call__(self, event: object) -> None:
-        """Record it; it is on disk when this returns.
+        """Record an entry; it is on disk when this returns.
 
-        Raises RequestError while another change is unfinished (by another verb, or with other facts), for a first
-        record without a device, and for a file of a later version; LinkError when the file cannot be written.
+        Raises RequestError while another change is unfinished, for a first record without a device, and for a file of a
+        later version; LinkError when the file cannot be written.
         """
         assert isinstance(event, JournalEntry)
-        open_change = self.unfinished()
-        if open_change is not None and _hinders(open_change, event):
-            raise _unfinished(open_change)
-        if event.state == ASKED or (event.state == OUTCOME and open_change is None):
+        change = self.unfinished()
+        if change is not None and _is_refused(event, change):
+            raise _unfinished(change)
+        if event.state == ASKED or (event.state == OUTCOME and change is None):
             return
-        if open_change is None and "node" not in event.facts:
+        if change is None and "node" not in event.facts:
             raise RequestError(
-                f"{event.change}() has reached {event.state!r} and nothing is known of its beginning",
-                cause="its journal has been closed in the meantime, by `motorbus recover` or another task",
+                f"{event.change}() has reached {event.state!r}, and its beginning is not recorded",
+                cause="its journal was closed meanwhile, by `motorbus recover` or another task",
                 advice="look how the device is before it is changed again",
             )
         record = {"change": event.change, "state": event.state, "at": _now(), "facts": event.facts}
-        if open_change is None:
+        if change is None:
             head = {"format": FORMAT, "what": "changes of devices on this bus", "bus": self.bus}
             self._replace(_line(head) + _line(record))
         else:
             self._append(_line(record))
 
     def unfinished(self) -> Change | None:
-        """The change that has begun and has no outcome yet. Raises RequestError for a file of a later version."""
-        return _read(self._content(), self.path)
+        """The change that has begun and has no outcome. Raises RequestError for a file of a later version."""
+        return _parse(self._content(), self.path)
 
     def forget(self) -> None:
-        """Leave nothing unfinished, whatever the file holds. Raises LinkError when it cannot be written."""
+        """Leave no change unfinished. Raises LinkError when the file cannot be written."""
         self._replace(b"")
 
     def warning(self) -> str:
-        """What the user of this bus ought to know about it; "" when nothing is unfinished."""
+        """The warning for the user of this bus; "" when no change is unfinished."""
         try:
             change = self.unfinished()
         except MotorbusError as error:
             return f"{error.summary}; {error.advice}"
-        return f"{_described(change)} is unfinished; {_advice(change)}" if change else ""
+        return f"{change.describe()} is unfinished; {change.remedy()}" if change else ""
 
-    # -- the file -------------------------------------------------------------------------------------------------
+    # -- the file ------------------------------------------------------------------------------------------------
 
     def _content(self) -> bytes:
         if self.path is None:
@@ -131,7 +140,7 @@ class BusJournal:
             raise _unusable(self.path, "read", error) from error
 
     def _replace(self, content: bytes) -> None:
-        """Replace the file by a new one, so it is never half written."""
+        """Replace the file by a new one, so that it is never half written."""
         if self.path is None:
             self._memory = content
             return
@@ -144,9 +153,8 @@ class BusJournal:
             raise _unusable(self.path, "written", error) from error
 
     def _append(self, line: bytes) -> None:
-        """One more record; a torn one before it, which an interrupted write has left, gets a line of its own."""
-        content = self._content()
-        line = line if content.endswith(b"\n") else b"\n" + line
+        """Append a record; a torn one before it gets a line of its own."""
+        line = line if self._content().endswith(b"\n") else b"\n" + line
         if self.path is None:
             self._memory += line
             return
@@ -157,7 +165,7 @@ class BusJournal:
 
 
 def everywhere() -> list[Change | MotorbusError]:
-    """Every unfinished change on any bus of this user; for a file that cannot be read, why: it hides no other."""
+    """All unfinished changes of this user, on any bus; for a file that cannot be read, the error."""
     found: list[Change | MotorbusError] = []
     for path in journals():
         try:
@@ -170,61 +178,59 @@ def everywhere() -> list[Change | MotorbusError]:
 
 
 def find_files(matches: Callable[[str], bool]) -> list[Path]:
-    """The files of unfinished changes on buses whose address at that time `matches`. Unreadable files are left out.
+    """The files of unfinished changes on buses whose address `matches`; without unreadable files.
 
-    A port may have lost its name: the user's link points to an adapter that is gone.
+    A port may have lost its name: the link of the user leads to an adapter that is gone.
     """
     found = []
     for path in journals():
         with contextlib.suppress(MotorbusError, OSError):
-            change = _read(path.read_bytes(), path)
+            change = _parse(path.read_bytes(), path)
             if change is not None and matches(change.bus):
                 found.append(path)
     return found
 
 
-def _read(content: bytes, path: Path | None) -> Change | None:
-    """The change in these lines, when it has no outcome; a torn line is a record that was never made."""
+def _parse(content: bytes, path: Path | None) -> Change | None:
+    """The unfinished change in these lines; a torn line is no record."""
     if not content:
         return None
-    head, *rest = content.split(b"\n")
-    bus = _bus(_parsed(head), path)
+    head, *lines = content.split(b"\n")
+    bus = _parse_head(head, path)
     change: Change | None = None
-    for record in map(_parsed, rest):
+    for record in map(_parse_line, lines):
         if record is None:
             continue
-        state, facts = str(record.get("state")), _plain(record.get("facts"))
+        state, facts = str(record.get("state")), record.get("facts")
+        facts = facts if isinstance(facts, dict) else {}
         if state == OUTCOME:
             change = None
         elif change is None:
             before = facts.get(REACHED)
             reached = [*map(str, before if isinstance(before, list) else ()), state]
-            change = Change(
-                bus, str(record.get("change")), {**facts, REACHED: reached}, str(record.get("at"))
-            )
+            verb, begun = str(record.get("change")), str(record.get("at"))
+            change = Change(bus, verb, {**facts, REACHED: reached}, begun)
         else:
             change.facts[REACHED].append(state)
     return change
 
 
-def _bus(head: dict[str, Any] | None, path: Path | None) -> str:
+def _parse_head(line: bytes, path: Path | None) -> str:
+    """The address of the bus."""
+    head = _parse_line(line)
     if head is None or head.get("format") != FORMAT:
-        said = "no format" if head is None else f"format {head.get('format')!r}"
+        text = "no format" if head is None else f"format {head.get('format')!r}"
         raise RequestError(
-            f"{path}: a journal with {said}, which this version of motorbus does not know",
+            f"{path}: a journal with {text}, which this version of motorbus does not know",
             expected=f"format {FORMAT}",
-            cause="a later version wrote it, or something else did",
-            advice="finish what it holds with the version that wrote it, or, if every device of this bus is as it"
-            " should be, `motorbus recover BUS --forget` or remove the file",
+            cause="a later version wrote it, or another program",
+            advice="finish the change with the version that wrote it or, if every device of this bus is in order, use"
+            " `motorbus recover BUS --forget` or remove the file",
         )
     return str(head.get("bus"))
 
 
-def _plain(facts: object) -> dict[str, Any]:
-    return facts if isinstance(facts, dict) else {}
-
-
-def _parsed(line: bytes) -> dict[str, Any] | None:
+def _parse_line(line: bytes) -> dict[str, Any] | None:
     try:
         record = json.loads(line)
     except (ValueError, RecursionError):
@@ -251,7 +257,7 @@ def _write(path: Path, flags: int, content: bytes) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Make a new name in it survive a crash; Windows has no such call, and does it by itself."""
+    """Let a new name in this folder survive a crash. Windows does that by itself and has no such call."""
     with contextlib.suppress(PermissionError):
         descriptor = os.open(folder, os.O_RDONLY)
         try:
@@ -260,48 +266,30 @@ def _sync_folder(folder: Path) -> None:
             os.close(descriptor)
 
 
-def _hinders(change: Change, event: JournalEntry) -> bool:
-    """This event is refused while that change is open."""
+def _is_refused(event: JournalEntry, change: Change) -> bool:
+    """Whether this entry belongs to another change than the unfinished one."""
     if event.state == ASKED:
         return not (event.facts.get(READABLE) and change.facts.get(READABLE))
-    return event.state == INTENT or not _belongs(event, change)
-
-
-def _belongs(event: JournalEntry, change: Change) -> bool:
-    """This is a record of that change: it has the same verb, and no fact differs."""
-    return event.change == change.verb and all(
-        change.facts.get(name, fact) == fact for name, fact in event.facts.items() if name != REACHED
+    return (
+        event.state == INTENT
+        or event.change != change.verb
+        or any(change.facts.get(name, fact) != fact for name, fact in event.facts.items() if name != REACHED)
     )
-
-
-_FORGET: Final = "if every device of that bus is in order, `motorbus recover {} --forget` removes the record"
-
-
-def _described(change: Change) -> str:
-    what = change.what or f"{change.verb}() of #{change.facts.get('node')}"
-    return f"{what}, begun {change.begun},"
-
-
-def _advice(change: Change) -> str:
-    if change.advice:
-        return change.advice
-    ends = "gives it back" if change.what else "finishes it or takes it back"
-    return f"`motorbus recover {change.bus}` {ends}"
 
 
 def _unfinished(change: Change) -> RequestError:
     return RequestError(
-        f"{_described(change)} is unfinished on this bus",
+        f"{change.describe()} is unfinished on this bus",
         cause=change.cause
-        or "the program that made the change was ended, or the device lost its supply, in the middle of it",
-        advice=f"{_advice(change)}; nothing was sent",
+        or "the program that made it ended, or the device lost its supply, in the middle of it",
+        advice=f"{change.remedy()}; nothing was sent",
     )
 
 
 def _unusable(path: Path, what: str, error: OSError) -> LinkError:
-    why = (error.strerror or str(error)).lower()
+    reason = (error.strerror or str(error)).lower()
     return LinkError(
-        f"the journal {path} cannot be {what}: {why}",
-        cause="without it a crash in the middle of a change could not be mended",
+        f"the journal {path} cannot be {what}: {reason}",
+        cause="without it a change that a crash interrupts cannot be recovered",
         advice="make room, or set XDG_STATE_HOME to a folder that you may write to",
     )

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 import motorbus
-from motorbus.simulation.faults import FaultyLine
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
+from tests.support.lines import ByteFault, ByteFaultLine
 
 
 def test_all_answer(run: Run, arm: Simulation) -> None:
@@ -61,7 +61,7 @@ def test_answers_that_collide_are_told_from_silence(run: Run, arm: Simulation) -
 
 def test_some_of_the_answers_to_a_broadcast_are_garbled(run: Run) -> None:
     with motorbus.simulate("feetech", ids="1+4", broadcast_ping="in_turn") as arm:
-        arm.line = FaultyLine("exchange 2 byte 11: corrupt 01")  # the last byte of the second answer
+        arm.line = ByteFaultLine(ByteFault(2, 11, "corrupt", value=1))  # the last byte of the second answer
         ran = run("ping", arm.url, "--broadcast", "--json")
     assert ran.code == 6
     assert [one["id"] for one in ran.records[0]["devices"]] == [1]

@@ -9,11 +9,14 @@ import socket
 import stat
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import motorbus
+from motorbus.simulation.faults import KINDS
 from tests.cli.conftest import Run
 from tests.support.processes import Simulated
 
@@ -79,14 +82,68 @@ def test_it_is_poked_while_it_runs(tmp_path: Path) -> None:
 
         assert len(json.loads(order("status"))["nodes"]) == 2
         assert motorbus.feetech.Servo(bus, 2).ping()
-        assert order("unplug 2") == "ok"
+        assert order("unplug 2") == '{"ok": true}'
         assert not motorbus.feetech.Servo(bus, 2).ping()
 
 
-def test_a_switch_changes_how_they_behave(tmp_path: Path, run: Run) -> None:
-    with Simulated("feetech", ids="1-3", link=tmp_path / "bus", switch="broadcast_ping=in_turn") as simulated:
+def test_a_quirk_is_a_flag(tmp_path: Path, run: Run) -> None:
+    with Simulated("feetech", ids="1-3", link=tmp_path / "bus", broadcast_ping="in_turn") as simulated:
         found = run("ping", simulated.bus, "--broadcast", "--json").document["devices"]
     assert [one["id"] for one in found] == [1, 2, 3]
+
+
+@pytest.mark.parametrize(
+    ("family", "way", "script"),
+    [
+        ("feetech", "link", "exchange 2: duplicate"),
+        ("feetech", "tcp", "exchange 2: delay 0.001"),
+        ("kst", "link", "exchange 2: corrupt"),
+        ("kst", "tcp", "exchange 2: drop"),
+    ],
+)
+def test_faults_before_and_while_it_runs(family: str, way: str, script: str, tmp_path: Path) -> None:
+    control, file = tmp_path / "control", tmp_path / "faults"
+    file.write_text(f"{script}  # once\n")
+    ways: dict[str, Any] = {"link": tmp_path / "bus"} if way == "link" else {"tcp": "0"}
+    with (
+        Simulated(family, control=str(control), faults=str(file), **ways) as simulated,
+        motorbus.open(simulated.bus) as bus,
+        socket.socket(socket.AF_UNIX) as client,
+    ):
+        client.settimeout(30)
+        client.connect(str(control))
+        lines = client.makefile("rw")
+
+        def order(text: str) -> dict[str, Any]:
+            lines.write(f"{text}\n")
+            lines.flush()
+            reply: dict[str, Any] = json.loads(lines.readline())
+            return reply
+
+        servo = getattr(motorbus, family).Servo(bus, 1)
+        for _ in range(3):
+            with suppress(motorbus.MotorbusError):
+                servo.position()
+        assert order("faults")["fired"] == [script]
+        assert servo.position() is not None
+        assert order("faults 100% to device: drop")["ok"] is True
+        with pytest.raises(motorbus.NoReply):
+            servo.position()
+        assert order("faults off")["count"] > 1
+        assert servo.position() is not None
+
+
+def test_faults_on_a_can_bus_that_may_have_real_devices_open_nothing(run: Run, tmp_path: Path) -> None:
+    flags = ["--can", "slcan/dev/nothing", "--link", str(tmp_path / "can"), "--faults", "100%: echo"]
+    ran = run("simulate", "kst", "--ids", "0x25", *flags)
+    assert (ran.code, ran.out) == (2, "")
+    assert "faults are refused on a CAN bus that may have real devices" in ran.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_kinds_of_faults_are_listed(run: Run) -> None:
+    rows = run("simulate", "feetech", "--faults", "help", "--json").document["faults"]
+    assert [row["fault"].split()[0] for row in rows] == list(KINDS)
 
 
 def test_a_ready_line_for_people(tmp_path: Path) -> None:
@@ -114,8 +171,10 @@ def test_devices_that_ship_with_another_rate_are_opened_by_the_address_of_the_re
         (["feetech", "--model", "abacus"], 2),
         (["feetech", "--ids", "254"], 2),
         (["feetech", "--ids", "x"], 2),
-        (["feetech", "--switch", "gravity=off"], 2),
-        (["feetech", "--switch", "gravity"], 2),
+        (["feetech", "--faults", "1%: dorp"], 2),
+        (["feetech", "--faults", "# none"], 2),
+        (["feetech", "--faults", "at 1 s: unplug 1"], 2),
+        (["kst", "--can", "socketcan/can0", "--faults", "1%: drop"], 2),
         (["feetech", "--gravity", "off"], 2),
         (["feetech", "--gravity"], 2),
         (["feetech", "--can", "virtual/x"], 2),

@@ -16,10 +16,10 @@ from motorbus.core.request import Data
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.table import EDITS, ORDERS
 from motorbus.link.base import Delivery, PerfectLine, Side
-from motorbus.simulation.faults import Fault, FaultyLine
 from tests.conftest import Figures
 from tests.families.stepper.rig import BYTE, KEPT, MOTIONS, STOPS, FalseWord, Rig
 from tests.support import single_faults
+from tests.support.lines import ByteFault, ByteFaultLine
 
 EDGES = (0x00, 0x02, 0x5E, 0xEE, 0xFF)
 """Values that mean something somewhere in a reply."""
@@ -48,7 +48,7 @@ def length_of(name: str) -> int:
     return wire.DUMP_LENGTH if name == "read_project" else wire.REPLY_LENGTH
 
 
-def every_fault(length: int, values: Iterable[int], places: Iterable[int] | None = None) -> list[Fault]:
+def every_fault(length: int, values: Iterable[int], places: Iterable[int] | None = None) -> list[ByteFault]:
     """All but the late bytes: a line at 9600 baud has no packets that a pause could part."""
     return [one for one in single_faults.every_fault(length, values, places=places) if one.action != "delay"]
 
@@ -61,7 +61,7 @@ class Tally(NamedTuple):
     false: list[str]
 
 
-def suffer(name: str, faults: Iterable[Fault], *, bytewise: bool = False) -> Tally:
+def suffer(name: str, faults: Iterable[ByteFault], *, bytewise: bool = False) -> Tally:
     """Every fault in turn, each of which must happen; what is asked next must be right at its first try."""
     rig = Rig(PerfectLine(), 1, pace=False)
     rig.open()
@@ -69,7 +69,7 @@ def suffer(name: str, faults: Iterable[Fault], *, bytewise: bool = False) -> Tal
     false: list[str] = []
     for fault in faults:
         total += 1
-        line = FaultyLine([fault])
+        line = ByteFaultLine(fault)
         rig.link.line = single_faults.Bytewise(line, BYTE) if bytewise else line
         try:
             succeeded += ask(rig, name)

@@ -160,7 +160,7 @@ def written(peer: PythonCan) -> None:
 
 
 def power_cycled(bus: CanBus) -> None:
-    assert bus.order("power-cycle") == "ok"
+    assert bus.order("power-cycle") == '{"ok": true}'
 
 
 def test_without_a_save_a_power_cycle_loses_node_id_and_bit_rate(tmp_path: Path) -> None:

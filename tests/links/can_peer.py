@@ -16,7 +16,6 @@ from motorbus.core.request import Data
 from motorbus.link import url
 from motorbus.link.can import PythonCanLink
 from motorbus.link.slcan import SlcanLink
-from motorbus.simulation.adapter import Adapter
 from motorbus.simulation.pty import PtyMaster
 from motorbus.simulation.slcan import SlcanAdapter
 
@@ -28,8 +27,8 @@ LONG_PING = CanFrame(0x625, b"\x01", extended=True)
 class Mute(SlcanAdapter):
     """An slcan adapter that sends no replies, as some do."""
 
-    def take(self) -> bytes:
-        super().take()
+    def take_answer(self) -> bytes:
+        super().take_answer()
         return b""
 
 
@@ -42,25 +41,25 @@ class Picky(SlcanAdapter):
         self.refusals = b""
         self.commands: list[bytes] = []
 
-    def feed(self, data: bytes, at: float = 0.0) -> list[CanFrame]:
+    def receive(self, data: bytes) -> list[CanFrame]:
         frames = []
         for line in data.split(b"\r")[:-1]:
             self.commands.append(line)
             if line in self.refused:
                 self.refusals += b"\a"
             else:
-                frames += super().feed(line + b"\r", at)
+                frames += super().receive(line + b"\r")
         return frames
 
-    def take(self) -> bytes:
+    def take_answer(self) -> bytes:
         refusals, self.refusals = self.refusals, b""
-        return super().take() + refusals
+        return super().take_answer() + refusals
 
 
 class Peer:
     """An adapter on a port; `url` is how a host opens it."""
 
-    def __init__(self, adapter: Adapter, url: str) -> None:
+    def __init__(self, adapter: SlcanAdapter, url: str) -> None:
         self.adapter = adapter
         self.url = url
         self.received: list[CanFrame] = []
@@ -69,17 +68,17 @@ class Peer:
     def say(self, *data: bytes | CanFrame) -> None:
         """Bytes as they are; a frame as the adapter delivers it."""
         for item in data:
-            self.write(self.adapter.deliver(item, 1.0) if isinstance(item, CanFrame) else item)
+            self.write(self.adapter.encode(item, 1.0) if isinstance(item, CanFrame) else item)
 
     def receive(self, data: bytes) -> None:
-        frames = self.adapter.feed(data)
+        frames = self.adapter.receive(data)
         self.received += frames
-        echoes = (self.adapter.deliver(frame._replace(id=frame.id + 1), 1.0) for frame in frames)
-        self.write(self.adapter.take() + b"".join(echoes))
+        echoes = (self.adapter.encode(frame._replace(id=frame.id + 1), 1.0) for frame in frames)
+        self.write(self.adapter.take_answer() + b"".join(echoes))
 
 
 @contextlib.contextmanager
-def on_terminal(adapter: Adapter | None = None) -> Iterator[Peer]:
+def on_terminal(adapter: SlcanAdapter | None = None) -> Iterator[Peer]:
     """An slcan adapter on a pseudo-terminal, served by a thread."""
     master = PtyMaster()
     peer = Peer(adapter or SlcanAdapter(), f"can://slcan{master.slave_name}")

@@ -48,10 +48,10 @@ def test_lines_of_slcan(frame: CanFrame, line: bytes) -> None:
 @given(frame=frames(), cut=st.integers(0, 40))
 def test_what_an_slcan_adapter_writes_is_read(frame: CanFrame, cut: int) -> None:
     adapter, reader = SlcanAdapter(), SlcanCodec()
-    adapter.feed(b"S6\rO\r")
-    text = adapter.deliver(frame, 1.0)
+    adapter.receive(b"S6\rO\r")
+    text = adapter.encode(frame, 1.0)
     assert reader.feed(text[:cut]) + reader.feed(text[cut:]) == [frame]
-    assert adapter.feed(SlcanCodec().encode(frame)) == [frame]
+    assert adapter.receive(SlcanCodec().encode(frame)) == [frame]
 
 
 @given(data=st.binary(max_size=80))
@@ -104,12 +104,12 @@ def test_timestamps_are_known_by_two_in_a_row() -> None:
 
 def test_the_commands_at_open_and_close() -> None:
     adapter = Picky()
-    adapter.open = True  # a killed program left the channel open on a busy bus
+    adapter.is_open = True  # a killed program left the channel open on a busy bus
     with on_terminal(adapter) as peer:
         peer.say(PONG, PONG, PONG)
         link = open_can(peer, 250_000)
         assert adapter.commands == [b"C", b"S5", b"O"]
-        assert (adapter.bitrate, adapter.open, link.trouble()) == (250_000, True, "")
+        assert (adapter.bitrate, adapter.is_open, link.trouble()) == (250_000, True, "")
         link.close()
     assert adapter.commands[-1] == b"C"
 
@@ -135,7 +135,7 @@ def test_an_adapter_that_refuses(options: dict[str, Any], command: bytes, words:
     adapter = Picky(command)
     with on_terminal(adapter) as peer, pytest.raises(LinkError, match=words):
         open_can(peer, 500_000, **options)
-    assert not adapter.open
+    assert not adapter.is_open
 
 
 def test_a_rate_that_is_refused_later_changes_nothing() -> None:
@@ -177,7 +177,7 @@ def test_s7_means_two_rates_so_it_is_not_used() -> None:
     with on_terminal() as peer:
         with pytest.raises(LinkError, match="no bit rate of 750000"):
             open_can(peer, 750_000)
-        assert not peer.adapter.open
+        assert not peer.adapter.is_open
         link = open_can(peer, 800_000)
         assert (link.rate, peer.adapter.bitrate) == (800_000, 800_000)
         link.close()

@@ -17,7 +17,7 @@ from motorbus.core.steps import ASKED, INTENT, OUTCOME, REACHED, JournalEntry
 from motorbus.errors import LinkError, RequestError
 from motorbus.journal import BusJournal
 from motorbus.link.lock import journal_path, state_folder
-from motorbus.session.keeping import journal_of
+from motorbus.session.journals import journal_of
 
 BUS = "feetech:/dev/ttyACM7"
 FACTS = {"node": 3, "new": 7, "rate": 1_000_000}

@@ -1,4 +1,4 @@
-"""Orders over a local socket: answered in one line each, refused in one line, and for the owner alone."""
+"""The control socket: its orders and replies, and programs that send too much or do not read."""
 
 from __future__ import annotations
 
@@ -7,263 +7,266 @@ import os
 import socket
 import stat
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import ExitStack, closing, contextmanager
+from math import radians
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from typing import Any
 
 import pytest
 
-from motorbus.errors import LinkError, PortBusy, RequestError
+import motorbus
+from motorbus import families
+from motorbus.errors import PortBusy, RequestError
 from motorbus.families.feetech.simulator import simulate
-from motorbus.families.stepper import simulator as stepper
-from motorbus.simulation.control import HELP, LONGEST_LINE, MOST_CLIENTS, ControlSocket, obey
-from motorbus.simulation.faulted import Faulted
-from motorbus.simulation.faults import World
-from motorbus.simulation.listener import TcpListener
-from motorbus.simulation.mount import Mount
-from tests.support.mounts import asked, served
+from motorbus.session import open as open_bus
+from motorbus.session import simulate as simulate_bus
+from motorbus.simulation.control import HELP, MAX_CLIENTS, MAX_LINE, WORDS, ControlSocket, carry_out
+from motorbus.simulation.pty import PtyMaster
+from motorbus.simulation.server import Server, ServerThread
+from tests.simulation.programs import LIMIT
+
+OK = {"ok": True}
+MIDDLE = radians(180)
 
 
-@pytest.fixture
-def path() -> Iterator[Path]:
-    with TemporaryDirectory() as folder:  # a short name: local sockets allow some hundred bytes
-        yield Path(folder) / "control"
+def order(devices: Any, line: str) -> dict[str, Any]:
+    """The reply to an order for these simulated devices."""
+    server = Server(devices, rate=1_000_000)
+    try:
+        return carry_out(server, line)
+    finally:
+        server.close()
 
 
-def order(path: Path, text: str) -> str:
-    """Send an order from a client of its own and read one line."""
-    with socket.socket(socket.AF_UNIX) as client:
-        client.settimeout(10.0)
-        client.connect(os.fspath(path))
-        client.sendall(text.encode() + b"\n")
-        with client.makefile() as lines:
-            return lines.readline().rstrip("\n")
+@contextmanager
+def socket_of(path: Path, simulator: Any) -> Iterator[Server]:
+    server = Server(simulator, rate=1_000_000)
+    with closing(ControlSocket(path, server)), ServerThread(server):
+        yield server
 
 
-def test_orders_while_the_bus_is_served(path: Path) -> None:
-    bus = simulate((1, 2))
-    control = ControlSocket(path, bus)
-    with (
-        closing(control),
-        closing(TcpListener()) as listener,
-        served(Mount(bus, listener, attendants=[control])),
-        socket.create_connection((listener.host, listener.port)) as client,
-    ):
-        assert asked(client.fileno(), "FF FF 02 04 03 29 09 C4", 6) == "FF FF 02 02 00 FB"
-        assert order(path, "unplug 2") == "ok"
-        status = json.loads(order(path, "status"))
-        assert [status["schema"], status["simulated"]] == ["motorbus.simulator/1", True]
-        assert [(node["id"], node["plugged"]) for node in status["nodes"]] == [(1, True), (2, False)]
-        assert order(path, "plug 2") == "ok"
-        assert asked(client.fileno(), "FF FF 02 04 02 29 01 CD", 7) == "FF FF 02 03 00 00 FA"  # RAM is lost
+@contextmanager
+def connected(path: Path) -> Iterator[socket.socket]:
+    with closing(socket.socket(socket.AF_UNIX)) as connection:
+        connection.settimeout(LIMIT)
+        connection.connect(os.fspath(path))
+        yield connection
 
 
-def test_power_cycle_of_one_and_of_all() -> None:
-    bus = simulate((1, 2))
-    for servo in bus.servos:
-        servo.memory["acceleration"] = 9
-    assert obey(bus, "power-cycle 2") == "ok"
-    assert [servo.memory["acceleration"] for servo in bus.servos] == [9, 0]
-    assert obey(bus, "power-cycle") == "ok"
-    assert [servo.memory["acceleration"] for servo in bus.servos] == [0, 0]
+def ask(connection: socket.socket, line: str) -> dict[str, Any]:
+    connection.sendall(line.encode() + b"\n")
+    with connection.makefile() as replies:
+        reply: dict[str, Any] = json.loads(replies.readline())
+        return reply
 
 
-def test_help_names_every_order() -> None:
-    bus = stepper.simulate((1,))  # it has inputs, and all else that any other has
-    world = World(bus)
-    faults = Faulted(Mount(world), world)
-    for word in obey(bus, "help").split(" | "):
-        order = word.replace("[ID]", "").replace("ID", "1").replace("INPUT on|off", "2 on")
-        order = order.replace("[SCRIPT|off]", "off")
-        order = order.replace("[LOW HIGH]", "").replace("ANGLE", "30deg").replace("PERCENT", "50%")
-        answer = obey(bus, order, faults)
-        assert not answer.startswith("error") or "has no physics for" in answer
-
-
-def test_faults_are_set_looked_at_and_switched_off() -> None:
-    bus = simulate((1,))
-    world = World(bus)
-    faults = Faulted(Mount(world), world)
-    assert obey(bus, "faults exchange 2: drop; 100% of bytes: flip 0", faults) == "ok"
-    facts = json.loads(obey(bus, "faults", faults))
-    assert (facts["schema"], facts["simulated"], facts["count"]) == ("motorbus.simulator-script/1", True, 0)
-    assert facts["script"] == f"seed {facts['seed']}; exchange 2: drop; 100% of bytes: flip 0"
-    assert obey(bus, "faults exchange 1: explode", faults).startswith("error: line 1: ")
-    assert json.loads(obey(bus, "faults", faults)) == facts
-    assert obey(bus, "faults off", faults) == "ok"
-    assert json.loads(obey(bus, "faults", faults))["script"] == ""
-    assert obey(bus, "faults", None) == "error: this simulation takes no faults"
+# Orders.
 
 
 @pytest.mark.parametrize(
-    ("text", "says"),
+    ("line", "message"),
     [
-        ("", "error: '' is not an order; there are: status"),
-        ("explode", "error: 'explode' is not an order"),
-        ("unplug", "error: the order is: unplug ID"),
-        ("plug 1 2", "error: the order is: plug ID"),
-        ("status now", "error: the order is: status"),
-        ("power-cycle 1 2", "error: the order is: power-cycle [ID]"),
-        ("set-input 1 2 on", "error: node 1 has no inputs"),
-        ("block 1 90deg", "error: the order is: block ID [LOW HIGH]"),
-        ("block 1 10deg 20deg", "error: the shaft is at 3.1416 rad (180.0°); expected a range that contains"),
-        ("push 1", "error: the order is: push ID ANGLE"),
-        ("push 1 30", "error: 30 has no unit; expected a number with its unit, as 30deg or 0.5rad"),
-        ("push 1 9999deg", "error: 174.5155 rad (9999.0°) is too far; expected at most 10 turns"),
-        ("push 1 30V", "error: position '30V' has the unit 'V'"),
-        ("load 1 0.5", "error: 0.5 has no unit; expected a number with its unit, as 50%"),
-        ("load 1 101%", "error: 101% is not possible; expected -100% to 100%"),
-        ("release", "error: the order is: release ID"),
-        ("unplug 9", "error: there is no node 9; there are: 1, 3"),
-        ("unplug one", "error: there is no node one"),
+        ("", "not an order"),
+        ("dance", "not an order"),
+        ("status 1", "not an order"),
+        ("unplug", "wrong arguments"),
+        ("unplug 1 2", "wrong arguments"),
+        ("unplug 9", "there is no device 9"),
+        ("unplug x", "there is no device x"),
+        ("push 1", "wrong arguments"),
+        ("push 1 30", "has no unit"),
+        ("push 1 30V", "measures voltage"),
+        ("block 1 10deg", "wrong arguments"),
+        ("load 1 much%", "not a number"),
+        ("supply 1 nanV", "not a number"),
+        ("set-input 1 1 on", "does not simulate"),
+        ("faults 1%: dorp", "no kind 'dorp'"),
+        ("faults at 1 s: unplug 1", "cannot be unplugged"),
     ],
 )
-def test_a_bad_order_gets_one_clear_line(text: str, says: str) -> None:
-    answer = obey(simulate((1, 3)), text)
-    assert answer.startswith(says)
-    assert "\n" not in answer
-
-
-def test_ids_may_be_hexadecimal() -> None:
-    bus = simulate((16,))
-    assert obey(bus, "unplug 0x10") == "ok"
-    assert not bus.nodes[16].plugged
-
-
-# The socket itself.
-
-
-def pumped(control: ControlSocket) -> None:
-    """Attend to everything that is readable or has room, until nothing is."""
-    import select
-
-    while any(ready := select.select(control.descriptors(), control.stuck(), (), 0.0)):
-        for descriptor in (*ready[0], *ready[1]):
-            control.attend(descriptor)
-
-
-def connected(path: Path) -> socket.socket:
-    client = socket.socket(socket.AF_UNIX)
-    client.settimeout(10.0)
-    client.connect(os.fspath(path))
-    return client
-
-
-def test_it_is_for_its_owner_alone_and_goes_when_closed(path: Path) -> None:
-    control = ControlSocket(path, simulate((1,)))
-    assert stat.S_IMODE(path.stat().st_mode) == 0o600
-    control.close()
-    control.close()
-    assert not path.exists()
-
-
-def test_several_orders_in_one_piece_and_one_order_in_several(path: Path) -> None:
-    with closing(ControlSocket(path, simulate((1,)))) as control, closing(connected(path)) as client:
-        client.sendall(b"unplug 1\nplug 1\nexpl")
-        pumped(control)
-        assert client.recv(100) == b"ok\nok\n"
-        client.sendall(b"ode\n")
-        pumped(control)
-        assert client.recv(100).startswith(b"error: 'explode'")
-
-
-def test_bytes_that_are_no_text(path: Path) -> None:
-    with closing(ControlSocket(path, simulate((1,)))) as control, closing(connected(path)) as client:
-        client.sendall(b"\xff\xfe\n")
-        pumped(control)
-        assert client.recv(200).startswith(b"error: ")
-
-
-@pytest.mark.parametrize("size", [LONGEST_LINE + 1, 3 * LONGEST_LINE])
-def test_an_order_that_is_too_long_is_refused_once_and_the_next_one_carried_out(
-    size: int, path: Path
-) -> None:
-    """Whoever is hung up on while he still writes never sees the answer."""
-    with closing(ControlSocket(path, simulate((1,)))) as control, closing(connected(path)) as client:
-        for _ in range(size // 8192):
-            client.sendall(b"x" * 8192)
-            pumped(control)
-        client.sendall(b"x" * (size % 8192) + b"\nunplug 1\n")
-        pumped(control)
-        assert client.recv(200) == b"error: an order has at most 65536 bytes; nothing has changed\nok\n"
-
-
-def test_an_answer_longer_than_a_socket_takes_at_once_arrives_whole(path: Path) -> None:
+def test_an_order_that_is_refused(line: str, message: str) -> None:
     bus = simulate((1,))
-    world = World(bus)
-    script = "; ".join(f"exchange {number}: drop" for number in range(20_000))
-    with (
-        closing(ControlSocket(path, bus)) as control,
-        closing(TcpListener()) as listener,
-    ):
-        mount = Mount(world, listener, attendants=[control])
-        control.faults = Faulted(mount, world)
-        control.faults.set(script)
-        with served(mount):
-            answer = order(path, "faults")
-            assert len(answer) > 1 << 18, "more than the system keeps for a reader"
-            assert json.loads(answer)["script"] == script
-            assert order(path, "unplug 1") == "ok"
+    port = PtyMaster()
+    server = Server(bus, port, rate=1_000_000)
+    reply = carry_out(server, line)
+    server.close()
+    assert message in reply["error"]
+    assert bus.nodes[1].plugged
 
 
-def test_who_does_not_read_waits_and_holds_nobody_up(path: Path) -> None:
-    with (
-        closing(ControlSocket(path, simulate(tuple(range(100))))) as control,
-        closing(connected(path)) as lazy,
-        closing(connected(path)) as other,
-    ):
-        lazy.sendall(b"status\n" * 99 + b"help\n" + b"unplug 7\nunplug")
-        lazy.shutdown(socket.SHUT_WR)
-        pumped(control)
-        assert len(control.stuck()) == 1
-        other.sendall(b"plug 1\n")
-        pumped(control)
-        assert other.recv(100) == b"ok\n"
-        said = b""
-        while part := lazy.recv(1 << 20):
-            said += part
-            pumped(control)
-        *stati, last, end, nothing = said.decode().split("\n")
-        assert [json.loads(one)["schema"] for one in stati] == ["motorbus.simulator/1"] * 99
-        assert (last, end, nothing) == (HELP, "ok", "")
-        assert (len(control.descriptors()), control.stuck()) == (2, [])
+def test_help_names_every_word() -> None:
+    assert order(simulate((1,)), "help") == {"ok": True, "help": HELP}
+    assert all(f"{word} ID" in HELP for word in WORDS)
 
 
-def test_too_many_clients_are_sent_away(path: Path) -> None:
-    with closing(ControlSocket(path, simulate((1,)))) as control:
-        clients = []
-        for _ in range(MOST_CLIENTS + 1):
-            clients.append(connected(path))
-            pumped(control)
-        assert len(control.descriptors()) == MOST_CLIENTS + 1
-        assert clients[-1].recv(1) == b""
-        for client in clients:
-            client.close()
+def test_status_shows_every_device() -> None:
+    reply = order(simulate((2, 1)), "status")
+    assert [node["id"] for node in reply["nodes"]] == [1, 2]
 
 
-def test_what_a_dead_simulator_left_is_taken_over(path: Path) -> None:
-    with socket.socket(socket.AF_UNIX) as dead:
-        dead.bind(os.fspath(path))
-    with closing(ControlSocket(path, simulate((1,)))):
-        assert path.exists()
+def test_plugs_and_power() -> None:
+    bus = simulate((1, 2))
+    assert order(bus, "unplug 2") == OK
+    assert (bus.nodes[1].plugged, bus.nodes[2].plugged) == (True, False)
+    assert order(bus, "plug 0x2") == OK
+    for node in bus.nodes.values():
+        node.memory["torque_enable"] = 1
+    assert order(bus, "power-cycle 1") == OK
+    assert [node.memory["torque_enable"] for node in bus.nodes.values()] == [0, 1]
+    assert order(bus, "power-cycle") == OK
+    assert bus.nodes[2].memory["torque_enable"] == 0
 
 
-def test_a_live_one_is_busy_and_not_disturbed(path: Path) -> None:
-    with closing(ControlSocket(path, simulate((1,)))):
-        with pytest.raises(PortBusy):
-            ControlSocket(path, simulate((1,)))
-        assert path.exists()
+def test_faults_are_set_shown_and_ended() -> None:
+    server = Server(simulate((1,)), rate=1_000_000)
+    assert carry_out(server, "faults seed 3; 1%: drop; exchange 4: echo") == {
+        "ok": True,
+        "faults": "seed 3; 1%: drop; exchange 4: echo",
+        "count": 0,
+        "fired": [],
+        "pending": ["exchange 4: echo"],
+    }
+    assert carry_out(server, "faults")["faults"] == "seed 3; 1%: drop; exchange 4: echo"
+    assert carry_out(server, "faults off")["faults"] == ""
+    server.close()
 
 
-def test_another_file_is_not_removed(path: Path) -> None:
-    path.write_text("mine")
+def test_supply_and_heat_of_one_servo_raise_its_alarms() -> None:
+    with simulate_bus("feetech", ids="1-2") as sim, open_bus(sim.url) as bus:
+        first, second = (motorbus.feetech.Servo(bus, node) for node in (1, 2))
+        assert order(sim.simulator, "supply 1 16V") == OK
+        assert first.voltage() == 16.0
+        assert any("voltage" in alarm for alarm in first.alarms())
+        assert order(sim.simulator, "supply 1 7400mV") == OK
+        assert order(sim.simulator, "heat 1 85C") == OK
+        assert first.temperature() == pytest.approx(85, abs=1)
+        assert any("temperature" in alarm or "heat" in alarm for alarm in first.alarms())
+        assert second.alarms() == ()
+
+
+@pytest.mark.parametrize("model", ["sts3215", "scs0009", "hls3925"])
+def test_a_pushed_shaft_turns_and_returns_with_torque(model: str) -> None:
+    with simulate_bus("feetech", model=model) as sim, open_bus(sim.url) as bus:
+        servo = motorbus.feetech.Servo(bus, 1)
+        servo.enable_torque()
+        start = servo.position()
+        assert order(sim.simulator, "push 1 -20deg") == OK
+        assert servo.position() < start - radians(10)
+        sim.wait(sim.now + 2.0)
+        assert servo.position() == pytest.approx(start, abs=0.02)
+
+
+@pytest.mark.parametrize("after", [0.0, 0.1, 0.5, 1.0])
+def test_a_blocked_shaft_stops_and_a_released_one_completes_its_move(after: float) -> None:
+    with simulate_bus("feetech") as sim, open_bus(sim.url) as bus:
+        servo = motorbus.feetech.Servo(bus, 1)
+        servo.enable_torque()
+        servo.move(radians(270), wait=False)
+        sim.wait(sim.now + after)
+        assert order(sim.simulator, "block 1") == OK
+        blocked = servo.position()
+        sim.wait(sim.now + 1.0)
+        assert servo.position() == pytest.approx(blocked, abs=0.002)
+        assert order(sim.simulator, "release 1") == OK
+        sim.wait(sim.now + 4.0)
+        assert servo.position() == pytest.approx(radians(270), abs=0.01)
+
+
+def test_a_load_shows_until_it_is_released() -> None:
+    with simulate_bus("feetech") as sim, open_bus(sim.url) as bus:
+        servo = motorbus.feetech.Servo(bus, 1)
+        servo.enable_torque()
+        for text, load in (("load 1 50%", 0.5), ("load 1 -25%", -0.25), ("release 1", 0.0)):
+            assert order(sim.simulator, text) == OK
+            assert servo.read("present_load")["present_load"] == pytest.approx(load, abs=0.01)
+
+
+def test_a_blocked_range_bounds_a_push() -> None:
+    with simulate_bus("feetech", position=1500) as sim, open_bus(sim.url) as bus:
+        servo = motorbus.feetech.Servo(bus, 1)
+        assert order(sim.simulator, "block 1 1deg 350deg") == OK
+        assert order(sim.simulator, "push 1 1turn") == OK
+        sim.wait(sim.now + 10.0)
+        assert servo.position() == pytest.approx(radians(350), abs=0.01)
+
+
+def test_a_device_without_physics_refuses_the_order() -> None:
+    kst = families.load("kst").simulator((0x25,))
+    assert order(kst, "load 0x25 50%") == OK
+    assert order(kst, "heat 37 80C") == OK
+    assert kst.nodes[0x25].status()["temperature"] == 80.0
+    stepper = families.load("stepper").simulator((1,))
+    for word in ("block 1", "push 1 30deg", "load 1 50%", "release 1", "supply 1 5V"):
+        assert "does not simulate" in order(stepper, word)["error"]
+    assert order(stepper, "set-input 1 1 on") == OK
+    assert "error" in order(stepper, "set-input 1 99 on")
+
+
+# The socket.
+
+
+def test_many_orders_in_any_pieces_are_answered_in_order(tmp_path: Path) -> None:
+    with socket_of(tmp_path / "control", simulate((1,))), connected(tmp_path / "control") as connection:
+        assert stat.S_IMODE((tmp_path / "control").stat().st_mode) == 0o600
+        lines = b"status\nhelp\nunplug 9\nfaults\n" * 50
+        for start in range(0, len(lines), 7):
+            connection.sendall(lines[start : start + 7])
+        with connection.makefile() as replies:
+            keys = [next(iter(json.loads(replies.readline()).items())) for _ in range(200)]
+    assert [key for key, _ in keys] == ["ok", "ok", "error", "ok"] * 50
+
+
+def test_a_program_that_does_not_read_gets_all_replies_later_and_holds_up_nobody(tmp_path: Path) -> None:
+    path, count = tmp_path / "control", 400
+    with socket_of(path, simulate(range(1, 9))), connected(path) as silent:
+        silent.settimeout(0.5)
+        sent = b"status\n" * count
+        try:
+            while sent:
+                sent = sent[silent.send(sent) :]
+        except TimeoutError:
+            pass
+        with connected(path) as other:
+            assert ask(other, "help")["ok"] is True
+        silent.settimeout(LIMIT)
+        with silent.makefile() as replies:
+            for _ in range(count - -(-len(sent) // 7)):
+                assert '"ok": true' in replies.readline()
+
+
+def test_an_endless_order_is_refused_and_its_program_dropped(tmp_path: Path) -> None:
+    path = tmp_path / "control"
+    with socket_of(path, simulate((1,))), connected(path) as connection:
+        connection.sendall(b"x" * (MAX_LINE + 1))
+        with connection.makefile() as replies:
+            assert "at most" in json.loads(replies.readline())["error"]
+            assert replies.readline() == ""
+        with connected(path) as other:
+            assert ask(other, "help")["ok"] is True
+
+
+def test_too_many_programs_are_turned_away(tmp_path: Path) -> None:
+    path = tmp_path / "control"
+    with socket_of(path, simulate((1,))), ExitStack() as stack:
+        for _ in range(MAX_CLIENTS):
+            assert ask(stack.enter_context(connected(path)), "help")["ok"] is True
+        assert stack.enter_context(connected(path)).recv(1) == b""
+
+
+def test_a_path_that_is_taken(tmp_path: Path) -> None:
+    server = Server(simulate((1,)), rate=1_000_000)
+    file, left = tmp_path / "file", tmp_path / "left"
+    file.touch()
     with pytest.raises(RequestError, match="no socket"):
-        ControlSocket(path, simulate((1,)))
-    assert path.read_text() == "mine"
-
-
-def test_a_folder_that_is_not_there_and_a_path_too_long(path: Path) -> None:
-    with pytest.raises(LinkError):
-        ControlSocket(path / "missing" / "control", simulate((1,)))
-    with pytest.raises(RequestError):
-        ControlSocket(path.with_name("x" * 200), simulate((1,)))
+        ControlSocket(file, server)
+    with pytest.raises(RequestError, match="control socket"):
+        ControlSocket(tmp_path / ("x" * 120), server)
+    with closing(socket.socket(socket.AF_UNIX)) as dead:
+        dead.bind(os.fspath(left))
+    control = ControlSocket(left, server)
+    with pytest.raises(PortBusy):
+        ControlSocket(left, server)
+    control.close()
+    control.close()
+    assert not left.exists()
+    server.close()

@@ -1,43 +1,23 @@
-"""A mount at work in a thread of the test, ended and joined with it, and clients that use nothing but the system."""
+"""A server at work in a thread of the test, ended and joined with it, and clients that use nothing but the system."""
 
 from __future__ import annotations
 
 import os
 import select
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from motorbus.simulation.mount import Mount
+from motorbus.simulation.server import Server, ServerThread
 
 PATIENCE = 10.0
 
 
 @contextmanager
-def served(mount: Mount) -> Iterator[None]:
-    """Serve in a thread; whatever the loop raises is raised here."""
-    stop, ring = os.pipe()
-    errors: list[BaseException] = []
-
-    def work() -> None:
-        try:
-            mount.serve(stop)
-        except BaseException as error:
-            errors.append(error)
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    try:
+def served(server: Server) -> Iterator[None]:
+    """Serve in a thread; an error of the loop is raised here."""
+    with ServerThread(server):
         yield
-    finally:
-        os.write(ring, b".")
-        thread.join(PATIENCE)
-        assert not thread.is_alive()
-        os.close(stop)
-        os.close(ring)
-    if errors:
-        raise errors[0]
 
 
 def received(descriptor: int, count: int, patience: float = PATIENCE) -> str:

@@ -59,7 +59,7 @@ class Simulator:
     def __init__(self, port: Path, family: str, *arguments: str) -> None:
         self.port = port
         self.control = port.with_name(port.name + ".control")
-        flags = ("--link", str(port), "--control", str(self.control), "--quiet", "--json")
+        flags = ("--link", str(port), "--control", str(self.control), "--json")
         self._child = _started(("-m", "motorbus", "simulate", family, *flags, *arguments))
         assert self._child.stdout is not None
         ready = self._child.stdout.readline()
@@ -114,7 +114,7 @@ class Simulated:
         pace: bool = False,
         **flags: str,
     ) -> None:
-        words = ["-m", "motorbus", "simulate", family, "--ids", ids, "--quiet", "--json"]
+        words = ["-m", "motorbus", "simulate", family, "--ids", ids, "--json"]
         words += ["--link", str(link)] if link else []
         words += ["--tcp", tcp] if tcp else []
         words += ["--pace"] if pace else []

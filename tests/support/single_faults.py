@@ -13,7 +13,7 @@ from motorbus.core.request import Data
 from motorbus.errors import MotorbusError
 from motorbus.link.base import Delivery, Line, PerfectLine, Side
 from motorbus.link.memory import MemoryLink
-from motorbus.simulation.faults import Fault, FaultyLine
+from tests.support.lines import ByteFault, ByteFaultLine
 from tests.support.world import Bus
 
 SPLIT = 0.0003
@@ -104,17 +104,17 @@ class Bytewise:
 
 def every_fault(
     length: int, values: Iterable[int] = EVERY, to: Side = Side.HOST, places: Iterable[int] | None = None
-) -> Iterator[Fault]:
+) -> Iterator[ByteFault]:
     """At each byte: lost, there twice, changed, parted from those before it, late; before and behind it one more."""
     values = tuple(values)
     for byte in range(length + 1) if places is None else places:
         if byte < length:
-            yield Fault(1, byte, "drop", to)
-            yield Fault(1, byte, "duplicate", to)
-            yield Fault(1, byte, "delay", to, seconds=SPLIT)
-            yield Fault(1, byte, "delay", to, seconds=LATE)
-            yield from (Fault(1, byte, "corrupt", to, value=value) for value in values if value)
-        yield from (Fault(1, byte, "insert", to, value=value) for value in values)
+            yield ByteFault(1, byte, "drop", to)
+            yield ByteFault(1, byte, "duplicate", to)
+            yield ByteFault(1, byte, "delay", to, seconds=SPLIT)
+            yield ByteFault(1, byte, "delay", to, seconds=LATE)
+            yield from (ByteFault(1, byte, "corrupt", to, value=value) for value in values if value)
+        yield from (ByteFault(1, byte, "insert", to, value=value) for value in values)
 
 
 def number_of(length: int, values: int = 256) -> int:
@@ -122,9 +122,9 @@ def number_of(length: int, values: int = 256) -> int:
     return length * (4 + values - 1) + (length + 1) * values
 
 
-def scripted(fault: Any) -> FaultyLine:
-    """A line with this one fault of a script."""
-    return FaultyLine([fault])
+def scripted(fault: Any) -> ByteFaultLine:
+    """A line with this one fault."""
+    return ByteFaultLine(fault)
 
 
 def suffer(

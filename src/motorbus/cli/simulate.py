@@ -6,29 +6,24 @@ import difflib
 import gc
 import os
 import signal
-import time
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
 
 from cyclopts import App, Parameter
 
 from motorbus import families, session
-from motorbus.cli import faulty
 from motorbus.cli.exits import Exit
+from motorbus.cli.files import usable
 from motorbus.cli.output import Output
 from motorbus.core import units
 from motorbus.errors import RequestError
-from motorbus.link.lock import served_by_simulator
-from motorbus.simulation.clients import CanClient, Door
+from motorbus.simulation.can_channel import CanChannel, may_have_wire
 from motorbus.simulation.control import ControlSocket
-from motorbus.simulation.faulted import SCHEMA, Faulted
-from motorbus.simulation.faults import Script, World
-from motorbus.simulation.listener import TcpListener, TcpPort, parse_endpoint
-from motorbus.simulation.mount import Mount, Place
+from motorbus.simulation.faults import EXAMPLE, KINDS, Script, parse
 from motorbus.simulation.pty import PtyMaster
-from motorbus.simulation.served import check_harmless, join
-from motorbus.simulation.slcan import SlcanAdapter
+from motorbus.simulation.server import Port, Server, faults_on_wire
+from motorbus.simulation.tcp import TcpPort, parse_endpoint
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -40,22 +35,20 @@ app = App(
     help_epilogue="""Prints one line when it is ready, then serves until Ctrl-C or SIGTERM, and
 removes its link and its control socket. Told no way to the bus, it says which
 pseudo-terminal it has made. --tcp without a host binds 127.0.0.1; there is no
-login. The control socket takes one order a line:
-status, power-cycle [ID], unplug ID, plug ID, set-input ID INPUT on|off,
-faults [SCRIPT|off], help, and for the shaft of a FEETECH servo
-block ID [LOW HIGH], push ID ANGLE, load ID PERCENT, release ID (of a KST
-servo load and release).
+login. The control socket takes one order a line and replies with JSON:
+status, power-cycle [ID], unplug ID, plug ID, supply ID VOLTS, heat ID CELSIUS,
+set-input ID INPUT on|off, faults [SCRIPT|off], help, and for the shaft of a
+FEETECH servo block ID [LOW HIGH], push ID ANGLE, load ID PERCENT, release ID
+(of a KST servo load and release).
 
 A CAN bus is served by the slcan protocol on --link and --tcp, and may be
 served in several ways at once: what one program sends, the others see.
 
 --faults takes a script of what goes wrong, one fault a line or between
-semicolons, or a file with one: `exchange 17 byte 3: drop`, `1% of bytes:
-corrupt`, `at 2.5 s: unplug 0.5`. `--faults help` lists all of them. What
-happened is printed to stderr, and at the end how to have it again and which
-of them have not happened; --quiet leaves that out. With --can they are refused
-unless that bus is made of programs alone: virtual, udp_multicast, or socketcan
-with vcan0.
+semicolons, or a file with one: `exchange 17: drop`, `1%: corrupt`,
+`at 2.5 s: unplug 0.5`. `--faults help` lists all of them. With --can they are
+refused unless that bus is made of programs alone: virtual, udp_multicast, or
+socketcan with vcan0.
 
 A quirk of the family may be given as a flag: --profile kst-ext.
 
@@ -72,9 +65,8 @@ Examples:
 
 Flag = Annotated[bool, Parameter(negative="")]
 Faults = Annotated[str | None, Parameter(help="What goes wrong: a script, or a file with one, or help.")]
-Switched = Annotated[
-    tuple[str, ...], Parameter(help="NAME=VALUE, how they behave where real ones differ.", negative="")
-]
+MAX_SCRIPT: Final = 1 << 20
+"""Bytes of a file with a script."""
 _OWN = (
     "ids",
     "model",
@@ -86,8 +78,6 @@ _OWN = (
     "bitrate",
     "control",
     "faults",
-    "quiet",
-    "switch",
 )
 
 
@@ -114,8 +104,6 @@ def simulate(
     bitrate: Annotated[str, Parameter(help="The rate of a CAN bus until a client sets one.")] = "",
     control: Annotated[Path | None, Parameter(help="A local socket to make, which takes orders.")] = None,
     faults: Faults = None,
-    quiet: Annotated[Flag, Parameter(help="Do not print to stderr which faults happened.")] = False,
-    switch: Switched = (),
     output: Annotated[Output, Parameter(parse=False)],
     **flags: Annotated[str, Parameter(help="A switch of the family, as --NAME VALUE.")],
 ) -> Exit:
@@ -123,48 +111,57 @@ def simulate(
     output.simulated = True
     found = families.load(family)
     if faults == "help":
-        return faulty.listed(output)
-    script = _script(faults, can, found)
-    options, settings = _sorted(found, {**_switched(switch), **flags})
+        return _list_faults(output)
+    script = _script(faults)
+    if script.faults and can and may_have_wire(f"can://{can}"):
+        raise faults_on_wire(f"can://{can}")
+    options, settings = _sorted(found, flags)
     simulator = found.simulator(session.parse_ids(ids), model, **options)
     asked = _rate(found, baud, bitrate)
     usual: int = getattr(simulator, "usual_rate", None) or found.link.rate
     rate = asked or usual
-    simulator.tune(rate)
-    if usual != found.link.rate and found.link.kind == "bytes":
+    is_can = found.link.kind == "frames"
+    if usual != found.link.rate and not is_can:
         settings["baud"] = str(rate)  # these devices ship with another rate than most of their family
     with ExitStack() as stack:
-        stop = stack.enter_context(_until_signalled())
-        served = _served(stack, found, Ways(link, tcp, can), asked)
-        controls = [stack.enter_context(closing(ControlSocket(control, simulator)))] if control else []
-        world = World(simulator, now=time.monotonic())
-        places = [place for place, _ in served]
-        mount = Mount(world, *places, pace=rate if pace else None, rate=rate, attendants=controls)
-        faulted = _faulted(mount, world, script, controls)
-        buses = [f"{family}:{port}{_appended(settings, port, asked)}" for _, port in served]
+        served = _open_ports(stack, found, Ways(link, tcp, can), asked)
+        ports = [port for port, _ in served]
+        server = Server(simulator, *ports, rate=rate, slcan=is_can, pace=pace)
+        stack.enter_context(closing(server))
+        server.set_faults(script)
+        stack.enter_context(_stopped_by_signals(server))
+        if control:
+            stack.enter_context(closing(ControlSocket(control, server)))
+        buses = [f"{family}:{name}{_appended(settings, name, asked)}" for _, name in served]
         gc.collect()  # before the ready line: the first request is answered without this delay
         gc.freeze()  # hundreds of devices live as long as this; to look through them again and again makes replies late
         _ready(output, buses, family, sorted(simulator.nodes), ids)
-        _serve(mount, stop, faulted, None if quiet else output)
-        _ended(output, faulted)
+        server.serve()
+        if server.faults.count:
+            output.note(f"faults: {server.faults.count} happened")
     return Exit.OK
 
 
-def _script(said: str | None, can: str, family: Family) -> Script:
-    """What is to go wrong. Raises RequestError for a bad script, and for any where real devices may be."""
-    script = faulty.from_option(said)
-    if script.faults and can and family.link.kind == "frames":
-        check_harmless(f"can://{can}")
+def _script(text: str | None) -> Script:
+    """The faults in this text or in the file of this name. Raises RequestError."""
+    if text is None:
+        return Script()
+    file = Path(text)
+    if len(text) < 256 and file.is_file():
+        with usable(file, "read"), file.open("rb") as opened:
+            text = opened.read(MAX_SCRIPT).decode("utf-8-sig", errors="replace")
+    script = parse(text)
+    if not script.faults:
+        raise RequestError("--faults: there is no fault in it", expected="a script or a file", advice=EXAMPLE)
     return script
 
 
-def _faulted(mount: Mount, world: World, script: Script, controls: Iterable[ControlSocket]) -> Faulted:
-    """What is to go wrong, and those who may change it."""
-    faulted = Faulted(mount, world)
-    faulted.set(script)
-    for control in controls:
-        control.faults = faulted
-    return faulted
+def _list_faults(output: Output) -> Exit:
+    """Every kind of fault with its arguments."""
+    rows = [{"fault": f"{name}{kind.form}", "effect": kind.help} for name, kind in KINDS.items()]
+    output.document("motorbus.faults/2", {"faults": rows})
+    output.table("Faults", ["fault", "effect"], [list(row.values()) for row in rows])
+    return Exit.OK
 
 
 def _ready(output: Output, buses: Sequence[str], family: str, nodes: Sequence[int], ids: str) -> None:
@@ -175,67 +172,25 @@ def _ready(output: Output, buses: Sequence[str], family: str, nodes: Sequence[in
     output.text(f"ready: {' and '.join(buses)}  (simulated: {count}, ids {ids})")
 
 
-def _serve(mount: Mount, stop: int, faulted: Faulted, output: Output | None) -> None:
-    """Serve until `stop` turns readable; print to stderr which faults happened, unless there is no output."""
-    if output is None:
-        mount.serve(stop)
-        return
-    _note(output, faulted.news())
-    while not mount.step(stop):
-        _note(output, (*faulted.news(), *faulted.remarks(time.monotonic())))
-    _note(output, (*faulted.news(), *faulted.remarks(time.monotonic())))
-    _note(output, (*faulted.rest(), *filter(None, [faulted.replay()]), *faulted.unhappened()))
-
-
-def _ended(output: Output, faulted: Faulted) -> None:
-    """With --json, what came of the faults, if there was ever a script."""
-    if faulted.used:
-        output.document(SCHEMA, faulted.facts())
-
-
-def _note(output: Output, lines: Iterable[str]) -> None:
-    for line in lines:
-        output.note(line, limit=None)  # it may hold a script to be used again
-
-
-def _served(stack: ExitStack, family: Family, ways: Ways, bitrate: int) -> list[tuple[Place, str]]:
-    """Where clients come in, and what a host calls each."""
-    if family.link.kind == "frames":
-        return list(_frames(stack, ways, bitrate, family.link.rate))
-    return [_bytes(stack, ways)]
-
-
-def _bytes(stack: ExitStack, ways: Ways) -> tuple[Place, str]:
-    """The open port, and what a host calls it."""
-    if ways.can:
+def _open_ports(stack: ExitStack, family: Family, ways: Ways, rate: int) -> list[tuple[Port, str]]:
+    """The open ports, and what a host calls each."""
+    is_can = family.link.kind == "frames"
+    if not is_can and ways.can:
         raise RequestError("these devices speak on a serial line, not on CAN", expected="--link or --tcp")
-    if ways.tcp and ways.link:
+    if not is_can and ways.tcp and ways.link:
         raise RequestError("a serial line is served on --link or on --tcp, not on both")
-    if ways.tcp:
-        listener = stack.enter_context(closing(TcpListener(*parse_endpoint(ways.tcp))))
-        stack.enter_context(served_by_simulator(listener.url))
-        return listener, listener.url
-    terminal = stack.enter_context(closing(PtyMaster()))
-    if ways.link is None:
-        return terminal, terminal.slave_name
-    terminal.symlink(ways.link)
-    return terminal, str(ways.link)
-
-
-def _frames(stack: ExitStack, ways: Ways, said: int, usual: int) -> Iterator[tuple[Place, str]]:
-    """Every way to the CAN bus, and what a host calls it."""
+    found: list[tuple[Port, str]] = []
     if ways.link or not any(ways):
-        terminal = stack.enter_context(closing(PtyMaster()))
-        if ways.link:
-            terminal.symlink(ways.link)
-        name = ways.link.absolute() if ways.link else terminal.slave_name
-        yield CanClient(terminal, SlcanAdapter()), f"can://slcan{name}"
+        terminal = stack.enter_context(closing(PtyMaster(ways.link)))
+        name = str(Path(terminal.name).absolute()) if is_can else terminal.name
+        found.append((terminal, f"can://slcan{name}" if is_can else name))
     if ways.tcp:
-        door = Door(TcpPort(*parse_endpoint(ways.tcp)), SlcanAdapter)
-        stack.enter_context(served_by_simulator(f"socket://{door.port.address}"))
-        yield stack.enter_context(closing(door)), f"can://slcan/socket://{door.port.address}"
+        port = stack.enter_context(closing(TcpPort(*parse_endpoint(ways.tcp))))
+        found.append((port, f"can://slcan/{port.name}" if is_can else port.name))
     if ways.can:
-        yield stack.enter_context(closing(join(f"can://{ways.can}", said, usual))), f"can://{ways.can}"
+        channel = CanChannel(f"can://{ways.can}", rate, family.link.rate)
+        found.append((stack.enter_context(closing(channel)), channel.name))
+    return found
 
 
 def _rate(family: Family, baud: str, bitrate: str) -> int:
@@ -258,15 +213,6 @@ def _appended(settings: Mapping[str, str], port: str, bitrate: int) -> str:
     """The options that a host needs to open the bus as it is served here."""
     options = {**settings, **({"bitrate": str(bitrate)} if bitrate and "://slcan/" in port else {})}
     return "".join(f",{name}={value}" for name, value in options.items())
-
-
-def _switched(texts: Sequence[str]) -> dict[str, str]:
-    pairs = [text.partition("=")[::2] for text in texts]
-    if not all(name and value for name, value in pairs):
-        raise RequestError(
-            f"--switch {' '.join(texts)}: not NAME=VALUE", expected="as broadcast-ping=in_turn"
-        )
-    return dict(pairs)
 
 
 def _sorted(family: Family, given: Mapping[str, str]) -> tuple[dict[str, str], dict[str, str]]:
@@ -293,15 +239,12 @@ def _unknown(name: str, family: str, known: Iterable[str]) -> RequestError:
 
 
 @contextmanager
-def _until_signalled() -> Iterator[int]:
-    """A descriptor that turns readable at SIGINT or SIGTERM, which end nothing by themselves meanwhile."""
-    readable, writable = os.pipe()
+def _stopped_by_signals(server: Server) -> Iterator[None]:
+    """SIGINT and SIGTERM end the server, and nothing else meanwhile."""
     names = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.signal(name, lambda number, frame: os.write(writable, b"!") and None) for name in names]
+    before = [signal.signal(name, lambda number, frame: server.stop()) for name in names]
     try:
-        yield readable
+        yield
     finally:
         for name, handler in zip(names, before, strict=True):
             signal.signal(name, handler)
-        os.close(readable)
-        os.close(writable)

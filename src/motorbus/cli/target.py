@@ -106,13 +106,15 @@ def gathered(texts: Iterable[str]) -> dict[str, tuple[int, ...]]:
 def opened(bus: str, options: Mapping[str, str], output: Output) -> Iterator[Bus]:
     """An open bus, closed at the end; says what the user ought to know about the port, and what its operations tell."""
     from motorbus import session
+    from motorbus.motion.safety import Gate
 
     def tell(event: object) -> None:
         say = faces.offer(found.family.name, "say")
         if say is not None and (text := say(event)):
             output.note(f"note: {text}")
 
-    with session.open(bus, report=tell, **with_estops(bus, said(options))) as found, traced(found):
+    estops = with_estops(bus, said(options))
+    with session.open(bus, report=tell, interlock=Gate(), **estops) as found, traced(found):
         output.simulated = output.simulated or found.simulated
         LOG.info("%s is open at %d bit/s", bus, found.rate)
         fenced(found, bus, output)

@@ -16,7 +16,7 @@ from motorbus.journal import Change
 from motorbus.motion.body import Body
 from motorbus.motion.safety import restarts
 from motorbus.motion.safety.gate import Gate
-from motorbus.session.keeping import unfinished
+from motorbus.session.journals import unfinished
 
 
 def faults(body: Body) -> dict[str, str]:

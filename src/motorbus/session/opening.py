@@ -1,167 +1,186 @@
-"""An address and its options, checked before a port is opened: family, port, rate, options."""
+"""Open a bus, blocking or async: its link, driver, interlock, journal and stop socket. Make a simulated bus."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import NamedTuple
+import logging
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from motorbus import families
-from motorbus.core import units
-from motorbus.core.family import BusDriver, Family
-from motorbus.errors import RequestError
+from motorbus.bus.base import BaseBus
+from motorbus.bus.blocking import Bus
+from motorbus.bus.interlock import DeviceLimits, Interlock
+from motorbus.core.request import Request
+from motorbus.errors import MotorbusError, RequestError
+from motorbus.link.base import Link
+from motorbus.link.lock import socket_path
 from motorbus.link.memory import MemoryLink
-from motorbus.session.address import parse_address, parse_ids
-from motorbus.simulation.faults import strike
+from motorbus.link.reconnect import Reconnecting, reconnecting
+from motorbus.link.url import open_link
+from motorbus.session.address import parse_ids
+from motorbus.session.journals import journal_for
+from motorbus.session.options import Opening, is_simulated, prepare
+from motorbus.simulation import Simulation, find
+from motorbus.simulation.faulty import FaultyBus
 
-LATEST = 1.0  # s
-FAULTS = "faults"
-"""The option for a script of faults, for simulated devices only; see `motorbus.simulation.faults`."""
-ADAPTER = "can://"
-"""Ports whose remaining options belong to the adapter; `link.can` checks them."""
+if TYPE_CHECKING:
+    from motorbus.bus.aio import AsyncBus
 
-LATENCY = "latency"
-"""The option of every serial port for the time (s) that its adapter holds bytes back."""
-RECONNECT = "reconnect"
-"""The option of every bus for whether a lost port is opened again."""
+LOG = logging.getLogger("motorbus.session")
+logging.getLogger("motorbus").addHandler(logging.NullHandler())  # silent by default
+
+Notify = Callable[[object], None]
+AnyBus = TypeVar("AnyBus", bound=BaseBus)
 
 
-class Opening(NamedTuple):
-    """All that is needed to open a bus.
+def open(
+    address: str, *, report: Notify | None = None, interlock: Interlock | None = None, **options: object
+) -> Bus:
+    """Open a bus, blocking; use it in a `with`.
 
-    `driver` is that of this bus; `rate` in bit/s, 0 if not given; `options` are for the simulator or the link.
-    `reconnect`: a lost port is opened again when it is back.
+    `report` gets progress, early results and journal entries, the latter when they are on disk. `interlock` judges
+    motion requests, by default `DeviceLimits`. Options may also stand in the address. An unfinished guarded change is a
+    warning of the bus, see `unfinished`. Raises RequestError for a bad address, PortNotFound, PortBusy (with the owner)
+    or LinkError for the port.
     """
-
-    driver: BusDriver
-    port: str
-    rate: int
-    options: dict[str, object]
-    reconnect: bool = True
-
-    @property
-    def family(self) -> Family:
-        """The family of the devices."""
-        return self.driver.family
-
-
-def prepare(address: str, options: dict[str, object]) -> Opening:
-    """Check an address and its options without touching the port. Raises RequestError."""
-    spot = parse_address(address)
-    family = families.load(spot.family)
-    merged: dict[str, object] = {**spot.options, **options}
-    word = "baud" if family.link.kind == "bytes" else "bitrate"
-    rate = _rate(word, merged.pop(word)) if word in merged else 0
-    reconnect = _yes(RECONNECT, merged.pop(RECONNECT, True))
-    timing = _timing(merged) if _is_serial(family, spot.port) else {}
-    settings = {option.name: merged[option.name] for option in family.link.settings if option.name in merged}
-    simulated = spot.port == "sim"
-    if FAULTS in merged and not simulated:
-        raise _no_faults(address, spot.port)
-    known = (
-        {"ids", "model", FAULTS, *(option.name for option in family.simulator_options())}
-        if simulated
-        else set()
-    )
-    rest = {name: value for name, value in merged.items() if name in known or name not in settings}
-    unknown = sorted(set(rest) - known)
-    if unknown and not spot.port.startswith(ADAPTER):
-        more = {LATENCY} if _is_serial(family, spot.port) else set()
-        here = [option.name for option in family.link.settings]
-        usual = [name for name in ("ids", "model", FAULTS) if name in known]
-        raise _unknown(address, unknown[0], [word, *usual, *here, *sorted(more), RECONNECT, *sorted(known)])
-    return Opening(family.open(**settings), spot.port, rate, {**rest, **timing}, reconnect)
+    bus = _make(Bus, address, report, interlock, options)
+    try:
+        test = echo_test(bus)
+        if test is not None:
+            try:
+                bus.run(test)
+            except MotorbusError as silence:
+                LOG.debug("echo test: %s", silence.summary)
+            warn_of_echo(bus)
+    except BaseException:
+        bus.close()
+        raise
+    bus.defer_signals()
+    return bus
 
 
-def simulated(opening: Opening) -> MemoryLink:
-    """Make the simulated devices of an address with the port `sim`, on a bus in memory.
+def open_async(
+    address: str, *, report: Notify | None = None, interlock: Interlock | None = None, **options: object
+) -> AsyncBus:
+    """Open a bus for asyncio; use it in an `async with`. Arguments and errors as for `open`."""
+    from motorbus.session.opening_async import OpenAsyncBus  # a blocking program does not import asyncio
 
-    Raises RequestError for bad ids, an unknown model, a bad option or bad faults.
+    return _make(OpenAsyncBus, address, report, interlock, options)
+
+
+def simulate(
+    family: str,
+    *,
+    ids: str | tuple[int, ...] = "1",
+    model: str = "",
+    clock: str = "virtual",
+    name: str | None = None,
+    faults: str = "",
+    **options: object,
+) -> Simulation:
+    """A simulated bus in this process; use it in a `with`, open it by its `url`, use its devices by `sim[3]`.
+
+    `clock` is "virtual" (time passes only while a caller waits) or "real"; `faults` is a script, see
+    `motorbus.simulation.faults`. Raises RequestError for an unknown family, model or option, and for a bad script.
+    """
+    found = families.load(family)
+    numbers = parse_ids(ids) if isinstance(ids, str) else ids
+    return Simulation(found, numbers, model=model, clock=clock, name=name, faults=faults, **options)
+
+
+def simulated_link(opening: Opening) -> MemoryLink:
+    """Make the simulated devices of an address with the port `sim`, and the link to them.
+
+    `clock=virtual` suits a program that only waits for its bus. Raises RequestError for bad ids, an unknown model, a
+    bad option or bad faults.
     """
     family, options = opening.family, dict(opening.options)
     ids = parse_ids(str(options.pop("ids", "1")))
-    model, faults = str(options.pop("model", "")), options.pop(FAULTS, "")
+    model, faults = str(options.pop("model", "")), str(options.pop("faults", ""))
+    clock = options.pop("clock", "real")
+    if clock not in ("virtual", "real"):
+        raise RequestError(f"clock={clock} is not possible", expected="virtual or real")
     simulator = family.simulator(ids, model, **options)
-    rate = opening.rate or family.link.rate
-    memory = MemoryLink(simulator, rate=rate, virtual=False, name=f"{family.name}:sim")
+    link = MemoryLink(
+        simulator,
+        rate=opening.rate or family.link.rate,
+        virtual=clock == "virtual",
+        name=f"{family.name}:sim",
+    )
     if faults:
-        strike(memory, str(faults))
-    return memory
+        bus = FaultyBus(simulator, lambda seconds: link.unplug(seconds=seconds))
+        bus.set(faults, link.now())
+        link.simulator, link.line = bus, bus
+    return link
 
 
-def _unknown(address: str, option: str, known: Iterable[str]) -> RequestError:
-    """The error for an unknown option; the most usual of the `known` come first."""
-    from motorbus.motion.machine.refusal import listed, nearest  # opening a bus imports no machine
-
-    there = dict.fromkeys(known)
-    return RequestError(
-        f"{address!r}: unknown option {option!r}",
-        expected=listed(there),
-        advice=f"{nearest(option, there, 'take it out of the address')}; nothing was opened",
-    )
+def echo_test(bus: BaseBus) -> Request[Any] | None:
+    """Log the warnings of the bus; return the request that shows an echo, None where the family needs none."""
+    for warning in bus.warnings:
+        LOG.warning("%s: %s", bus.link.name, warning)
+    test = bus.driver.echo_test()
+    if test is not None:
+        bus.expect_echo(test)
+    return test
 
 
-def _is_serial(family: Family, port: str) -> bool:
-    """A port that carries bytes, and is not a simulator in this process."""
-    return family.link.kind == "bytes" and port.partition(":")[0] != "sim"
+def warn_of_echo(bus: BaseBus) -> None:
+    """Log that the adapter echoes, if the test has shown it."""
+    if bus.echoes:
+        LOG.warning("%s: the adapter echoes what is sent; the echo is taken off", bus.link.name)
 
 
-def _timing(merged: dict[str, object]) -> dict[str, object]:
-    """Remove the options about reply times and return them as the link takes them."""
-    return {LATENCY: _latency(merged.pop(LATENCY))} if LATENCY in merged else {}
-
-
-def _latency(said: object) -> float:
-    """The option in s."""
+def _make(
+    kind: Callable[..., AnyBus],
+    address: str,
+    report: Notify | None,
+    interlock: Interlock | None,
+    options: dict[str, object],
+) -> AnyBus:
+    """A bus of this kind on its open link; nothing is sent."""
+    opening = prepare(address, options)
+    link = _open_link(opening)
     try:
-        seconds = units.parse(str(said), "time")
-    except RequestError as refusal:
-        raise RequestError(f"{LATENCY}={said}: {refusal.summary}", expected=refusal.expected) from None
-    if not 0 <= seconds <= LATEST:
-        raise RequestError(
-            f"{LATENCY}={said}: no adapter holds bytes back for that long",
-            expected=f"0 to {LATEST:g} s, as 0, 1ms or 500us; 0 for a line without an adapter",
+        journal = journal_for(address, options, opening, link)
+        bus = kind(
+            link,
+            opening.driver,
+            interlock=DeviceLimits() if interlock is None else interlock,
+            report=report,
+            journal=journal,
+            stop_socket=_stop_socket(opening, link),
         )
-    return seconds
+        if not opening.reconnect:
+            bus.reconnects = False
+        elif isinstance(bus.link, Reconnecting):  # an emergency stop finds the port under its new name
+            bus.link.on_rename = lambda name: bus.move_stop_socket(socket_path(name) if name else None)
+        if journal is not None and (warning := journal.warning()):
+            bus.warnings += (warning,)
+    except BaseException:
+        link.close()
+        raise
+    return bus
 
 
-def _no_faults(address: str, port: str) -> RequestError:
-    """Faults are for simulated devices: there is no way to put them in front of a port."""
-    here = port.startswith("sim:")
-    return RequestError(
-        f"{address!r}: {FAULTS} cannot be put in front of {'this bus' if here else 'a port'}: nothing was opened",
-        expected=f"a simulated bus, as FAMILY:sim,ids=1-6 with {FAULTS}",
-        cause="" if here else "whatever is behind a port may be real",
-        advice="set `faults` of the simulation that it belongs to"
-        if here
-        else "tell the simulator: motorbus simulate FAMILY --faults",
-    )
+def _open_link(opening: Opening) -> Link:
+    family = opening.family
+    if opening.port == "sim":
+        return simulated_link(opening)
+    if is_simulated(opening.port):
+        return find(opening.port.removeprefix("sim:"), family.name).link(opening.rate or family.link.rate)
+    arguments: dict[str, Any] = {
+        "rate": opening.rate,
+        "default_rate": family.link.rate,
+        "kind": family.link.kind,
+        "options": opening.options,
+    }
+    link = open_link(opening.port, **arguments)
+    return reconnecting(link, **arguments) if opening.reconnect else link
 
 
-def _yes(word: str, said: object) -> bool:
-    if isinstance(said, bool):
-        return said
-    if said not in ("yes", "no"):
-        raise RequestError(f"{word}={said}: neither yes nor no", expected="yes or no")
-    return said == "yes"
-
-
-def _rate(word: str, said: object) -> int:
-    try:
-        return units.rate(said)
-    except RequestError as refusal:
-        raise RequestError(
-            f"{word}={said}: not a rate in bit/s", expected=refusal.expected, advice=refusal.advice
-        ) from None
-
-
-def lock_name(address: str, options: Mapping[str, object]) -> str:
-    """The name of the port of this bus, for its lock and its stop socket, the same for all spellings of the address.
-
-    "" for a channel that several programs share. Raises RequestError.
-    """
-    opening = prepare(address, dict(options))
-    if not opening.port.startswith(ADAPTER):
-        return opening.port
-    from motorbus.link.can import read_address
-
-    return read_address(opening.port).lock_name
+def _stop_socket(opening: Opening, link: Link) -> Path | None:
+    if is_simulated(opening.port):
+        return None
+    name: str = getattr(link, "lock_name", opening.port)
+    return socket_path(name) if name else None

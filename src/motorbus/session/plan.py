@@ -19,10 +19,11 @@ from motorbus.motion.body import named as named_in
 from motorbus.motion.machine import AxisSpec, Machine
 from motorbus.motion.machine.agreement import check
 from motorbus.motion.machine.refusal import no_axes, of_file, path, refused
+from motorbus.motion.safety import Gate
 from motorbus.motion.several import named
 from motorbus.session.address import parse_address
-from motorbus.session.buses import AnyBus, open, open_async
-from motorbus.session.opening import lock_name, prepare, simulated
+from motorbus.session.opening import AnyBus, open, open_async, simulated_link
+from motorbus.session.options import lock_name, prepare
 
 
 class Plan(NamedTuple):
@@ -59,13 +60,15 @@ class Plan(NamedTuple):
     def open(self, name: str, report: Callable[[object], None] | None) -> Bus:
         """Open one of the buses. Raises as `motorbus.open`, naming the file and the bus in it."""
         with _of_bus(self.machine, name):
-            return open(self.machine.buses[name].address, report=report, **estop_options(self.machine, name))
+            address, options = self.machine.buses[name].address, estop_options(self.machine, name)
+            return open(address, report=report, interlock=Gate(), **options)
 
     def open_async(self, name: str, report: Callable[[object], None] | None) -> AsyncBus:
         """The same for asyncio."""
         with _of_bus(self.machine, name):
             options = estop_options(self.machine, name)
-            return open_async(self.machine.buses[name].address, report=report, **options)
+            address = self.machine.buses[name].address
+            return open_async(address, report=report, interlock=Gate(), **options)
 
     def blocking(self, buses: Mapping[str, Bus]) -> dict[str, Axis]:
         """The axes on these buses, of whose devices nothing is known yet."""
@@ -117,7 +120,7 @@ def _try(address: str) -> None:
     """Make the simulated devices of an address, and throw them away. Raises RequestError where they cannot be."""
     opening = prepare(address, {})
     if opening.port == "sim":
-        simulated(opening)
+        simulated_link(opening)
 
 
 def _can_be_judged(address: str) -> bool:

@@ -1,5 +1,9 @@
-"""Simulated buses where others can reach them: on a pseudo-terminal or TCP port, or by name in this process.
+"""Simulated buses: by name in this process, and on real ports for any program.
 
-What a device does lives in its family's `simulator`; here is only how it is served: the clock, the pace of the wire,
-faults between, a control socket, and the names of those that are alive.
+What a device does is in the `simulator` of its family. Here are the clock, the wire, faults, ports and the control
+socket.
 """
+
+from motorbus.simulation.named import Simulation, find
+
+__all__ = ["Simulation", "find"]

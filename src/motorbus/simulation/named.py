@@ -1,53 +1,45 @@
-"""Simulated buses of this process, by name, so that an address can lead to one: `feetech:sim:NAME`.
+"""Simulated buses of this process, by name: `feetech:sim:NAME` is the address of one.
 
-A name is worth something in this process only, and only while the simulation is open. One host at a time has the
-bus, as with a real port; when it closes its link another may open one, and the motors stand where they stood.
+A name is valid in this process while the simulation is open. One host at a time has the bus, as with a real port; when
+it closes, the next one finds the motors where they stood.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
-from contextlib import nullcontext
 from itertools import count
 from math import inf
 from threading import Lock
-from types import TracebackType
-from typing import Any, Final, Self, TypeAlias
+from typing import Any, Final, Self
 
 from motorbus.core.family import Family, Simulator
 from motorbus.errors import PortBusy, PortNotFound, RequestError
 from motorbus.link.base import Line, PerfectLine
 from motorbus.link.memory import MemoryLink
-from motorbus.simulation.faults import Fault, FaultyLine, Script, World
-from motorbus.simulation.faults.script import requested
-from motorbus.simulation.faults.struck import is_calm, on_a_wire
-from motorbus.simulation.served import LinkClient, Served, check_harmless, join
-from motorbus.simulation.told import told
+from motorbus.simulation.can_channel import CanChannel
+from motorbus.simulation.faults import Script, parse
+from motorbus.simulation.faulty import FaultyBus
+from motorbus.simulation.server import Server, ServerThread
 
-Faults: TypeAlias = str | Script | Iterable[Fault]
-KNOCK: Final = 0.1
-"""s of virtual time that an attempt to open takes while the port is away; else it would never come back."""
+OPEN_TIME: Final = 0.1
+"""s of virtual time that an attempt to open takes while the port is unplugged; else it would never be back."""
 
-_live: dict[tuple[str, str], Simulation] = {}
+_open: dict[tuple[str, str], Simulation] = {}
 _numbers = count(1)
 _lock = Lock()
 
 
 class Simulation:
-    """A simulated bus, used in a `with`: open it by its `url`, poke its nodes by `simulation[3]`.
+    """A simulated bus, used in a `with`: open it by its `url`, use its devices by `simulation[3]`.
 
-    `simulator`  the simulated bus itself
+    `simulator`  the simulated devices
     `url`        its address, valid in this process until `close`
     `clock`      "virtual": time passes only while a host waits; "real": it runs
-    `pace`       set it before a link is opened and bytes take their time on the wire
-    `faults`     a script of what goes wrong, see `motorbus.simulation.faults`
+    `pace`       data takes its air time; set it before a link is opened
 
-    Raises RequestError for an unknown model or option, an impossible clock, or a name that is taken.
+    `faults` is a script, see `simulation.faults`; other options are those of the family. Raises RequestError for an
+    unknown model or option, an impossible clock, a bad script, or a name that is taken.
     """
-
-    def __repr__(self) -> str:
-        return f"<Simulation {self.url}, ids {', '.join(map(str, self.simulator.nodes))}>"
 
     def __init__(
         self,
@@ -57,7 +49,7 @@ class Simulation:
         model: str = "",
         clock: str = "virtual",
         name: str | None = None,
-        faults: Faults = "",
+        faults: str = "",
         **options: object,
     ) -> None:
         if clock not in ("virtual", "real"):
@@ -65,204 +57,182 @@ class Simulation:
         self.family = family
         self.clock = clock
         self.pace = False
-        named = {option.name for option in family.link.settings}
-        self.settings = {option: value for option, value in options.items() if option in named}
-        taken = {option.name for option in family.simulator_options()}
-        options = {
-            option: value for option, value in options.items() if option in taken or option not in named
-        }
+        settings = {option.name for option in family.link.settings}
+        self.settings = {option: value for option, value in options.items() if option in settings}
+        known = {option.name for option in family.simulator_options()}
+        options = {key: value for key, value in options.items() if key in known or key not in settings}
         self.simulator: Simulator = family.simulator(ids, model, **options)
-        self._line: Line = PerfectLine()
-        self._link: MemoryLink | Served | None = None
-        self._left_at = 0.0 if clock == "virtual" else time.monotonic()
-        self._away_until = -inf
-        self._gate = Lock()
-        self._world = World(self.simulator, port=self, now=self._left_at)
+        self._faulty = FaultyBus(self.simulator, lambda seconds: self.unplug(seconds=seconds))
         self._devices: Simulator = self.simulator
+        self._line: Line = PerfectLine()
+        self._host: MemoryLink | ServerThread | None = None
+        self._left_at = 0.0 if clock == "virtual" else time.monotonic()
+        self._back_at = -inf
+        self._mutex = Lock()
         if faults:
             self.faults = faults
         self.name = _register(self, name)
 
+    def __repr__(self) -> str:
+        return f"<Simulation {self.url}, ids {', '.join(map(str, self.simulator.nodes))}>"
+
     @property
     def url(self) -> str:
-        """The address that `motorbus.open` takes, with the settings of the bus, and its rate if it is not the usual."""
-        settings = "".join(f",{name}={value}" for name, value in {**self.settings, **self._rate()}.items())
-        return f"{self.family.name}:sim:{self.name}{settings}"
-
-    def _rate(self) -> dict[str, int]:
-        """As an option of the address: devices that ship with another rate than most say so by `usual_rate`."""
+        """The address for `motorbus.open`, with the settings of the bus, and its rate if it is not the usual one."""
+        settings = dict(self.settings)
         rate = getattr(self.simulator, "usual_rate", None)
-        word = "baud" if self.family.link.kind == "bytes" else "bitrate"
-        return {word: rate} if rate and rate != self.family.link.rate else {}
+        if rate and rate != self.family.link.rate:
+            settings["baud" if self.family.link.kind == "bytes" else "bitrate"] = rate
+        text = "".join(f",{name}={value}" for name, value in settings.items())
+        return f"{self.family.name}:sim:{self.name}{text}"
 
     @property
     def line(self) -> Line:
-        """What lies between host and devices; set it to do harm, at any time."""
+        """The wire between host and devices; a program may set another one at any time."""
         return self._line
 
     @line.setter
     def line(self, line: Line) -> None:
-        with self._gate:
-            self._check_wire(line)
+        if isinstance(self._host, ServerThread):
+            raise RequestError(f"{self.url} is served on a CAN channel, which has its own line")
+        with self._mutex:
             self._line = line
-            if self._link is not None:
-                self._link.simulator, self._link.line = self._devices, line
+            if self._host is not None:
+                self._host.simulator, self._host.line = self._devices, line
 
     @property
-    def faults(self) -> FaultyLine:
-        """What happens by script, and what has happened; set a script to have it from now on, "" for none.
+    def faults(self) -> FaultyBus:
+        """The faults and what happened; set a script to replace them from now on, "" for none.
 
-        Raises RequestError for a bad script, and for what these devices cannot do; the one before goes on then.
+        Raises RequestError for a bad script and for what is not possible here; the former faults stay then.
         """
-        return self._line if isinstance(self._line, FaultyLine) else FaultyLine()
+        return self._host.server.faults if isinstance(self._host, ServerThread) else self._faulty
 
     @faults.setter
-    def faults(self, script: Faults) -> None:
-        given = requested(script)
-        link = self._link
-        if given.faults:
-            self._check_wire()
-        self._world.port = None if isinstance(link, Served) else self
-        with link.still() if isinstance(link, Served) else nullcontext():
-            self._world.now = max(self._world.now, self._now())
-            line = FaultyLine(given, self._world)
-            self._devices = self._world
-            self.line = line
+    def faults(self, script: str | Script) -> None:
+        given = parse(script) if isinstance(script, str) else script
+        if isinstance(self._host, ServerThread):
+            with self._host.still():
+                self._host.server.set_faults(given)
+            return
+        self._faulty.set(given, self.now)
+        self._devices = self._faulty
+        self.line = self._faulty
 
     def unplug(self, *, seconds: float) -> None:
-        """Pull the port: whoever has it open gets LinkLost, and for so long (s) nobody can open it.
-
-        Raises RequestError while it is served on a channel of somebody else.
-        """
-        if isinstance(self._link, Served):
-            raise RequestError(f"{self.url} is served on a channel that cannot be pulled")
-        self._away_until = self._now() + seconds
-        if self._link is not None:
-            self._link.unplug(seconds=seconds)
+        """Unplug the port: the host gets LinkLost, and for so long (s) none can open it."""
+        if isinstance(self._host, ServerThread):
+            raise RequestError(f"{self.url} is served on a channel that cannot be unplugged")
+        self._back_at = self.now + seconds
+        if self._host is not None:
+            self._host.unplug(seconds=seconds)
 
     @property
     def now(self) -> float:
-        """The moment (s) on the devices' clock; a virtual one begins at 0."""
-        return self._now()
+        """The moment (s) on the clock of the devices; a virtual clock begins at 0."""
+        if self._host is not None:
+            return self._host.now()
+        return self._left_at if self.clock == "virtual" else time.monotonic()
 
     def wait(self, until: float) -> None:
-        """Let time pass for the devices until this moment (s); when it has passed already, nothing happens.
+        """Let time pass for the devices until this moment (s); no effect if it has passed.
 
-        A virtual clock goes there at once, so simulations that all wait for the same moments have one clock.
+        A virtual clock jumps there, so simulations that wait for the same moments have one clock.
         """
-        seconds = until - self._now()
+        seconds = until - self.now
         if seconds <= 0:
             return
-        if self.clock == "real" or isinstance(self._link, Served):
+        if self.clock == "real" or isinstance(self._host, ServerThread):
             time.sleep(seconds)
-        elif self._link is not None:
-            self._link.advance(seconds)
+        elif self._host is not None:
+            self._host.advance(seconds)
         else:
             self._left_at = until
 
     def __getitem__(self, node: int) -> Any:
-        """The simulated device with this id: at least a `core.family.SimulatedNode`, and what its family adds.
-
-        Raises RequestError when there is none.
-        """
+        """The simulated device with this id, see `core.family.SimulatedNode`. Raises RequestError without one."""
         try:
             return self.simulator.nodes[node]
         except KeyError:
+            known = ", ".join(map(str, self.simulator.nodes))
             raise RequestError(
-                f"{self.url} has no node {told(self.simulator, [node])}",
-                expected=f"one of {told(self.simulator, self.simulator.nodes)}",
+                f"{self.url} has no device {node} (0x{node:02X})", expected=f"one of {known}"
             ) from None
 
     def link(self, rate: int | None = None) -> MemoryLink:
-        """A link that ends in this bus. Raises PortBusy while another one is open, PortNotFound after `close`."""
-        with self._gate, _lock:
+        """A link to this bus. Raises PortBusy while another host has it, PortNotFound after `close`."""
+        with self._mutex, _lock:
             self._check_free()
-            self._check_there()
-            link = _OneAtATime(self, rate or self.family.link.rate, self._left_at)
-            self._link = link
+            if self.now < self._back_at:
+                if self.clock == "virtual":
+                    self._left_at += OPEN_TIME
+                raise PortNotFound(f"{self.url}: the simulated adapter is unplugged")
+            self._host = link = _SimulationLink(self, rate or self.family.link.rate)
             return link
 
-    def serve(self, port: str, rate: int | None = None, **options: object) -> Served:
-        """Put the devices on a CAN channel, such as `can://virtual/NAME` for python-can in this process.
+    def serve(self, port: str, rate: int | None = None, **options: object) -> ServerThread:
+        """Serve the devices on a CAN channel in real time, in a thread, until the result is closed.
 
-        They work there in real time, by a thread, until what is given back is closed; use it in a `with`. `rate` is
-        the bit rate of that bus, `options` are for its adapter. Raises RequestError for devices that do not speak CAN
-        and for what is no channel, with faults for one on which there may be real devices, PortBusy while the
-        simulation is open elsewhere, LinkError for the channel.
+        `port` is as `can://virtual/NAME`, `rate` its bit rate, `options` are for its adapter. Raises RequestError for
+        devices without CAN, for another port, and for faults on a channel that may have real devices; PortBusy while a
+        host has the bus; LinkError.
         """
         if self.family.link.kind != "frames":
             raise RequestError(f"{self.family.name} devices do not speak CAN")
-        said, rate = rate or 0, rate or self.family.link.rate
-        if any(fault.action == "unplug" for fault in self.faults.faults):
-            raise RequestError(f"{port}: unplug pulls a port, and this channel is not ours to pull")
-        with self._gate, _lock:
+        with self._mutex, _lock:
             self._check_free()
-            if not is_calm(self._line):
-                check_harmless(port)
-            client = join(port, said, self.family.link.rate, **options)
-            start = self._left_at if self.clock == "virtual" else None
-            pace = rate if self.pace else None
-            served = _ServedOne(self, client, line=self._line, pace=pace, rate=rate, start=start)
-            self._link = served
+            usual = self.family.link.rate
+            channel = CanChannel(port, rate or 0, usual, **options)
+            offset = self._left_at - time.monotonic() if self.clock == "virtual" else 0.0
+            try:
+                server = Server(
+                    self.simulator,
+                    channel,
+                    rate=rate or usual,
+                    slcan=True,
+                    pace=self.pace,
+                    clock=lambda: time.monotonic() + offset,
+                )
+                server.set_faults(self._faulty.script)
+            except BaseException:
+                channel.close()
+                raise
+            self._host = served = _SimulationThread(self, server)
             return served
 
     def close(self) -> None:
-        """Forget its name; a link that is open goes dead. Calling it again does nothing."""
+        """Release its name; an open link is lost. A second call does nothing."""
         with _lock:
-            if _live.get((self.family.name, self.name)) is self:
-                del _live[self.family.name, self.name]
-        link = self._link
-        if link is not None:
-            link.close()
+            if _open.get((self.family.name, self.name)) is self:
+                del _open[self.family.name, self.name]
+        if self._host is not None:
+            self._host.close()
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *exc: object) -> None:
         self.close()
 
-    def _now(self) -> float:
-        """The moment (s) on the devices' clock."""
-        if self._link is not None:
-            return self._link.now()
-        return self._left_at if self.clock == "virtual" else time.monotonic()
-
-    def _check_wire(self, line: Line | None = None) -> None:
-        """No harm is done where a device may be real; None: the line does some."""
-        if isinstance(self._link, Served) and self._link.real and (line is None or not is_calm(line)):
-            raise on_a_wire(self._link.real)
-
-    def _check_there(self) -> None:
-        """The port has not been pulled; asking takes its time."""
-        now = self._now()
-        if now < self._away_until:
-            if self.clock == "virtual":
-                self._left_at += KNOCK
-            raise PortNotFound(
-                f"{self.url} is unplugged",
-                cause="a fault of its script has pulled it",
-                advice=f"it is there again in {self._away_until - now:g} s",
-            )
-
     def _check_free(self) -> None:
-        if _live.get((self.family.name, self.name)) is not self:
+        if _open.get((self.family.name, self.name)) is not self:
             raise _not_found(self.name, self.family.name)
-        if self._link is not None:
+        if self._host is not None:
             raise PortBusy(f"{self.url} is open already", advice="close the other bus first")
 
-    def _release(self, link: MemoryLink | Served) -> None:
-        with self._gate:
-            if self._link is link:
-                self._link, self._left_at = None, link.now()
+    def _release(self, host: MemoryLink | ServerThread) -> None:
+        """The host has closed; the next one may open the bus."""
+        with self._mutex:
+            if self._host is host:
+                self._left_at = host.now()
+                self._host = None
 
 
 def find(name: str, family: str) -> Simulation:
-    """The live simulation of this name. Raises PortNotFound, which tells the names there are."""
+    """The open simulation of this name. Raises PortNotFound, which names those that are open."""
     with _lock:
         try:
-            return _live[family, name]
+            return _open[family, name]
         except KeyError:
             raise _not_found(name, family) from None
 
@@ -271,21 +241,21 @@ def _register(simulation: Simulation, name: str | None) -> str:
     family = simulation.family.name
     with _lock:
         if name is None:
-            name = next(text for text in map(str, _numbers) if (family, text) not in _live)
+            name = next(text for text in map(str, _numbers) if (family, text) not in _open)
         elif not name or set(name) & set(",:#") or name != name.strip():
             raise RequestError(
-                f"{name!r} cannot be the name of a bus", expected="no comma, colon, hash or margin"
+                f"{name!r} cannot be the name of a bus", expected="no comma, colon, hash or outer space"
             )
-        elif (family, name) in _live:
+        elif (family, name) in _open:
             raise RequestError(
                 f"{family}:sim:{name} exists already", advice="choose another name, or close it"
             )
-        _live[family, name] = simulation
+        _open[family, name] = simulation
         return name
 
 
 def _not_found(name: str, family: str) -> PortNotFound:
-    names = ", ".join(sorted(f"{family}:sim:{other}" for kind, other in _live if kind == family))
+    names = ", ".join(sorted(f"{family}:sim:{other}" for kind, other in _open if kind == family))
     return PortNotFound(
         f"there is no simulated bus {family}:sim:{name} in this process",
         expected=f"one of {names}" if names else "",
@@ -293,19 +263,20 @@ def _not_found(name: str, family: str) -> PortNotFound:
     )
 
 
-class _OneAtATime(MemoryLink):
-    """The memory link of a simulation; closing it lets the next host in, at the time at which this one left."""
+class _SimulationLink(MemoryLink):
+    """The link of the present host; when it closes, the bus is free at that moment."""
 
-    def __init__(self, simulation: Simulation, rate: int, start: float) -> None:
+    def __init__(self, simulation: Simulation, rate: int) -> None:
         self._simulation = simulation
+        is_virtual = simulation.clock == "virtual"
         super().__init__(
             simulation._devices,
             rate=rate,
             line=simulation.line,
-            virtual=simulation.clock == "virtual",
+            virtual=is_virtual,
             pace=simulation.pace,
             name=simulation.url,
-            start=start if simulation.clock == "virtual" else time.monotonic(),
+            start=simulation._left_at if is_virtual else time.monotonic(),
         )
 
     def close(self) -> None:
@@ -313,22 +284,12 @@ class _OneAtATime(MemoryLink):
         self._simulation._release(self)
 
 
-class _ServedOne(Served):
-    """A simulation at work elsewhere; closing it lets the next host in."""
+class _SimulationThread(ServerThread):
+    """A simulation that is served on a channel; when it closes, the bus is free."""
 
-    def __init__(
-        self,
-        simulation: Simulation,
-        client: LinkClient,
-        *,
-        line: Line,
-        pace: int | None,
-        rate: int,
-        start: float | None,
-    ) -> None:
+    def __init__(self, simulation: Simulation, server: Server) -> None:
         self._simulation = simulation
-        simulation.simulator.tune(rate)
-        super().__init__(simulation._devices, client, line=line, pace=pace, rate=rate, start=start)
+        super().__init__(server)
 
     def close(self) -> None:
         try:

@@ -97,7 +97,7 @@ class Twin:
         """Send one order to the control socket; its answer."""
         self._orders.sendall(f"{line}\n".encode())
         answer = self._answers.readline().strip()
-        assert not answer.startswith("error"), answer
+        assert "error" not in json.loads(answer), answer
         return answer
 
     def status(self) -> dict[int, dict[str, Any]]:

@@ -11,14 +11,14 @@ import sys
 import tty
 from contextlib import closing
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 import pytest
 
 from motorbus.families.stepper.simulator import simulate
 from motorbus.simulation.control import ControlSocket
-from motorbus.simulation.mount import Mount
 from motorbus.simulation.pty import PtyMaster
+from motorbus.simulation.server import Server
 from tests.protocol.stepper.vectors import DUMP_A, FOLDER
 from tests.simulators.stepper.host import READ, SAVE, SELECT, frame, step
 from tests.support.mounts import asked, served
@@ -37,7 +37,7 @@ def test_the_client_knows_no_motorbus_and_is_short() -> None:
 
 def test_a_foreign_client_writes_reads_saves_starts_and_hears_the_end() -> None:
     bus = simulate((1,), shipped="empty")
-    with closing(PtyMaster()) as master, served(Mount(bus, master, pace=9600)):
+    with closing(PtyMaster()) as master, served(Server(bus, master, rate=9600, pace=True)):
         ended = subprocess.run(
             [
                 sys.executable,
@@ -62,11 +62,12 @@ def test_a_foreign_client_writes_reads_saves_starts_and_hears_the_end() -> None:
     assert bus.controller.position == -1600
 
 
-def ordered(lines: TextIO, order: str) -> str:
-    """Send an order to the control socket; its line of answer."""
+def ordered(lines: TextIO, order: str) -> dict[str, Any]:
+    """Send an order to the control socket; its reply."""
     lines.write(f"{order}\n")
     lines.flush()
-    return lines.readline().strip()
+    reply: dict[str, Any] = json.loads(lines.readline())
+    return reply
 
 
 @pytest.mark.parametrize(("save_cut", "image"), [("old", DUMP_A[6:]), ("empty", bytes(220))])
@@ -74,8 +75,9 @@ def test_the_supply_fails_in_the_middle_of_a_save(save_cut: str, image: bytes, t
     bus = simulate((1,), save_cut=save_cut, save_time=3600.0)
     with (
         closing(PtyMaster()) as master,
-        closing(ControlSocket(tmp_path / "control", bus)) as control,
-        served(Mount(bus, master, attendants=[control])),
+        closing(Server(bus, master, rate=9600)) as server,
+        closing(ControlSocket(tmp_path / "control", server)),
+        served(server),
         closing(socket.socket(socket.AF_UNIX)) as client,
         open(master.slave_name, "r+b", buffering=0) as port,
     ):
@@ -86,7 +88,7 @@ def test_the_supply_fails_in_the_middle_of_a_save(save_cut: str, image: bytes, t
         for data in (frame(SELECT, 1, 1), step(1, distance=77)[0]):
             assert asked(port.fileno(), data.hex(), 6)[:8] == data.hex(" ").upper()[:8]
         port.write(frame(SAVE, 1))
-        stati = (json.loads(ordered(lines, "status"))["nodes"][0] for _ in range(10_000))
+        stati = (ordered(lines, "status")["nodes"][0] for _ in range(10_000))
         assert any(status["saving"] == 1 for status in stati)  # it has read it, and the save takes an hour
-        assert ordered(lines, "power-cycle") == "ok"
+        assert ordered(lines, "power-cycle") == {"ok": True}
         assert asked(port.fileno(), frame(READ, 1).hex(), 226) == (DUMP_A[:6] + image).hex(" ").upper()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from typing import Any
 
 import pytest
@@ -11,8 +12,10 @@ from motorbus.errors import RequestError
 from motorbus.families.stepper import wire
 from motorbus.families.stepper.execution import Behaviour
 from motorbus.families.stepper.simulator import OPTIONS, Switches, simulate
+from motorbus.families.stepper.simulator.bus import StepperBus
 from motorbus.link.memory import MemoryLink
-from motorbus.simulation.control import obey
+from motorbus.simulation.control import carry_out
+from motorbus.simulation.server import Server
 from tests.protocol.stepper.vectors import DUMP_A
 from tests.simulators.stepper.host import START, STOP, frame
 
@@ -90,26 +93,33 @@ def test_a_project_tells_its_end_in_virtual_time() -> None:
     assert [event.data.hex() for event in events] == ["ffaa4e010000", "eedd"]
 
 
-def test_a_control_socket_looks_at_it_and_cuts_its_supply() -> None:
+def order(bus: StepperBus, line: str) -> dict[str, Any]:
+    """The reply of the control socket."""
+    with closing(Server(bus, rate=9600)) as server:
+        return carry_out(server, line)
+
+
+def test_a_control_socket_shows_it_and_cuts_its_supply() -> None:
     bus = simulate((1,))
-    assert '"phase": "idle"' in obey(bus, "status")
-    assert [obey(bus, order) for order in ("power-cycle", "unplug 1", "plug 1")] == ["ok"] * 3
-    assert obey(bus, "unplug 9").startswith("error: there is no node 9")
+    assert order(bus, "status")["nodes"][0]["phase"] == "idle"
+    for line in ("power-cycle", "unplug 1", "plug 1"):
+        assert order(bus, line) == {"ok": True}
+    assert order(bus, "unplug 9")["error"] == "there is no device 9"
 
 
 @pytest.mark.parametrize(
-    ("order", "answer"),
+    ("line", "error"),
     [
-        ("set-input 1 2 on", "ok"),
-        ("set-input 1 2 off", "ok"),
-        ("set-input 1 9 on", "error: there is no input 9; expected 1 to 5"),
-        ("set-input 4 2 on", "error: there is no node 4; there are: 1"),
-        ("set-input 1 two on", "error: the order is: set-input ID INPUT on|off"),
-        ("set-input 1 2 up", "error: the order is: set-input ID INPUT on|off"),
-        ("set-input 1 2", "error: the order is: set-input ID INPUT on|off"),
+        ("set-input 1 2 on", ""),
+        ("set-input 1 2 off", ""),
+        ("set-input 1 9 on", "there is no input 9"),
+        ("set-input 4 2 on", "there is no device 4"),
+        ("set-input 1 two on", "two is not a number"),
+        ("set-input 1 2 up", "up is neither on nor off"),
+        ("set-input 1 2", "set-input: wrong arguments"),
     ],
 )
-def test_a_control_socket_presses_its_buttons(order: str, answer: str) -> None:
+def test_a_control_socket_sets_its_inputs(line: str, error: str) -> None:
     bus = simulate((1,))
-    assert obey(bus, order) == answer
-    assert bus.controller.status()["inputs"] == ([2] if order == "set-input 1 2 on" else [])
+    assert order(bus, line).get("error", "") == error
+    assert bus.controller.status()["inputs"] == ([2] if line == "set-input 1 2 on" else [])

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 
 from motorbus.core.family import Simulator
-from motorbus.simulation_new.pty import PtyMaster
-from motorbus.simulation_new.server import Server, ServerThread
-from motorbus.simulation_new.tcp import TcpPort
+from motorbus.simulation.pty import PtyMaster
+from motorbus.simulation.server import Server, ServerThread
+from motorbus.simulation.tcp import TcpPort
 
 LIMIT = 20.0  # s
 RATE = 1_000_000

@@ -16,7 +16,7 @@ from motorbus.core.family import SimulatedNode, Simulator
 from motorbus.core.request import Data
 from motorbus.errors import RequestError
 from motorbus.link.base import Delivery, Side
-from motorbus.simulation_new.faults import KINDS, Fault, Script, parse
+from motorbus.simulation.faults import KINDS, Fault, Script, parse
 
 BROKEN: Final = CanFrame(ERROR_FLAG | 0x88, bytes(8))
 """Report of an adapter about a broken CAN frame: protocol violation and bus error, the classes of SocketCAN."""

@@ -10,8 +10,8 @@ import pytest
 import motorbus
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.families.kst import KstDriver
-from motorbus.session_new import lock_name, open, prepare, simulate
-from motorbus.session_new.opening import simulated_link
+from motorbus.session import lock_name, open, prepare, simulate
+from motorbus.session.opening import simulated_link
 
 
 @pytest.mark.parametrize(

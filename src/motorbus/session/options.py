@@ -14,7 +14,7 @@ from motorbus import families
 from motorbus.core import units
 from motorbus.core.family import BusDriver, Family
 from motorbus.errors import RequestError
-from motorbus.session_new.address import parse_address
+from motorbus.session.address import parse_address
 
 MAX_LATENCY: Final = 1.0  # s
 CAN: Final = "can://"

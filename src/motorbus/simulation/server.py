@@ -15,14 +15,14 @@ from typing import Final, Self, TypeAlias
 from motorbus.core.family import Simulator
 from motorbus.core.request import Data
 from motorbus.errors import RequestError
-from motorbus.simulation_new.can_channel import CanChannel
-from motorbus.simulation_new.clients import Client
-from motorbus.simulation_new.faults import Script, parse
-from motorbus.simulation_new.faulty import FaultyBus
-from motorbus.simulation_new.pty import PtyMaster
-from motorbus.simulation_new.slcan import SlcanAdapter
-from motorbus.simulation_new.tcp import TcpPort
-from motorbus.simulation_new.wire import Wire
+from motorbus.simulation.can_channel import CanChannel
+from motorbus.simulation.clients import Client
+from motorbus.simulation.faults import Script, parse
+from motorbus.simulation.faulty import FaultyBus
+from motorbus.simulation.pty import PtyMaster
+from motorbus.simulation.slcan import SlcanAdapter
+from motorbus.simulation.tcp import TcpPort
+from motorbus.simulation.wire import Wire
 
 MAX_CLIENTS: Final = 16
 MAX_WAIT: Final = 1.0  # s

@@ -14,8 +14,8 @@ from motorbus import families
 from motorbus.core.can_frame import CanFrame
 from motorbus.errors import LinkLost, PortBusy, PortNotFound, RequestError
 from motorbus.link.memory import MemoryLink
-from motorbus.session_new import open as open_bus
-from motorbus.simulation_new import Simulation, find
+from motorbus.session import open as open_bus
+from motorbus.simulation import Simulation, find
 from tests.simulation.links import QueueLink
 
 PING_1 = bytes.fromhex("FF FF 01 02 01 FB")
@@ -165,14 +165,14 @@ def test_a_closed_simulation_is_freed() -> None:
 def channel(monkeypatch: pytest.MonkeyPatch) -> QueueLink:
     """The link that opens, whatever channel is asked for."""
     link = QueueLink(descriptor=True)
-    monkeypatch.setattr("motorbus.simulation_new.can_channel.open_can", lambda port, **options: link)
+    monkeypatch.setattr("motorbus.simulation.can_channel.open_can", lambda port, **options: link)
     return link
 
 
 @pytest.mark.parametrize("descriptor", [True, False])
 def test_devices_on_a_channel(descriptor: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     link = QueueLink(descriptor=descriptor)
-    monkeypatch.setattr("motorbus.simulation_new.can_channel.open_can", lambda port, **options: link)
+    monkeypatch.setattr("motorbus.simulation.can_channel.open_can", lambda port, **options: link)
     with can_servos() as sim:
         with sim.serve("can://virtual/here") as served:
             link.arrive(CanFrame(0x626, READ_37.data))

@@ -16,7 +16,7 @@ from motorbus.core.can_bits import bits
 from motorbus.core.can_frame import Audience, CanFrame
 from motorbus.core.request import Data
 from motorbus.link.base import Side
-from motorbus.simulation_new.faulty import FaultyBus
+from motorbus.simulation.faulty import FaultyBus
 
 HASTE: Final = 0.004
 """Without pace, devices do at once what is due within so many seconds."""

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from weakref import WeakKeyDictionary
 
 from motorbus.bus.base import BaseBus
-from motorbus.journal_new import BusJournal, Change, find_files
+from motorbus.journal import BusJournal, Change, find_files
 from motorbus.link.base import Link
 from motorbus.link.lock import journal_path
-from motorbus.session_new.address import parse_address
-from motorbus.session_new.options import Opening, is_simulated, lock_name
-from motorbus.simulation_new import Simulation, find
+from motorbus.session.address import parse_address
+from motorbus.session.options import Opening, is_simulated, lock_name
+from motorbus.simulation import Simulation, find
 
 _simulated: WeakKeyDictionary[Simulation, BusJournal] = WeakKeyDictionary()
 """The journals of simulated buses of this process, which end with them."""

@@ -14,10 +14,10 @@ from motorbus.core.can_frame import CanFrame
 from motorbus.errors import LinkLost, MotorbusError, NoReply, PortNotFound, RequestError
 from motorbus.families.feetech.simulator import simulate
 from motorbus.link.base import Delivery, Side
-from motorbus.session_new import open as open_bus
-from motorbus.session_new import simulate as simulate_bus
-from motorbus.simulation_new.faults import KINDS, LONGEST, Fault, parse
-from motorbus.simulation_new.faulty import BROKEN, FaultyBus
+from motorbus.session import open as open_bus
+from motorbus.session import simulate as simulate_bus
+from motorbus.simulation.faults import KINDS, LONGEST, Fault, parse
+from motorbus.simulation.faulty import BROKEN, FaultyBus
 
 REQUEST, REPLY = b"request", b"reply"
 

@@ -13,10 +13,10 @@ from motorbus import families
 from motorbus.core.family import Simulator
 from motorbus.errors import LinkError, PortBusy, RequestError
 from motorbus.families.feetech.simulator import simulate
-from motorbus.simulation_new.pty import PtyMaster
-from motorbus.simulation_new.server import Server
-from motorbus.simulation_new.tcp import TcpPort, parse_endpoint
-from tests.simulation_new.programs import PING_1, PONG_1, Program, on_pty, on_tcp, serving
+from motorbus.simulation.pty import PtyMaster
+from motorbus.simulation.server import Server
+from motorbus.simulation.tcp import TcpPort, parse_endpoint
+from tests.simulation.programs import PING_1, PONG_1, Program, on_pty, on_tcp, serving
 
 UNLOCK = "FF FF 01 04 03 37 00 C0"
 SLOW_WRITE = "FF FF 01 04 03 0D 41 A9"  # EEPROM: 20 ms

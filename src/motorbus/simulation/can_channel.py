@@ -17,6 +17,13 @@ from motorbus.link.url import open_can
 SCHEME: Final = "can://"
 
 
+def may_have_wire(port: str) -> bool:
+    """Whether real devices may be on this CAN channel; opens nothing. Raises RequestError for another port."""
+    from motorbus.link.can import read_address
+
+    return not read_address(port).no_wire
+
+
 class CanChannel:
     """A CAN channel with all its programs and devices; the interface is that of `clients.Client`.
 

@@ -1,0 +1,69 @@
+"""A line with one fault at one byte, and nothing else wrong."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from motorbus.core.request import Data
+from motorbus.link.base import Delivery, Side
+
+
+class ByteFault(NamedTuple):
+    """A fault at a byte, counted from 0 in the direction `to` within an exchange, counted from 1.
+
+    `action` is drop, duplicate, corrupt (`value`: the bits that change), insert (`value`: the byte in front) or delay
+    (`seconds`: how much later this byte and all that follow in the exchange arrive).
+    """
+
+    exchange: int
+    byte: int
+    action: str
+    to: Side = Side.HOST
+    value: int = 0
+    seconds: float = 0.0
+
+
+class ByteFaultLine:
+    """Carries data and lets one fault happen; `fired` lists it when it has."""
+
+    def __init__(self, fault: ByteFault) -> None:
+        self.fault = fault
+        self.fired: list[ByteFault] = []
+        self._exchange = 0
+        self._passed = {Side.HOST: 0, Side.DEVICE: 0}
+        self._later = 0.0
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        to = Side.DEVICE if sender is Side.HOST else Side.HOST
+        if sender is Side.HOST:
+            self._exchange += 1
+            self._passed = {Side.HOST: 0, Side.DEVICE: 0}
+            self._later = 0.0
+        fault = self.fault
+        later = self._later if to is fault.to else 0.0
+        place = fault.byte - self._passed[to]
+        if not isinstance(data, bytes):
+            return [Delivery(at + later, to, data)]
+        self._passed[to] += len(data)
+        is_here = 0 <= place < len(data) + (fault.action == "insert")
+        if self.fired or fault.to is not to or fault.exchange != self._exchange or not is_here:
+            return [Delivery(at + later, to, data)]
+        self.fired.append(fault)
+        before, byte, after = data[:place], data[place : place + 1], data[place + 1 :]
+        pieces = [(later, before + self._changed(byte) + after)]
+        if fault.action == "delay":
+            self._later = fault.seconds
+            pieces = [(0.0, before), (self._later, byte + after)]
+        return [Delivery(at + shift, to, piece) for shift, piece in pieces if piece]
+
+    def _changed(self, byte: bytes) -> bytes:
+        match self.fault.action:
+            case "drop":
+                return b""
+            case "duplicate":
+                return byte * 2
+            case "corrupt":
+                return bytes([byte[0] ^ self.fault.value])
+            case "insert":
+                return bytes([self.fault.value]) + byte
+        return byte
