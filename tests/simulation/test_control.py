@@ -172,6 +172,48 @@ def test_a_blocked_shaft_stops_and_a_released_one_completes_its_move(after: floa
         assert servo.position() == pytest.approx(radians(270), abs=0.01)
 
 
+def test_a_blocked_servo_raises_the_overload_alarm() -> None:
+    with simulate_bus("feetech") as sim, open_bus(sim.url) as bus:
+        servo = motorbus.feetech.Servo(bus, 1)
+        servo.enable_torque()
+        assert order(sim.simulator, "block 1") == OK
+        servo.move(radians(200), wait=False)
+        sim.wait(sim.now + 5.0)
+        assert any("overload" in alarm for alarm in servo.alarms())
+        assert servo.position() == pytest.approx(MIDDLE, abs=0.01)
+        assert order(sim.simulator, "release 1") == OK
+        assert order(sim.simulator, "power-cycle 1") == OK
+        servo.enable_torque()
+        servo.move(radians(200))
+        assert servo.position() == pytest.approx(radians(200), abs=0.01)
+
+
+@pytest.mark.parametrize("settings", [{}, {"phase": 0x80 | 12}, {"angular_resolution": 3}])
+def test_angles_are_those_that_the_servo_reads(settings: dict[str, int]) -> None:
+    with simulate_bus("feetech", position=1500) as sim, open_bus(sim.url) as bus:
+        servo = motorbus.feetech.Servo(bus, 1)
+        for name, raw in settings.items():
+            sim[1].memory[name] = raw
+        sim[1].power_cycle()
+        before = servo.position()
+        for text in ("block 1 1deg 350deg", "push 1 40deg"):
+            assert order(sim.simulator, text) == OK
+        sim.wait(sim.now + 2.0)
+        assert servo.position() == pytest.approx(before + radians(40), abs=0.01)
+
+
+def test_release_ends_a_push() -> None:
+    with simulate_bus("feetech") as sim, open_bus(sim.url) as bus:
+        servo = motorbus.feetech.Servo(bus, 1)
+        order(sim.simulator, "push 1 90deg")
+        sim.wait(sim.now + 0.5)
+        order(sim.simulator, "release 1")
+        stopped = servo.position()
+        sim.wait(sim.now + 2.0)
+        assert MIDDLE < stopped < MIDDLE + radians(60)
+        assert servo.position() == stopped
+
+
 def test_a_load_shows_until_it_is_released() -> None:
     with simulate_bus("feetech") as sim, open_bus(sim.url) as bus:
         servo = motorbus.feetech.Servo(bus, 1)

@@ -223,6 +223,7 @@ class SimulatedNode(Protocol):
                            invalid name or value, without a change
         midway()           moment (s) when half of a store operation is done, inf if none runs: a power cut at that
                            moment leaves the stored data incomplete
+        voltage, temperature   may be set: its supply (V), its temperature (°C)
         block_shaft(between) push_shaft(angle) load_shaft(share) release_shaft()    in rad; a share of 1 is full torque
     """
 

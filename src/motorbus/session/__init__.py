@@ -9,8 +9,9 @@ Opening writes nothing to a device: one read is sent, to learn whether the adapt
 """
 
 from motorbus.session.address import Address, parse_address, parse_ids
+from motorbus.session.echo import LOG
 from motorbus.session.journals import journal_of, unfinished
-from motorbus.session.opening import LOG, open, open_async, simulate
+from motorbus.session.opening import open, open_async, simulate
 from motorbus.session.options import Opening, lock_name, prepare
 
 __all__ = [

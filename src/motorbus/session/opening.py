@@ -11,7 +11,6 @@ from motorbus import families
 from motorbus.bus.base import BaseBus
 from motorbus.bus.blocking import Bus
 from motorbus.bus.interlock import DeviceLimits, Interlock
-from motorbus.core.request import Request
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.link.base import Link
 from motorbus.link.lock import socket_path
@@ -19,6 +18,7 @@ from motorbus.link.memory import MemoryLink
 from motorbus.link.reconnect import Reconnecting, reconnecting
 from motorbus.link.url import open_link
 from motorbus.session.address import parse_ids
+from motorbus.session.echo import LOG, echo_test, warn_of_echo
 from motorbus.session.journals import journal_for
 from motorbus.session.options import Opening, is_simulated, prepare
 from motorbus.simulation import Simulation, find
@@ -27,7 +27,6 @@ from motorbus.simulation.faulty import FaultyBus
 if TYPE_CHECKING:
     from motorbus.bus.aio import AsyncBus
 
-LOG = logging.getLogger("motorbus.session")
 logging.getLogger("motorbus").addHandler(logging.NullHandler())  # silent by default
 
 Notify = Callable[[object], None]
@@ -113,22 +112,6 @@ def simulated_link(opening: Opening) -> MemoryLink:
         bus.set(faults, link.now())
         link.simulator, link.line = bus, bus
     return link
-
-
-def echo_test(bus: BaseBus) -> Request[Any] | None:
-    """Log the warnings of the bus; return the request that shows an echo, None where the family needs none."""
-    for warning in bus.warnings:
-        LOG.warning("%s: %s", bus.link.name, warning)
-    test = bus.driver.echo_test()
-    if test is not None:
-        bus.expect_echo(test)
-    return test
-
-
-def warn_of_echo(bus: BaseBus) -> None:
-    """Log that the adapter echoes, if the test has shown it."""
-    if bus.echoes:
-        LOG.warning("%s: the adapter echoes what is sent; the echo is taken off", bus.link.name)
 
 
 def _make(

@@ -6,7 +6,7 @@ from typing import Self
 
 from motorbus.bus.aio import AsyncBus
 from motorbus.errors import MotorbusError
-from motorbus.session.opening import LOG, echo_test, warn_of_echo
+from motorbus.session.echo import LOG, echo_test, warn_of_echo
 
 
 class OpenAsyncBus(AsyncBus):

@@ -43,8 +43,8 @@ from motorbus.motion.recognition import recognise
 from motorbus.motion.safety.fence import fence
 from motorbus.motion.teach import teach
 from motorbus.session.deadman import Leased, awaiting_attended, blocking_attended
+from motorbus.session.echo import LOG
 from motorbus.session.faults import clear, distrust, faults
-from motorbus.session.opening import LOG
 from motorbus.session.plan import Plan, loaded
 from motorbus.session.stopping import estop, latch, reset, trigger
 

@@ -18,7 +18,7 @@ from motorbus.errors import MotorbusError
 from motorbus.motion.body import Body
 from motorbus.motion.leaving import given_up, goes_on, moves, stopped_going_on
 from motorbus.motion.safety.lease import Lease, Standing
-from motorbus.session.opening import LOG
+from motorbus.session.echo import LOG
 
 RETRY_PERIOD: Final = 0.5
 """s after which the stop is sent again to axes that did not accept it."""
