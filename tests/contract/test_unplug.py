@@ -15,7 +15,9 @@ import pytest
 
 import motorbus
 from motorbus import feetech, kst, stepper
+from motorbus.link.base import Side
 from tests.conftest import Rounds
+from tests.support.lines import ByteFault, ByteFaultLine
 from tests.support.processes import LATENCY, LIMIT, Simulator, simulator, until_back
 
 READ: Final = 2
@@ -136,8 +138,8 @@ CALLS: Final[dict[str, tuple[str, Any, Callable[[Any], Any]]]] = {
 """Family, device class and call."""
 
 
-def pulled(name: str, place: str) -> bool:
-    """Pull the port at this place of the call; False when the call has no such place."""
+def pulled(name: str, exchange: int, byte: int, to: Side) -> bool:
+    """Pull the port at this byte of the call; False when the call has no such byte."""
     family, device, call = CALLS[name]
     with motorbus.simulate(family, ids="1") as sim:
         sim.pace = True
@@ -146,9 +148,11 @@ def pulled(name: str, place: str) -> bool:
             servo.identify()
             if name == "feetech move":
                 servo.enable_torque()
-            sim.faults = f"exchange {place}: unplug 0.5"
+            fault = ByteFault(exchange, byte, "unplug", to)
+            link: Any = bus.link
+            sim.line = line = ByteFaultLine(fault, lambda at: link.unplug(at, 0.5))
             error = raised(lambda: call(servo))
-            if not sim.faults.count:
+            if not line.fired:
                 assert error is None
                 return False
             assert error is None or lost(error)
@@ -170,7 +174,7 @@ def test_a_port_that_is_pulled_at_any_byte(name: str, rounds: Rounds) -> None:
     most, fired = rounds(10_000, 40), 0
     for request in range(1, 10):
         for byte in range(250):
-            struck = [pulled(name, f"{request} byte {byte} to {side}") for side in ("device", "host")]
+            struck = [pulled(name, request, byte, side) for side in Side]
             fired += sum(struck)
             if not any(struck) or fired > most:
                 break
