@@ -131,6 +131,22 @@ def test_programs_on_a_can_bus_receive_the_frames_of_the_others() -> None:
         one.say(b"", b"t1231FF\r")
 
 
+def test_a_can_program_that_does_not_read_loses_whole_frames() -> None:
+    terminal, tcp = PtyMaster(), TcpPort()
+    with (
+        serving(servos(), terminal, tcp, slcan=True, rate=500_000) as server,
+        on_pty(terminal) as silent,
+        on_tcp(tcp) as other,
+    ):
+        for program in (silent, other):
+            program.say(OPEN, b"\r\r\r")
+        for _ in range(600):
+            other.say(READ_25, b"z\r" + REPLY_25)
+        assert server.lost > 0
+        rest = bytes.fromhex(silent.receive(1 << 20, 0.5))
+        assert set(rest.split(b"\r")) == {READ_25[:-1], REPLY_25[:-1], b""}
+
+
 def test_servos_follow_the_rate_of_the_adapter() -> None:
     port = PtyMaster()
     with serving(servos(), port, slcan=True, rate=500_000), on_pty(port) as program:

@@ -70,6 +70,7 @@ class Server:
         self._selector = selectors.SelectSelector()
         self._wake, self._ring = os.pipe()
         self._stopped = False
+        self._is_behind = False  # a program has not read all of its data
         self._unplug_for: float | None = None
         self._plug_at = inf
         self.watch(self._wake, lambda: None)
@@ -128,28 +129,26 @@ class Server:
             if isinstance(client, CanChannel) and client.fileno() is None:
                 self._receive_polled(client, min(wait, SLICE))
                 wait = 0.0
-        ready = self._selector.select(wait)
+        ready = self._selector.select(min(wait, RETRY) if self._is_behind else wait)
         with self.lock:
-            is_behind = self._run()
+            self._run()
             for key, _ in ready:
                 if key.fd in self._selector.get_map():  # not closed by an earlier event
                     key.data()
             if ready:
-                is_behind = self._run()
+                self._run()
             self._drop_gone()
-        if is_behind:
-            time.sleep(min(RETRY, timeout))
 
-    def _run(self) -> bool:
-        """Carry out all events up to now; whether a program has not read all of its data."""
+    def _run(self) -> None:
+        """Carry out all events up to now."""
         now = self._clock()
         for arrival in self.wire.run(now):
             for client in self.clients if self._unplug_for is None else ():
                 if client is not arrival.sender:
                     client.send(arrival.data, min(arrival.at, now))
-        is_behind = False
+        self._is_behind = False
         for client in self.clients:
-            is_behind |= not client.flush()
+            self._is_behind |= not client.flush()
         if self._unplug_for is not None:
             self._detach(now + self._unplug_for)
         elif self._plug_at <= now:
@@ -159,7 +158,6 @@ class Server:
                     port.plug()
                 self._attach(port)
             self.wire.tune(self._rate)
-        return is_behind
 
     # -- programs ------------------------------------------------------------------------------------------------
 
