@@ -1,0 +1,362 @@
+"""A controller that carries out projects and manual motions, over time and with its inputs and outputs.
+
+Time is an argument. What ends by itself ends at its own moment, so nothing depends on how often `advance` is called.
+Source of each transition: stepper controller serial protocol manual; `# assumption` marks what it does not say.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from math import inf
+from typing import Final, NamedTuple
+
+from motorbus.families.stepper_new.execution import ramp, sequence
+from motorbus.families.stepper_new.execution.ramp import Motion
+from motorbus.families.stepper_new.execution.sequence import Place
+from motorbus.families.stepper_new.parameters import (
+    HOME_INPUT,
+    IMMEDIATE,
+    LEDS,
+    START_INPUT,
+    STOP_INPUT,
+    Project,
+    Step,
+    outputs_after_port,
+    outputs_after_step,
+)
+
+FIRST: Final = Place(1)
+EMPTY_PASS: Final = 0.001  # s of a pass of an endless project in which nothing takes time, assumption
+
+
+class Phase(Enum):
+    """The present activity; the first three belong to a step of a project."""
+
+    WAIT = "waiting for an input"
+    MOVE = "moving"
+    PAUSE = "pausing"
+    IDLE = "idle"
+    JOG = "jogging"
+    ONCE = "making one move"
+    HOMING = "homing"
+    SLOWING = "slowing down"
+    OFF = "off"
+
+
+class After(Enum):
+    """What follows the end of a motion that was stopped."""
+
+    REST = "rest"
+    STOP = "the project is stopped"
+    PAUSE = "the pause of the step"
+    REVERSE = "jog the other way"
+
+
+class Happening(NamedTuple):
+    """An event: its moment (s), and the step of the project (0: none).
+
+    `kind` is "waits", "begins" (a step, with its outputs), "moved", "ended" (a project, by itself), "completed" (the
+    notice), "stopped" (a project), "homed", or "rests" (the end of a manual motion).
+    """
+
+    at: float
+    kind: str
+    step: int = 0
+
+
+@dataclass(slots=True)
+class Run:
+    """A project that runs: its place, the pass (from 1) and when that began, and whether a command started it."""
+
+    project: Project
+    by_command: bool
+    began: float
+    place: Place = FIRST
+    round: int = 1
+
+    @property
+    def step(self) -> Step:
+        return self.project.step(self.place.step)
+
+
+class Machine:
+    """The state of a controller.
+
+    `outputs` has three bits, bit 0 is output 1; `inputs` are the active ones, 1 to 5; `motion` is the move since
+    `since`, from the position `base`. `events` collects all `Happening`s; the caller empties it.
+    """
+
+    def __init__(self, *, tick_ms: float = ramp.TICK_MS) -> None:
+        self.tick_ms = tick_ms
+        self.phase = Phase.IDLE
+        self.since = 0.0
+        self.until = inf  # end of the phase
+        self.motion: Motion | None = None
+        self.base = 0
+        self.run: Run | None = None
+        self.manual: Project | None = None  # the project of the speed of a manual motion
+        self.outputs = 0
+        self.leds = False
+        self.inputs: frozenset[int] = frozenset()
+        self.stop_mode = 0
+        self.is_homed = False
+        self.events: list[Happening] = []
+        self._now = 0.0
+        self._after = After.REST
+
+    @property
+    def is_busy(self) -> bool:
+        return self.phase not in (Phase.IDLE, Phase.OFF)
+
+    def position(self, at: float) -> int:
+        """In pulses."""
+        if self.motion is None:
+            return self.base
+        is_over = self.motion.pulses is not None and at >= self.until
+        done = self.motion.pulses if is_over else self.motion.done(at - self.since)
+        return self.base + self.motion.sign * (done or 0)
+
+    def frequency(self, at: float) -> float:
+        """In pulses per second, negative in reverse."""
+        if self.motion is None or at >= self.until:
+            return 0.0
+        return self.motion.sign * self.motion.frequency(at - self.since)
+
+    def advance(self, to: float) -> None:
+        """Let time pass until this moment."""
+        while self.until <= to:
+            self._now = self.until
+            self._end_phase()
+        self._now = max(self._now, to)
+
+    # -- commands --------------------------------------------------------------------------------------------------
+
+    def power_on(self, at: float, *, home_with: Project | None = None) -> None:
+        """Power on at rest, with all outputs off; with `home_with` home with the speed of its step 1."""
+        self._now = at
+        self._rest()
+        self.stop_mode = home_with.stop_mode if home_with else 0
+        if home_with:
+            self.home(home_with, at)
+
+    def power_off(self, at: float) -> None:
+        """Without supply; the motor stays in its place."""
+        self.advance(at)
+        self._rest(Phase.OFF)
+        self.run = self.manual = None
+        self.outputs, self.leds, self.is_homed = 0, False, False
+
+    def start(self, project: Project, at: float, *, by_command: bool = True) -> bool:
+        """Start a project. False if it is busy; then the start is ignored, assumption."""
+        self.advance(at)
+        if self.is_busy or self.phase is Phase.OFF:
+            return False
+        self.stop_mode = project.stop_mode  # assumption: of each project
+        self.run = Run(project, by_command, self._now)
+        if sequence.last_step(project):
+            self._begin_step()
+        else:
+            self._finish("ended")  # assumption: at once, with a notice
+        self.advance(at)
+        return True
+
+    def jog(self, project: Project, sign: int, at: float) -> bool:
+        """Turn until stopped with the speed of step 1 of this project; False if it is busy.
+
+        The opposite jog command stops and reverses, assumption.
+        """
+        self.advance(at)
+        if self.phase is Phase.JOG and self.motion and self.motion.sign != sign:
+            self._stop(After.REVERSE)
+        elif self.is_busy or self.phase is Phase.OFF:
+            return False
+        else:
+            self._move_by_hand(Phase.JOG, project, None, sign)
+        self.advance(at)
+        return True
+
+    def run_once(self, project: Project, at: float) -> bool:
+        """Make the move of step 1 of this project, without its inputs, output and pause; False if it is busy."""
+        self.advance(at)
+        if self.is_busy or self.phase is Phase.OFF:
+            return False
+        step = project.step(1)
+        self._move_by_hand(Phase.ONCE, project, ramp.pulses_of(project, step), step.sign)
+        self.advance(at)
+        return True
+
+    def home(self, project: Project, at: float) -> bool:
+        """Turn in reverse with the speed of step 1 of this project until input 5; False if it is busy.
+
+        It ends at once, without a motion, if the input is active.
+        """
+        self.advance(at)
+        if self.is_busy or self.phase is Phase.OFF:
+            return False
+        if HOME_INPUT in self.inputs:
+            self._happen("rests")
+        else:
+            self._move_by_hand(Phase.HOMING, project, None, -1)
+        self.advance(at)
+        return True
+
+    def stop_project(self, at: float) -> None:
+        """Stop the project; a manual motion continues, assumption."""
+        self.advance(at)
+        if self.run is None:
+            return
+        if self.phase is Phase.SLOWING:
+            self._after = After.STOP
+        else:
+            self._stop(After.STOP)
+        self.advance(at)
+
+    def stop_motor(self, at: float) -> None:
+        """Stop the motor; it ends the project, assumption."""
+        self.advance(at)
+        if self.run is not None:
+            self.stop_project(at)
+        elif self.phase is Phase.SLOWING:
+            self._after = After.REST
+        elif self.is_busy:
+            self._stop(After.REST)
+        self.advance(at)
+
+    def set_output(self, port: int, level: int, at: float) -> None:
+        """Switch outputs (1 to 3, 4 for all) or the LEDs (5), at any time."""
+        self.advance(at)
+        if port == LEDS:
+            self.leds = bool(level)
+        self.outputs = outputs_after_port(self.outputs, port, level)
+
+    def set_input(self, port: int, active: bool, at: float, *, start: Project | None = None) -> None:
+        """Set an input, 1 to 5; `start` is the project that input 3 starts."""
+        self.advance(at)
+        rises = active and port not in self.inputs
+        self.inputs = self.inputs | {port} if active else self.inputs - {port}
+        if not rises:
+            return
+        if port == HOME_INPUT and self.phase is Phase.HOMING:
+            self._rest()
+            self.base, self.is_homed = 0, True
+            self._happen("homed")
+            self._end_manual()
+        elif self.run and self.phase is Phase.WAIT and self.run.step.start_input == port:
+            self._begin_motion()
+        elif self.run and self.phase is Phase.MOVE and self.run.step.stop_input == port:
+            self._end_motion()
+        if port == STOP_INPUT:
+            self.stop_project(at)
+        elif port == START_INPUT and start:
+            self.start(start, at, by_command=False)
+        self.advance(at)
+
+    # -- motion ----------------------------------------------------------------------------------------------------
+
+    def _go(self, phase: Phase, motion: Motion) -> None:
+        self.base = self.position(self._now)
+        self.phase, self.motion, self.since = phase, motion, self._now
+        self.until = self._now + motion.duration
+
+    def _rest(self, phase: Phase = Phase.IDLE, until: float = inf) -> None:
+        self.base = self.position(self._now)
+        self.phase, self.motion, self.since, self.until = phase, None, self._now, until
+
+    def _stop(self, after: After) -> None:
+        """Stop the motion as the stop mode says."""
+        self._after = after
+        slow = self.motion.slowing(self._now - self.since) if self.motion else None
+        if slow is None or self.stop_mode == IMMEDIATE:
+            self._stopped()
+        else:
+            self._go(Phase.SLOWING, slow)
+
+    def _stopped(self) -> None:
+        last = self.motion
+        self._rest()
+        if self._after is After.STOP:
+            self._finish("stopped")
+        elif self._after is After.REVERSE and last and self.manual:
+            self._move_by_hand(Phase.JOG, self.manual, None, -last.sign)
+        else:
+            self._end_manual()
+
+    def _move_by_hand(self, phase: Phase, project: Project, pulses: int | None, sign: int) -> None:
+        self.stop_mode = project.stop_mode
+        self.manual = project
+        speed = ramp.ramp_of(project, project.step(1))
+        self._go(phase, ramp.motion(speed, pulses, sign, self.tick_ms))
+
+    def _end_manual(self) -> None:
+        self.manual = None
+        self._happen("rests")
+
+    def _end_phase(self) -> None:
+        """The phase ends by itself."""
+        if self.phase is Phase.MOVE:
+            self._end_motion()
+        elif self.phase is Phase.PAUSE:
+            self._next_step()
+        elif self.phase is Phase.SLOWING:
+            self._stopped()
+        else:  # one move is made, or a manual motion has no speed
+            self._rest()
+            self._end_manual()
+
+    # -- a project -------------------------------------------------------------------------------------------------
+
+    def _running(self) -> Run:
+        assert self.run is not None, "only a project has steps"
+        return self.run
+
+    def _begin_step(self) -> None:
+        port = self._running().step.start_input
+        if port and port not in self.inputs:  # assumption: an input that is active already starts it
+            self._rest(Phase.WAIT)
+            self._happen("waits")
+        else:
+            self._begin_motion()
+
+    def _begin_motion(self) -> None:
+        """Outputs and motor at the same moment."""
+        run = self._running()
+        project, step = run.project, run.step
+        self.outputs = outputs_after_step(self.outputs, step.output)
+        pulses = ramp.pulses_of(project, step)
+        self._go(Phase.MOVE, ramp.motion(ramp.ramp_of(project, step), pulses, step.sign, self.tick_ms))
+        self._happen("begins")
+        if step.stop_input in self.inputs:
+            self._end_motion()
+
+    def _end_motion(self) -> None:
+        """The motion is over, or its stop input ends it at once."""
+        self._rest(Phase.PAUSE, self._now + self._running().step.delay / 1000)
+        self._happen("moved")
+
+    def _next_step(self) -> None:
+        run = self._running()
+        place = sequence.following(run.project, run.place)
+        passes = sequence.passes(run.project)
+        if place is None and passes is not None and run.round >= passes:
+            self._finish("ended")
+            return
+        if place is None and passes is None and self._now <= run.began:
+            run.began = -inf
+            self._rest(Phase.PAUSE, self._now + EMPTY_PASS)
+            return
+        if place is None:
+            run.round, run.began = run.round + 1, self._now
+        run.place = place or FIRST
+        self._begin_step()
+
+    def _finish(self, kind: str) -> None:
+        """The project has ended; its outputs stay, assumption. The notice follows a natural end of a command."""
+        self._happen(kind)
+        self._rest()
+        if kind == "ended" and self._running().by_command:
+            self._happen("completed")
+        self.run = None
+
+    def _happen(self, kind: str) -> None:
+        self.events.append(Happening(self._now, kind, self.run.place.step if self.run else 0))
