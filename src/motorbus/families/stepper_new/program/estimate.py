@@ -1,0 +1,116 @@
+"""How long a project takes, and how far it goes, before it runs.
+
+Motion and pauses are known but for the reading of the acceleration. Waits for an input are counted, not guessed.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Final
+
+from msgspec import Struct
+
+from motorbus.families.stepper_new.execution import ramp, sequence
+from motorbus.families.stepper_new.execution.ramp import READINGS, TICK_MS
+from motorbus.families.stepper_new.parameters import Project, Step
+
+COUNTLESS: Final = 1_000_000  # passes for which the travel of an endless project is given
+
+
+class Estimate(Struct, frozen=True, kw_only=True):
+    """The duration of a project.
+
+    `seconds`  motion and pauses in all, of one pass of an endless project; `low` and `high` in other readings of the
+               acceleration
+    `waits`    how often it waits for an input; `cuts` how often a stop input may end a motion early
+    """
+
+    seconds: float
+    low: float
+    high: float
+    waits: int
+    cuts: int
+    endless: bool
+
+    def __str__(self) -> str:
+        waits = f" + {self.waits} wait{'s' * (self.waits > 1)}" if self.waits else ""
+        text = f"at least {show_duration(self.seconds)}{waits}" + " for each pass, endless" * self.endless
+        if show_duration(self.low) != show_duration(self.high):
+            text += f"; {show_duration(self.low)} to {show_duration(self.high)} in other readings of the acceleration"
+        if self.cuts:
+            times = "once" if self.cuts == 1 else f"{self.cuts} times"
+            text += f"; less where a stop input ends a step early, {times} at most"
+        return text
+
+
+def show_duration(seconds: float) -> str:
+    """`41.6 s`, `4 min 12 s`, `2 h 5 min`."""
+    if seconds < 99.95:
+        return f"{seconds:.1f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    if minutes < 60:
+        return f"{minutes} min {rest} s"
+    return f"{minutes // 60} h {minutes % 60} min"
+
+
+def estimate(project: Project) -> Estimate:
+    """The duration of a project."""
+    count = sequence.passes(project) or 1
+    steps = [(project.step(n), sequence.times(project, n) * count) for n in numbers(project)]
+    readings = [_seconds(project, steps, tick) for tick in READINGS.values()]
+    return Estimate(
+        seconds=_seconds(project, steps, TICK_MS),
+        low=min(readings),
+        high=max(readings),
+        waits=sum(times for step, times in steps if step.start_input),
+        cuts=sum(times for step, times in steps if step.stop_input and ramp.pulses_of(project, step)),
+        endless=project.is_endless,
+    )
+
+
+def _seconds(project: Project, steps: list[tuple[Step, int]], tick_ms: float) -> float:
+    return sum(times * (step_seconds(project, step, tick_ms) + step.delay / 1000) for step, times in steps)
+
+
+def step_seconds(project: Project, step: Step, tick_ms: float = TICK_MS) -> float:
+    """Duration (s) of the motion of a step."""
+    return ramp.duration(ramp.ramp_of(project, step), ramp.pulses_of(project, step), tick_ms)
+
+
+def numbers(project: Project) -> range:
+    """The numbers of the steps that are carried out."""
+    return range(1, sequence.last_step(project) + 1)
+
+
+def net_units(project: Project) -> int:
+    """The end of one pass in user units from its beginning; steps of less than one pulse do not count."""
+    moves = [n for n in numbers(project) if ramp.pulses_of(project, project.step(n))]
+    return sum(project.step(n).sign * project.step(n).distance * sequence.times(project, n) for n in moves)
+
+
+def reach(project: Project) -> tuple[int, int]:
+    """Lowest and highest end of a step, in user units from the start, over all passes.
+
+    Of both readings of the loop counts the one that reaches farther; an endless project is given a million passes.
+    """
+    low, high = 0, 0
+    for extra in (0, 1):
+        places = [place.step for place in sequence.one_pass(project)]
+        if project.has_loop and extra:
+            inside = list(range(project.loop_first, project.loop_last + 1))
+            end = len(places) - (sequence.last_step(project) - project.loop_last)
+            places[end:end] = inside
+        at, least, most = 0, 0, 0
+        for number in places:
+            step = project.step(number)
+            at += step.sign * step.distance if step.speed else 0
+            least, most = min(least, at), max(most, at)
+        passes = sequence.passes(project, extra=1)
+        drift = at * ((passes or COUNTLESS) - 1)
+        low, high = min(low, least, least + drift), max(high, most, most + drift)
+    return low, high
+
+
+def is_endless(project: Project) -> bool:
+    """Only a stop ends it."""
+    return project.is_endless or estimate(project).seconds == inf

@@ -1,0 +1,455 @@
+"""A project as a TOML file with units and names; its schema is that of `ProgramFile`.
+
+Conversion is exact: a value that is no whole number of what the controller counts is an error that gives the two
+neighbours. Errors name the step and the field.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from math import ceil, floor
+from typing import Annotated, Any, Final, Literal
+
+import msgspec
+from msgspec import Meta, Struct
+
+from motorbus.core.register import shown
+from motorbus.errors import RequestError
+from motorbus.families.stepper_new.parameters import (
+    ENDLESS,
+    INPUTS,
+    OUTPUTS,
+    PARAMETERS,
+    STEPS,
+    Order,
+    Project,
+    Step,
+    check_project,
+    check_value,
+    decode_image,
+    with_steps,
+)
+from motorbus.families.stepper_new.program.estimate import Estimate, estimate
+from motorbus.families.stepper_new.program.lint import Finding, lint
+from motorbus.families.stepper_new.protocol import DUMP_LENGTH, HEADER, READ_PROJECT, REPLY_LENGTH
+
+LONGEST: Final = 1 << 20  # characters of a file
+FORMAT: Final = 1
+
+_QUANTITY: Final = re.compile(
+    r"([+-]?(?:\d{1,20}(?:\.\d{0,20})?|\.\d{1,20}))\s*([^\d\s.].*)", re.ASCII | re.DOTALL
+)
+_NAME: Final = re.compile(r"(?!(?:none|all|(?:input|output)\b.*)$)[A-Za-z][A-Za-z0-9 _-]{0,31}", re.ASCII)
+_SAME: Final = {
+    "unit": "units",
+    "pulse": "pulses",
+    "turn": "turns",
+    "°": "deg",
+    "RPM": "rpm",
+    "µm": "um",
+    "μm": "um",
+}
+_LENGTH: Final = {"mm": Fraction(1), "um": Fraction(1, 1000), "cm": Fraction(10), "m": Fraction(1000)}
+_TIME: Final = {"ms": Fraction(1), "s": Fraction(1000), "min": Fraction(60_000), "h": Fraction(3_600_000)}
+_HERTZ: Final = {"Hz": Fraction(1), "kHz": Fraction(1000)}
+_Each = Mapping[str, Fraction]
+
+
+class Quantity:
+    """A number with a unit, as `-12.5 mm`. Raises ValueError for other text."""
+
+    __slots__ = ("number", "text", "unit")
+
+    def __init__(self, text: str) -> None:
+        match = _QUANTITY.fullmatch(text.strip())
+        if match is None:
+            raise ValueError(f"{shown(text)} is no number with a unit")
+        self.text = text
+        self.number = Fraction(match[1])
+        self.unit = _SAME.get(match[2], match[2])
+
+    @property
+    def is_negative(self) -> bool:
+        """Also for -0."""
+        return self.text.strip().startswith("-")
+
+
+def _range(name: str) -> Meta:
+    return Meta(ge=PARAMETERS[name].low, le=PARAMETERS[name].high)
+
+
+class MotorTable(Struct, kw_only=True, forbid_unknown_fields=True):
+    """The motor: `step_angle` or `full_steps`, and `unit` (of distances) or `turn_distance`."""
+
+    microsteps: Annotated[int, _range("microsteps")]
+    step_angle: Quantity | None = None
+    full_steps: int | None = None
+    turn_distance: Annotated[int, _range("turn_distance")] | None = None
+    unit: str | None = None
+    lead: Quantity | None = None
+    stop: Literal["slow", "immediate"] = "slow"
+    mode4: Annotated[int, _range("mode4")] = 0
+    home_at_power_on: bool = False
+
+
+class LoopTable(Struct, kw_only=True, forbid_unknown_fields=True):
+    """The steps `first` to `last` run `count` times in each pass."""
+
+    first: Annotated[int, _range("step")]
+    last: Annotated[int, _range("step")]
+    count: Annotated[int, _range("loop_count")]
+
+
+class StepTable(Struct, kw_only=True, forbid_unknown_fields=True):
+    """One step; a negative `move` is in reverse."""
+
+    move: Quantity = Quantity("0 units")
+    speed: Quantity | None = None
+    start: Quantity = Quantity("0 Hz")
+    acceleration: Quantity = Quantity("0 Hz")
+    output: str = "none"
+    delay: Quantity = Quantity("0 ms")
+    wait_for: int | str = "none"
+    stop_on: int | str = "none"
+
+
+class ProgramFile(Struct, kw_only=True, forbid_unknown_fields=True):
+    """A program file, format 1."""
+
+    format: Literal[1]
+    name: str = ""
+    project: Annotated[int, _range("project")] = 1
+    repeat: Annotated[int, Meta(ge=0, le=ENDLESS - 1)] | Literal["endless"] = 1
+    expert: bool = False
+    motor: MotorTable
+    loop: LoopTable | None = None
+    inputs: dict[str, Annotated[int, Meta(ge=1, le=INPUTS)]] = {}
+    outputs: dict[str, Annotated[int, Meta(ge=1, le=OUTPUTS)]] = {}
+    step: Annotated[list[StepTable], Meta(min_length=1, max_length=STEPS)]
+
+
+_TABLES: Final = {"": ProgramFile, "motor": MotorTable, "loop": LoopTable, "step": StepTable}
+
+
+def schema() -> dict[str, Any]:
+    """The JSON schema of a program file."""
+    return msgspec.json.schema(
+        ProgramFile, schema_hook=lambda _: {"type": "string", "description": "number and unit"}
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Program:
+    """A project, its name, and the names of its inputs and outputs; `lead` is mm per turn, if known."""
+
+    project: Project
+    name: str = ""
+    inputs: Mapping[str, int] = field(default_factory=dict)
+    outputs: Mapping[str, int] = field(default_factory=dict)
+    lead: Fraction | None = None
+    expert: bool = False
+
+    @classmethod
+    def parse(cls, source: str) -> Program:
+        """From the text of a file. Raises RequestError, naming step and field."""
+        file = _decode(source)
+        for kind, names in (("inputs", file.inputs), ("outputs", file.outputs)):
+            _check_names(kind, names)
+        base, lead = _motor(file.motor)
+        repeat = ENDLESS if file.repeat == "endless" else file.repeat
+        base = replace(base, number=file.project, project_loop=repeat)
+        if loop := file.loop:
+            base = replace(base, loop_first=loop.first, loop_last=loop.last, loop_count=loop.count)
+        steps = tuple(_step(entry, number, file, base, lead) for number, entry in enumerate(file.step, 1))
+        return cls(
+            project=with_steps(base, steps), name=file.name, inputs=file.inputs, outputs=file.outputs, lead=lead,
+            expert=file.expert,
+        )  # fmt: skip
+
+    @classmethod
+    def load(cls, path: str) -> Program:
+        """From a file. Raises RequestError if it cannot be read, and as `parse`."""
+        return cls.parse(read_text(path))
+
+    @classmethod
+    def from_dump(cls, data: bytes, *, name: str = "", order: Order = "little") -> Program:
+        """From the 226 bytes of the reply to "read project". Raises RequestError for other bytes."""
+        head = HEADER + bytes((READ_PROJECT,))
+        if len(data) != DUMP_LENGTH or not data.startswith(head):
+            raise RequestError(
+                "no dump of a project", received=data[:12], expected="226 bytes that begin with FF AA 3E"
+            )
+        return cls(project=replace(decode_image(data[REPLY_LENGTH:], order), number=data[3]), name=name)
+
+    def text(self) -> str:
+        """The file. Raises RequestError for numbers that no file may hold, as those of a cleared project."""
+        for error in check_project(self.project, expert=True):
+            raise error
+        return "\n".join(_lines(self)) + "\n"
+
+    def lint(self, **conditions: Any) -> list[Finding]:
+        """What in it does not do what it seems to say; see `lint.lint`."""
+        return lint(self.project, **conditions)
+
+    def estimate(self) -> Estimate:
+        """How long it takes."""
+        return estimate(self.project)
+
+
+def read_text(path: str) -> str:
+    """The text of a file. Raises RequestError if it cannot be read."""
+    try:
+        with open(path, encoding="utf-8") as file:
+            return file.read(LONGEST + 1)
+    except UnicodeDecodeError as error:
+        raise RequestError(f"{path} is not text: {error.reason}", expected="TOML in UTF-8") from None
+    except OSError as error:
+        raise RequestError(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
+
+
+# -- reading ---------------------------------------------------------------------------------------------------------
+
+
+def _decode(source: str) -> ProgramFile:
+    data = read_toml(source)
+    try:
+        return msgspec.convert(data, ProgramFile, dec_hook=lambda _, text: Quantity(text))
+    except msgspec.ValidationError as error:
+        message, _, path = str(error).partition(" - at `$")
+    keys = re.findall(r"[a-z_0-9]+", path.partition("`")[0])
+    table = _TABLES.get(keys[0] if keys else "", ProgramFile)
+    expected = f"one of {', '.join(table.__struct_fields__)}" if "unknown field" in message else ""
+    raise _wrong(f"{_place(keys)}{message[0].lower()}{message[1:]}", expected)
+
+
+def read_toml(source: str) -> dict[str, Any]:
+    """The data of a TOML file of at most 1 MiB. Raises RequestError."""
+    if len(source) > LONGEST:
+        raise _wrong("the file is too long", f"at most {LONGEST} characters")
+    try:
+        return tomllib.loads(source)
+    except (ValueError, RecursionError) as error:
+        raise _wrong(f"the file is not TOML: {str(error)[:100]}", "a file as in the documentation") from None
+
+
+def _place(keys: list[str]) -> str:
+    """`step 3, speed: ` for ["step", "2", "speed"]."""
+    words = (
+        [f"step {int(keys[1]) + 1}", *keys[2:]]
+        if keys[1:] and keys[0] == "step" and keys[1].isdigit()
+        else keys
+    )
+    return f"{', '.join(words)}: " if words else ""
+
+
+def _check_names(kind: str, names: Mapping[str, int]) -> None:
+    for name in names:
+        if not _NAME.fullmatch(name):
+            raise _wrong(
+                f"{kind}: {shown(name)} is no name", "letters, digits, space, - and _; not none, all, input 1"
+            )
+    if len(set(names.values())) < len(names):
+        raise _wrong(f"{kind}: two names for one number", "one name for each")
+
+
+def _motor(table: MotorTable) -> tuple[Project, Fraction | None]:
+    lead = None
+    if table.lead:
+        lead = table.lead.number * _LENGTH.get(table.lead.unit, Fraction(0))
+        if lead <= 0:
+            raise _wrong(f"motor, lead: {shown(table.lead.text)} is no length", "a length as 5 mm")
+    if (table.step_angle is None) is (table.full_steps is None):
+        raise _wrong("motor: step_angle or full_steps is needed, one of them", 'step_angle = "1.8 deg"')
+    if (table.turn_distance is None) is (table.unit is None):
+        raise _wrong(
+            "motor: turn_distance or unit is needed, one of them", 'unit = "pulse", "turn" or "0.01 deg"'
+        )
+    angle = table.step_angle or _full_step(table.full_steps or 0)
+    base = Project(
+        microsteps=table.microsteps,
+        step_angle=_whole(angle, {"deg": Fraction(100)}, "step_angle", "motor, step_angle"),
+        stop_mode=("slow", "immediate").index(table.stop),
+        mode4=table.mode4,
+        power_on_home=int(table.home_at_power_on),
+    )
+    turn = table.turn_distance or _turn_distance(table.unit or "", base, lead)
+    return replace(base, turn_distance=turn), lead
+
+
+def _full_step(count: int) -> Quantity:
+    if count < 1 or 36000 % count or 36000 // count > PARAMETERS["step_angle"].high:
+        raise _wrong(
+            f"motor, full_steps: {shown(count)} is not possible",
+            "a divisor of 36000, at least 142; else a step_angle and microsteps with the same pulses per turn",
+        )
+    return Quantity(f"{36000 // count / 100} deg")
+
+
+def _turn_distance(unit: str, base: Project, lead: Fraction | None) -> int:
+    """User units per turn, by the size of one unit."""
+    words = {"pulse": "1 pulse", "turn": "1 turn"}
+    try:
+        size = Quantity(words.get(unit, unit))
+    except ValueError as error:
+        raise _wrong(f"motor, unit: {error}", 'pulse, turn, "0.01 deg", with a lead "0.001 mm"') from None
+    turns = _distances(replace(base, turn_distance=1), lead)  # of one unit, in turns
+    each = turns.get(size.unit, Fraction(0)) * size.number
+    if size.unit == "units" or each <= 0:
+        raise _wrong(f"motor, unit: {shown(unit)} is no unit of distance", _one_of(turns, lead))
+    return _count(1 / each, "turn_distance", f"motor, unit: {shown(unit)}", "units per turn", Fraction(1))
+
+
+def _distances(project: Project, lead: Fraction | None) -> dict[str, Fraction]:
+    """User units in one of each unit of distance."""
+    turn, pulses = project.turn_distance, project.pulses_per_turn or Fraction(1)
+    each = {
+        "units": Fraction(1),
+        "pulses": turn / pulses,
+        "turns": Fraction(turn),
+        "deg": Fraction(turn, 360),
+    }
+    return each | ({unit: size * turn / lead for unit, size in _LENGTH.items()} if lead else {})
+
+
+def _speeds(project: Project, lead: Fraction | None) -> dict[str, Fraction]:
+    """RPM in one of each unit of speed."""
+    each = {"rpm": Fraction(1), "Hz": 60 / (project.pulses_per_turn or Fraction(1)), "deg/s": Fraction(1, 6)}
+    return each | ({f"{unit}/s": size * 60 / lead for unit, size in _LENGTH.items()} if lead else {})
+
+
+def _step(entry: StepTable, number: int, file: ProgramFile, base: Project, lead: Fraction | None) -> Step:
+    where = f"step {number}, "
+    distances, speeds = _distances(base, lead), _speeds(base, lead)
+    move = entry.move
+    distance = _whole(move, distances, "distance", f"{where}move", is_signed=True)
+    if distance and entry.speed is None:
+        raise _wrong(f"{where}speed: it is missing, and the step moves", _one_of(speeds, lead))
+    return Step(
+        distance=distance,
+        direction=int(move.is_negative),
+        speed=_whole(entry.speed, speeds, "speed", f"{where}speed") if entry.speed else 0,
+        start_frequency=_whole(entry.start, _HERTZ, "start_frequency", f"{where}start"),
+        acceleration=_whole(entry.acceleration, _HERTZ, "acceleration", f"{where}acceleration"),
+        delay=_whole(entry.delay, _TIME, "delay", f"{where}delay"),
+        output=_output(entry.output, file.outputs, f"{where}output"),
+        start_input=_input(entry.wait_for, file, f"{where}wait_for"),
+        stop_input=_input(entry.stop_on, file, f"{where}stop_on"),
+    )
+
+
+def _whole(said: Quantity, each: _Each, name: str, where: str, *, is_signed: bool = False) -> int:
+    """The raw value of a quantity; `each` are raw counts in one of each unit."""
+    where = f"{where}: {shown(said.text)}"
+    if said.unit not in each:
+        raise _wrong(f"{where} has no unit that is possible here", _one_of(each, None))
+    if said.is_negative and not is_signed:
+        raise _wrong(f"{where} is negative", _one_of(each, None))
+    return _count(abs(said.number) * each[said.unit], name, where, said.unit, each[said.unit])
+
+
+def _count(raw: Fraction, name: str, where: str, unit: str, each: Fraction) -> int:
+    row = PARAMETERS[name]
+    if not row.low <= raw <= row.high:
+        limits = " to ".join(f"{float(limit / each):.10g}" for limit in (row.low, row.high))
+        raise _wrong(f"{where} is not possible", f"{limits} {unit} (raw {row.low} to {row.high})")
+    if raw.denominator != 1:
+        below, above = (f"{float(near / each):.10g}" for near in (floor(raw), ceil(raw)))
+        raise _wrong(
+            f"{where} is {float(raw):.6g}, and the controller counts whole numbers",
+            f"{below} or {above} {unit}",
+        )
+    return int(raw)
+
+
+def _input(said: int | str, file: ProgramFile, where: str) -> int:
+    words = {"none": 0} | {f"input {number}": number for number in range(1, INPUTS + 1)} | file.inputs
+    number = said if isinstance(said, int) else words.get(said.strip(), -1)
+    try:
+        check_value("start_input", number, expert=file.expert)
+    except RequestError as error:
+        hint = "; 3 and 4 with expert = true" if number in (3, 4) else ""
+        raise _wrong(
+            f"{where}: {shown(said)} is not possible", f"{error.expected}{hint}, or a name of [inputs]"
+        ) from None
+    return number
+
+
+def _output(said: str, names: Mapping[str, int], where: str) -> int:
+    words = {text: action for action, text in PARAMETERS["output"].choices.items()}
+    for name, number in names.items():
+        words |= {f"{name} {level}": words[f"output {number} {level}"] for level in ("on", "off")}
+    action = words.get(said.strip())
+    if action is None:
+        raise _wrong(f"{where}: {shown(said)} is not possible", f"one of {', '.join(words)}")
+    return action
+
+
+def _one_of(each: _Each, lead: Fraction | None) -> str:
+    return f"a number with one of {', '.join(each)}" + (
+        "" if lead or "turns" not in each else "; mm needs a lead"
+    )
+
+
+def _wrong(what: str, expected: str) -> RequestError:
+    return RequestError(what, expected=expected, advice="correct the file; nothing was sent")
+
+
+# -- writing ---------------------------------------------------------------------------------------------------------
+
+
+def _lines(program: Program) -> list[str]:
+    project = program.project
+    inputs = {step.start_input for step in project.used} | {step.stop_input for step in project.used}
+    lines = [f"format = {FORMAT}"]
+    lines += [f"name = {_quoted(program.name)}"] if program.name else []
+    lines += [f"project = {project.number}"]
+    lines += ['repeat = "endless"' if project.is_endless else f"repeat = {project.project_loop}"]
+    lines += ["expert = true"] if program.expert or inputs & {3, 4} else []
+    lines += ["", "[motor]", f"microsteps = {project.microsteps}"]
+    lines += [
+        f'step_angle = "{project.step_angle / 100:.2f} deg"',
+        f"turn_distance = {project.turn_distance}",
+    ]
+    lines += [f'lead = "{float(program.lead):.12g} mm"'] if program.lead else []
+    lines += ['stop = "immediate"'] if project.stop_mode else []
+    lines += [f"mode4 = {project.mode4}"] if project.mode4 else []
+    lines += ["home_at_power_on = true"] if project.power_on_home else []
+    if project.loop_first:
+        lines += ["", "[loop]", f"first = {project.loop_first}", f"last = {project.loop_last}"]
+        lines += [f"count = {project.loop_count}"]
+    for kind, names in (("inputs", program.inputs), ("outputs", program.outputs)):
+        lines += (
+            ["", f"[{kind}]", *(f"{_quoted(name)} = {number}" for name, number in names.items())]
+            if names
+            else []
+        )
+    for step in project.used:
+        lines += ["", "[[step]]", *_step_lines(step, program)]
+    return lines
+
+
+def _step_lines(step: Step, program: Program) -> list[str]:
+    inputs = {number: name for name, number in program.inputs.items()}
+    output = PARAMETERS["output"].choices[step.output]
+    for name, number in program.outputs.items():
+        output = output.replace(f"output {number} ", f"{name} ")
+    values = {
+        "move": f"{'-' * step.direction}{step.distance} units" if step.distance or step.direction else "",
+        "speed": f"{step.speed} rpm" if step.distance or step.speed else "",
+        "start": f"{step.start_frequency} Hz" if step.start_frequency else "",
+        "acceleration": f"{step.acceleration} Hz" if step.acceleration else "",
+        "output": output if step.output else "",
+        "delay": f"{step.delay} ms" if step.delay else "",
+        "wait_for": inputs.get(step.start_input, f"input {step.start_input}") if step.start_input else "",
+        "stop_on": inputs.get(step.stop_input, f"input {step.stop_input}") if step.stop_input else "",
+    }
+    return [f"{key} = {_quoted(text)}" for key, text in values.items() if text]
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08X}" for c in escaped) + '"'
