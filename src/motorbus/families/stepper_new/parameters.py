@@ -177,7 +177,6 @@ TABLE: Final = RegisterMap(
     title="one project of the stepper controller",
 )
 TABLES: Final[Mapping[str, RegisterMap]] = {TABLE.name: TABLE}
-_NAMED: Final = {at for row in TABLE.values() for at in range(row.address, row.address + row.size)}
 
 
 # -- a project -------------------------------------------------------------------------------------------------------
@@ -318,22 +317,14 @@ def decode_image(image: bytes, order: Order = "little") -> Project:
 def encode_image(project: Project, order: Order = "little", *, over: bytes = BLANK) -> bytes:
     """The image of a project; the bytes that the manual does not name are those of `over`.
 
-    Raises RequestError for a number that does not fit its bytes, and if `over` has not 220.
+    Raises RequestError if `over` has not 220, OverflowError for a number that does not fit its bytes.
     """
     _check_length(over)
     image = bytearray(over)
     for name, raw in values_of(project).items():
         row = TABLE[name]
-        if not 0 <= raw < 1 << 8 * row.size:
-            raise RequestError(f"{name}: {raw} does not fit", expected=f"0 to {(1 << 8 * row.size) - 1}")
         image[row.address : row.address + row.size] = raw.to_bytes(row.size, order)
     return bytes(image)
-
-
-def reserved_bytes(image: bytes) -> dict[int, int]:
-    """The bytes that are not 0 and that the manual does not name, by offset."""
-    _check_length(image)
-    return {at: byte for at, byte in enumerate(image) if byte and at not in _NAMED}
 
 
 def checked_order(order: object) -> Order:

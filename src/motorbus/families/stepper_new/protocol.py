@@ -14,7 +14,7 @@ example frames carry a correct checksum, so where an annotation differs the fram
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 from motorbus.core.register import shown
@@ -40,8 +40,8 @@ class Command(NamedTuple):
     `number`      the item of the manual
     `code`        byte 2, and byte 3 unless it is a system command; the motor number of byte 2 is a setting
     `fields`      offset in the request of each number, by name; size and range are those of its parameter row
-    `repeats`     what bytes 3 to 5 of the reply repeat: the name of a number, "code", "selected" (the selected project,
-                  which the request does not name), or "" for 0
+    `repeats`     bytes 3 to 5 of the reply: the name of a number, "code", "selected" (the selected project, which the
+                  request does not name), or "" for 0
     `repeatable`  sending it twice has the same effect as sending it once
     """
 
@@ -49,15 +49,11 @@ class Command(NamedTuple):
     name: str
     code: tuple[int, ...]
     fields: Mapping[str, int]
-    repeats: tuple[str, str, str]
+    repeats: tuple[str, ...]
     effect: Effect
     repeatable: bool
     title: str
-    note: str = ""
-
-    @property
-    def is_of_motor(self) -> bool:
-        return self.code[0] == MOTOR
+    note: str
 
     @property
     def is_edit(self) -> bool:
@@ -65,21 +61,14 @@ class Command(NamedTuple):
         return self.effect is Effect.PERSISTENT and self.repeatable
 
     @property
-    def stores(self) -> bool:
-        """It writes memory that is kept without supply."""
-        return self.effect is Effect.PERSISTENT and not self.repeatable
-
-    @property
     def reply_within(self) -> TimeoutClass:
-        return TimeoutClass.STORE if self.stores else TimeoutClass.REPLY
+        """STORE if it writes memory that is kept without supply."""
+        stores = self.effect is Effect.PERSISTENT and not self.repeatable
+        return TimeoutClass.STORE if stores else TimeoutClass.REPLY
 
     @property
     def reply_length(self) -> int:
         return DUMP_LENGTH if self.code == (READ_PROJECT,) else REPLY_LENGTH
-
-    @property
-    def source(self) -> str:
-        return f"stepper controller serial protocol manual, item {self.number}"
 
 
 _EDIT: Final = (Effect.PERSISTENT, True)
@@ -90,87 +79,75 @@ _READ: Final = (Effect.NONE, True)
 _SWITCH: Final = (Effect.TORQUE, True)
 
 
-def _places(names: Sequence[str], offset: int) -> dict[str, int]:
-    places = {}
-    for name in names:
-        places[name] = offset
-        offset += PARAMETERS[name].size
-    return places
-
-
-def _system(
+def _row(
     number: str,
     name: str,
-    code: int,
-    fields: Sequence[str],
+    code: tuple[int, ...],
+    fields: str,
     repeats: str,
     kind: tuple[Effect, bool],
     title: str,
     note: str = "",
 ) -> Command:
-    return Command(number, name, (code,), _places(fields, 3), (repeats, "", ""), *kind, title, note)
-
-
-def _motor(
-    number: str,
-    name: str,
-    code: int,
-    fields: Sequence[str],
-    kind: tuple[Effect, bool],
-    title: str,
-    note: str = "",
-) -> Command:
-    return Command(number, name, (MOTOR, code), _places(fields, 4), ("code", "", ""), *kind, title, note)
-
-
-def _step(number: str, name: str, code: int, fields: Sequence[str], title: str) -> Command:
-    places = {**_places(fields, 4), "step": 9}
-    return Command(number, name, (MOTOR, code), places, ("code", "", "step"), *_EDIT, title)
+    """A row; `fields` follow the code, but "step" is byte 9, and `repeats` are the bytes of the reply from byte 3."""
+    offsets, at = {}, 2 + len(code)
+    for field in fields.split():
+        offsets[field] = 9 if field == "step" else at
+        at += PARAMETERS[field].size
+    last = (*repeats.split(","), "", "")[:3]
+    return Command(number, name, code, offsets, last, *kind, title, note)
 
 
 _ALL: Final = (
-    _system("1", "select_project", 0x6E, ("project", "total_steps"), "project", _EDIT,
-            "Select a project and set its number of steps",
-            "always writes the number of steps; later edits go to this project, an assumption"),
-    _motor("2", "set_microstep_and_angle", 0x01, ("microsteps", "step_angle"), _EDIT,
-           "Set microsteps and step angle", "angles up to 2.55 degrees"),
-    _motor("3", "set_turn_distance", 0x02, ("turn_distance",), _EDIT,
-           "Set the distance of one turn", "defines the unit of all distances"),
-    _step("4", "set_step_distance", 0x03, ("distance",), "Set the distance of a step"),
-    _step("5", "set_step_direction_start", 0x04, ("direction", "start_frequency"),
-          "Set direction and start frequency of a step"),
-    _step("6", "set_step_accel_speed", 0x05, ("acceleration", "speed"), "Set acceleration and speed of a step"),
-    _step("7", "set_step_output", 0x06, ("output",), "Set what a step does to the outputs"),
-    _step("8", "set_step_delay", 0x07, ("delay",), "Set the pause after a step"),
-    _step("9", "set_step_start_input", 0x08, ("start_input",), "Set the input that a step waits for"),
-    _step("10", "set_step_stop_input", 0x09, ("stop_input",), "Set the input that ends a step"),
-    _system("11", "set_segment_loop", 0x7E, ("loop_first", "loop_last", "loop_count"), "selected", _EDIT,
-            "Set the step loop", "one range for each project"),
-    _system("12", "set_project_loop", 0x8E, ("project_loop",), "selected", _EDIT,
-            "Set how often a project runs", "255 is endless: it sends no notice"),
-    _system("13", "start_project", 0x4E, ("project",), "project", _MOVE,
-            "Start a project", "also input 3; EE DD follows when the project has ended"),
-    _system("14", "stop_project", 0x5E, (), "", _STOP, "Stop the project", "also input 4; names no project"),
-    _system("15", "read_project", READ_PROJECT, ("project",), "project", _READ,
-            "Read a project", "226 bytes, no checksum"),
-    _system("16", "save_project", 0x2E, ("project",), "project", _STORE,
-            "Save a project", "the edits of the selected project are kept without supply"),
-    _system("17a", "clear_project", 0x1E, ("project",), "project", _STORE,
-            "Clear a project", "all to zero; without project 1 there is no speed to jog with"),
-    _motor("18", "jog_forward", 0x0A, (), _MOVE, "Jog forward", "until stopped; speed of step 1 of project 1"),
-    _motor("17b", "jog_reverse", 0x0B, (), _MOVE, "Jog in reverse", "until stopped; speed of step 1 of project 1"),
-    _motor("19", "run_once", 0x0C, (), _MOVE, "Run one move", "distance and speed of step 1 of project 1"),
-    _motor("20", "stop_motor", 0x0D, (), _STOP, "Stop the motor"),
-    _motor("21", "set_stop_mode", 0x0E, ("stop_mode",), _EDIT, "Set the stop mode", "slow or immediate"),
-    _motor("22", "home", 0x0F, (), _MOVE, "Home", "in reverse until input 5; no limit of travel or time, no notice"),
-    Command("23", "set_output", (0, 0x0C), {"port": 4, "level": 5}, ("code", "port", ""), *_SWITCH,
-            "Set an output", "it may switch a brake, a valve or a gripper"),
-    Command("24", "read_input", (0, 0x0B), {"port": 4}, ("code", "port", "level"), *_READ,
-            "Read an input", "the only reply with a live state"),
-    _system("25", "set_mode4", 0x9E, ("mode4",), "", _EDIT,
-            "Set the variant of mode 4", "the manual does not explain it"),
-    _system("26", "set_power_on_home", 0xAE, ("power_on_home",), "", _EDIT,
-            "Set homing at power-on", "the motor then moves at power-on"),
+    _row("1", "select_project", (0x6E,), "project total_steps", "project", _EDIT,
+         "Select a project and set its number of steps",
+         "always writes the number of steps; later edits go to this project, an assumption"),
+    _row("2", "set_microstep_and_angle", (MOTOR, 0x01), "microsteps step_angle", "code", _EDIT,
+         "Set microsteps and step angle", "angles up to 2.55 degrees"),
+    _row("3", "set_turn_distance", (MOTOR, 0x02), "turn_distance", "code", _EDIT,
+         "Set the distance of one turn", "defines the unit of all distances"),
+    _row("4", "set_step_distance", (MOTOR, 0x03), "distance step", "code,,step", _EDIT, "Set the distance of a step"),
+    _row("5", "set_step_direction_start", (MOTOR, 0x04), "direction start_frequency step", "code,,step", _EDIT,
+         "Set direction and start frequency of a step"),
+    _row("6", "set_step_accel_speed", (MOTOR, 0x05), "acceleration speed step", "code,,step", _EDIT,
+         "Set acceleration and speed of a step"),
+    _row("7", "set_step_output", (MOTOR, 0x06), "output step", "code,,step", _EDIT,
+         "Set what a step does to the outputs"),
+    _row("8", "set_step_delay", (MOTOR, 0x07), "delay step", "code,,step", _EDIT, "Set the pause after a step"),
+    _row("9", "set_step_start_input", (MOTOR, 0x08), "start_input step", "code,,step", _EDIT,
+         "Set the input that a step waits for"),
+    _row("10", "set_step_stop_input", (MOTOR, 0x09), "stop_input step", "code,,step", _EDIT,
+         "Set the input that ends a step"),
+    _row("11", "set_segment_loop", (0x7E,), "loop_first loop_last loop_count", "selected", _EDIT,
+         "Set the step loop", "one range for each project"),
+    _row("12", "set_project_loop", (0x8E,), "project_loop", "selected", _EDIT,
+         "Set how often a project runs", "255 is endless: it sends no notice"),
+    _row("13", "start_project", (0x4E,), "project", "project", _MOVE,
+         "Start a project", "also input 3; EE DD follows when the project has ended"),
+    _row("14", "stop_project", (0x5E,), "", "", _STOP, "Stop the project", "also input 4; names no project"),
+    _row("15", "read_project", (READ_PROJECT,), "project", "project", _READ,
+         "Read a project", "226 bytes, no checksum"),
+    _row("16", "save_project", (0x2E,), "project", "project", _STORE,
+         "Save a project", "the edits of the selected project are kept without supply"),
+    _row("17a", "clear_project", (0x1E,), "project", "project", _STORE,
+         "Clear a project", "all to zero; without project 1 there is no speed to jog with"),
+    _row("18", "jog_forward", (MOTOR, 0x0A), "", "code", _MOVE,
+         "Jog forward", "until stopped; speed of step 1 of project 1"),
+    _row("17b", "jog_reverse", (MOTOR, 0x0B), "", "code", _MOVE,
+         "Jog in reverse", "until stopped; speed of step 1 of project 1"),
+    _row("19", "run_once", (MOTOR, 0x0C), "", "code", _MOVE,
+         "Run one move", "distance and speed of step 1 of project 1"),
+    _row("20", "stop_motor", (MOTOR, 0x0D), "", "code", _STOP, "Stop the motor"),
+    _row("21", "set_stop_mode", (MOTOR, 0x0E), "stop_mode", "code", _EDIT, "Set the stop mode", "slow or immediate"),
+    _row("22", "home", (MOTOR, 0x0F), "", "code", _MOVE,
+         "Home", "in reverse until input 5; no limit of travel or time, no notice"),
+    _row("23", "set_output", (0, 0x0C), "port level", "code,port", _SWITCH,
+         "Set an output", "it may switch a brake, a valve or a gripper"),
+    _row("24", "read_input", (0, 0x0B), "port", "code,port,level", _READ,
+         "Read an input", "the only reply with a live state"),
+    _row("25", "set_mode4", (0x9E,), "mode4", "", _EDIT, "Set the variant of mode 4", "the manual does not explain it"),
+    _row("26", "set_power_on_home", (0xAE,), "power_on_home", "", _EDIT,
+         "Set homing at power-on", "the motor then moves at power-on"),
 )  # fmt: skip
 COMMANDS: Final[Mapping[str, Command]] = {command.name: command for command in _ALL}
 """Every command by its name, in the order of the manual."""
@@ -206,7 +183,7 @@ def encode(name: str, /, *, motor: int = MOTOR, **values: int) -> bytes:
         )
     body = bytearray(REQUEST_LENGTH - 1)
     body[:2] = HEADER
-    code = (checked_motor(motor), *command.code[1:]) if command.is_of_motor else command.code
+    code = command.code if command.code[0] != MOTOR else (checked_motor(motor), command.code[1])
     body[2 : 2 + len(code)] = bytes(code)
     for field, at in command.fields.items():
         size = PARAMETERS[field].size

@@ -6,8 +6,10 @@ Source of each transition: stepper controller serial protocol manual; `# assumpt
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 from math import inf
 from typing import Final, NamedTuple
 
@@ -42,15 +44,6 @@ class Phase(Enum):
     HOMING = "homing"
     SLOWING = "slowing down"
     OFF = "off"
-
-
-class After(Enum):
-    """What follows the end of a motion that was stopped."""
-
-    REST = "rest"
-    STOP = "the project is stopped"
-    PAUSE = "the pause of the step"
-    REVERSE = "jog the other way"
 
 
 class Happening(NamedTuple):
@@ -95,7 +88,6 @@ class Machine:
         self.motion: Motion | None = None
         self.base = 0
         self.run: Run | None = None
-        self.manual: Project | None = None  # the project of the speed of a manual motion
         self.outputs = 0
         self.leds = False
         self.inputs: frozenset[int] = frozenset()
@@ -103,7 +95,7 @@ class Machine:
         self.is_homed = False
         self.events: list[Happening] = []
         self._now = 0.0
-        self._after = After.REST
+        self._then: Callable[[], None] = self._end_manual  # after a slow stop
 
     @property
     def is_busy(self) -> bool:
@@ -144,13 +136,12 @@ class Machine:
         """Without supply; the motor stays in its place."""
         self.advance(at)
         self._rest(Phase.OFF)
-        self.run = self.manual = None
+        self.run = None
         self.outputs, self.leds, self.is_homed = 0, False, False
 
     def start(self, project: Project, at: float, *, by_command: bool = True) -> bool:
         """Start a project. False if it is busy; then the start is ignored, assumption."""
-        self.advance(at)
-        if self.is_busy or self.phase is Phase.OFF:
+        if not self._is_free(at):
             return False
         self.stop_mode = project.stop_mode  # assumption: of each project
         self.run = Run(project, by_command, self._now)
@@ -166,20 +157,19 @@ class Machine:
 
         The opposite jog command stops and reverses, assumption.
         """
-        self.advance(at)
-        if self.phase is Phase.JOG and self.motion and self.motion.sign != sign:
-            self._stop(After.REVERSE)
-        elif self.is_busy or self.phase is Phase.OFF:
-            return False
-        else:
+        is_free = self._is_free(at)
+        if is_free:
             self._move_by_hand(Phase.JOG, project, None, sign)
+        elif self.phase is Phase.JOG and self.motion and self.motion.sign != sign:
+            self._stop(partial(self._move_by_hand, Phase.JOG, project, None, sign))
+        else:
+            return False
         self.advance(at)
         return True
 
     def run_once(self, project: Project, at: float) -> bool:
         """Make the move of step 1 of this project, without its inputs, output and pause; False if it is busy."""
-        self.advance(at)
-        if self.is_busy or self.phase is Phase.OFF:
+        if not self._is_free(at):
             return False
         step = project.step(1)
         self._move_by_hand(Phase.ONCE, project, ramp.pulses_of(project, step), step.sign)
@@ -191,8 +181,7 @@ class Machine:
 
         It ends at once, without a motion, if the input is active.
         """
-        self.advance(at)
-        if self.is_busy or self.phase is Phase.OFF:
+        if not self._is_free(at):
             return False
         if HOME_INPUT in self.inputs:
             self._happen("rests")
@@ -204,24 +193,16 @@ class Machine:
     def stop_project(self, at: float) -> None:
         """Stop the project; a manual motion continues, assumption."""
         self.advance(at)
-        if self.run is None:
-            return
-        if self.phase is Phase.SLOWING:
-            self._after = After.STOP
-        else:
-            self._stop(After.STOP)
-        self.advance(at)
+        if self.run is not None:
+            self._stop(partial(self._finish, "stopped"))
+            self.advance(at)
 
     def stop_motor(self, at: float) -> None:
         """Stop the motor; it ends the project, assumption."""
-        self.advance(at)
-        if self.run is not None:
-            self.stop_project(at)
-        elif self.phase is Phase.SLOWING:
-            self._after = After.REST
-        elif self.is_busy:
-            self._stop(After.REST)
-        self.advance(at)
+        self.stop_project(at)
+        if self.is_busy and self.run is None:
+            self._stop(self._end_manual)
+            self.advance(at)
 
     def set_output(self, port: int, level: int, at: float) -> None:
         """Switch outputs (1 to 3, 4 for all) or the LEDs (5), at any time."""
@@ -263,33 +244,28 @@ class Machine:
         self.base = self.position(self._now)
         self.phase, self.motion, self.since, self.until = phase, None, self._now, until
 
-    def _stop(self, after: After) -> None:
-        """Stop the motion as the stop mode says."""
-        self._after = after
+    def _stop(self, then: Callable[[], None]) -> None:
+        """Stop the motion as the stop mode says, then call `then`; a slow stop that began continues."""
+        self._then = then
         slow = self.motion.slowing(self._now - self.since) if self.motion else None
+        if self.phase is Phase.SLOWING:
+            return
         if slow is None or self.stop_mode == IMMEDIATE:
-            self._stopped()
+            self._rest()
+            then()
         else:
             self._go(Phase.SLOWING, slow)
 
-    def _stopped(self) -> None:
-        last = self.motion
-        self._rest()
-        if self._after is After.STOP:
-            self._finish("stopped")
-        elif self._after is After.REVERSE and last and self.manual:
-            self._move_by_hand(Phase.JOG, self.manual, None, -last.sign)
-        else:
-            self._end_manual()
+    def _is_free(self, at: float) -> bool:
+        self.advance(at)
+        return self.phase is Phase.IDLE
 
     def _move_by_hand(self, phase: Phase, project: Project, pulses: int | None, sign: int) -> None:
         self.stop_mode = project.stop_mode
-        self.manual = project
         speed = ramp.ramp_of(project, project.step(1))
         self._go(phase, ramp.motion(speed, pulses, sign, self.tick_ms))
 
     def _end_manual(self) -> None:
-        self.manual = None
         self._happen("rests")
 
     def _end_phase(self) -> None:
@@ -299,7 +275,8 @@ class Machine:
         elif self.phase is Phase.PAUSE:
             self._next_step()
         elif self.phase is Phase.SLOWING:
-            self._stopped()
+            self._rest()
+            self._then()
         else:  # one move is made, or a manual motion has no speed
             self._rest()
             self._end_manual()

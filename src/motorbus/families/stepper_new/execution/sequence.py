@@ -1,8 +1,7 @@
 """The order of the steps of a project, and how often it runs.
 
 After the last step of the step loop follows its first, as often as the loop counts; the loop begins anew in each pass
-of the project. Assumptions: both counts are totals, and a project loop of 0 or 1 runs once. `extra=1` gives the other
-reading, in which a count is of repetitions.
+of the project. Assumptions: both counts are totals, and a project loop of 0 or 1 runs once.
 """
 
 from __future__ import annotations
@@ -27,20 +26,15 @@ def last_step(project: Project) -> int:
     return min(project.total_steps, STEPS)
 
 
-def laps(project: Project, *, extra: int = 0) -> int:
-    """How often the step loop runs in one pass of the project; 1 if it is off."""
-    return project.loop_count + extra if project.has_loop else 1
-
-
-def passes(project: Project, *, extra: int = 0) -> int | None:
+def passes(project: Project) -> int | None:
     """How often the project runs; None: until it is stopped."""
-    return None if project.is_endless else max(1, project.project_loop) + extra * (project.project_loop > 0)
+    return None if project.is_endless else max(1, project.project_loop)
 
 
 def following(project: Project, place: Place) -> Place | None:
     """The next place in the same pass of the project; None at its end."""
     step, lap = place
-    if project.has_loop and step == project.loop_last and lap < laps(project):
+    if project.has_loop and step == project.loop_last and lap < project.loop_count:
         return Place(project.loop_first, lap + 1)
     if step >= last_step(project):
         return None
@@ -55,12 +49,9 @@ def one_pass(project: Project) -> Iterator[Place]:
         place = following(project, place)
 
 
-def times(project: Project, step: int, *, extra: int = 0) -> int:
+def times(project: Project, step: int) -> int:
     """How often a step is carried out in one pass of the project."""
-    if not 1 <= step <= last_step(project):
-        return 0
-    inside = project.has_loop and project.loop_first <= step <= project.loop_last
-    return laps(project, extra=extra) if inside else 1
+    return sum(place.step == step for place in one_pass(project))
 
 
 def earliest_end(project: Project) -> float | None:
@@ -72,8 +63,7 @@ def earliest_end(project: Project) -> float | None:
     count = passes(project)
     if count is None:
         return None
-    numbers = range(1, last_step(project) + 1)
-    return count * sum(_least(project, project.step(one)) * times(project, one) for one in numbers)
+    return count * sum(_least(project, project.step(place.step)) for place in one_pass(project))
 
 
 def _least(project: Project, step: Step) -> float:

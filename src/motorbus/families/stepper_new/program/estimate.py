@@ -5,14 +5,14 @@ Motion and pauses are known but for the reading of the acceleration. Waits for a
 
 from __future__ import annotations
 
-from math import inf
+from dataclasses import replace
 from typing import Final
 
 from msgspec import Struct
 
 from motorbus.families.stepper_new.execution import ramp, sequence
 from motorbus.families.stepper_new.execution.ramp import READINGS, TICK_MS
-from motorbus.families.stepper_new.parameters import Project, Step
+from motorbus.families.stepper_new.parameters import ENDLESS, Project, Step
 
 COUNTLESS: Final = 1_000_000  # passes for which the travel of an endless project is given
 
@@ -93,24 +93,14 @@ def reach(project: Project) -> tuple[int, int]:
 
     Of both readings of the loop counts the one that reaches farther; an endless project is given a million passes.
     """
-    low, high = 0, 0
+    ends = [0]
     for extra in (0, 1):
-        places = [place.step for place in sequence.one_pass(project)]
-        if project.has_loop and extra:
-            inside = list(range(project.loop_first, project.loop_last + 1))
-            end = len(places) - (sequence.last_step(project) - project.loop_last)
-            places[end:end] = inside
-        at, least, most = 0, 0, 0
-        for number in places:
-            step = project.step(number)
+        count = min(ENDLESS - 1, project.loop_count + extra * project.has_loop)
+        at, own = 0, [0]
+        for place in sequence.one_pass(replace(project, loop_count=count)):
+            step = project.step(place.step)
             at += step.sign * step.distance if step.speed else 0
-            least, most = min(least, at), max(most, at)
-        passes = sequence.passes(project, extra=1)
-        drift = at * ((passes or COUNTLESS) - 1)
-        low, high = min(low, least, least + drift), max(high, most, most + drift)
-    return low, high
-
-
-def is_endless(project: Project) -> bool:
-    """Only a stop ends it."""
-    return project.is_endless or estimate(project).seconds == inf
+            own.append(at)
+        drift = at * (COUNTLESS if project.is_endless else project.project_loop)
+        ends += [*own, *(end + drift for end in own)]
+    return min(ends), max(ends)

@@ -43,7 +43,6 @@ FORMAT: Final = 1
 _QUANTITY: Final = re.compile(
     r"([+-]?(?:\d{1,20}(?:\.\d{0,20})?|\.\d{1,20}))\s*([^\d\s.].*)", re.ASCII | re.DOTALL
 )
-_NAME: Final = re.compile(r"(?!(?:none|all|(?:input|output)\b.*)$)[A-Za-z][A-Za-z0-9 _-]{0,31}", re.ASCII)
 _SAME: Final = {
     "unit": "units",
     "pulse": "pulses",
@@ -60,14 +59,14 @@ _Each = Mapping[str, Fraction]
 
 
 class Quantity:
-    """A number with a unit, as `-12.5 mm`. Raises ValueError for other text."""
+    """A number with a unit, as `-12.5 mm`. Raises ValueError for anything else."""
 
     __slots__ = ("number", "text", "unit")
 
-    def __init__(self, text: str) -> None:
-        match = _QUANTITY.fullmatch(text.strip())
-        if match is None:
-            raise ValueError(f"{shown(text)} is no number with a unit")
+    def __init__(self, text: object) -> None:
+        match = _QUANTITY.fullmatch(text.strip()) if isinstance(text, str) else None
+        if match is None or not isinstance(text, str):
+            raise ValueError("expected a number with a unit in quotes")
         self.text = text
         self.number = Fraction(match[1])
         self.unit = _SAME.get(match[2], match[2])
@@ -83,11 +82,10 @@ def _range(name: str) -> Meta:
 
 
 class MotorTable(Struct, kw_only=True, forbid_unknown_fields=True):
-    """The motor: `step_angle` or `full_steps`, and `unit` (of distances) or `turn_distance`."""
+    """The motor, with `unit` (of distances) or `turn_distance` (units per turn)."""
 
     microsteps: Annotated[int, _range("microsteps")]
-    step_angle: Quantity | None = None
-    full_steps: int | None = None
+    step_angle: Quantity
     turn_distance: Annotated[int, _range("turn_distance")] | None = None
     unit: str | None = None
     lead: Quantity | None = None
@@ -107,12 +105,12 @@ class LoopTable(Struct, kw_only=True, forbid_unknown_fields=True):
 class StepTable(Struct, kw_only=True, forbid_unknown_fields=True):
     """One step; a negative `move` is in reverse."""
 
-    move: Quantity = Quantity("0 units")
+    move: Quantity | None = None
     speed: Quantity | None = None
-    start: Quantity = Quantity("0 Hz")
-    acceleration: Quantity = Quantity("0 Hz")
+    start: Quantity | None = None
+    acceleration: Quantity | None = None
     output: str = "none"
-    delay: Quantity = Quantity("0 ms")
+    delay: Quantity | None = None
     wait_for: int | str = "none"
     stop_on: int | str = "none"
 
@@ -157,8 +155,6 @@ class Program:
     def parse(cls, source: str) -> Program:
         """From the text of a file. Raises RequestError, naming step and field."""
         file = _decode(source)
-        for kind, names in (("inputs", file.inputs), ("outputs", file.outputs)):
-            _check_names(kind, names)
         base, lead = _motor(file.motor)
         repeat = ENDLESS if file.repeat == "endless" else file.repeat
         base = replace(base, number=file.project, project_loop=repeat)
@@ -221,9 +217,15 @@ def _decode(source: str) -> ProgramFile:
     except msgspec.ValidationError as error:
         message, _, path = str(error).partition(" - at `$")
     keys = re.findall(r"[a-z_0-9]+", path.partition("`")[0])
-    table = _TABLES.get(keys[0] if keys else "", ProgramFile)
-    expected = f"one of {', '.join(table.__struct_fields__)}" if "unknown field" in message else ""
-    raise _wrong(f"{_place(keys)}{message[0].lower()}{message[1:]}", expected)
+    value: Any = data
+    for key in keys:
+        value = value[int(key) if key.isdigit() else key]
+    words = [f"step {int(keys[1]) + 1}", *keys[2:]] if keys[1:] and keys[0] == "step" else keys
+    where = ", ".join(words) or "the file"
+    if "field" in message:
+        table = _TABLES.get("".join(keys[:1]), ProgramFile)
+        raise _wrong(f"{where}: {message}", f"one of {', '.join(table.__struct_fields__)}")
+    raise _wrong(f"{where}: {shown(value)} is not possible", message)
 
 
 def read_toml(source: str) -> dict[str, Any]:
@@ -236,57 +238,25 @@ def read_toml(source: str) -> dict[str, Any]:
         raise _wrong(f"the file is not TOML: {str(error)[:100]}", "a file as in the documentation") from None
 
 
-def _place(keys: list[str]) -> str:
-    """`step 3, speed: ` for ["step", "2", "speed"]."""
-    words = (
-        [f"step {int(keys[1]) + 1}", *keys[2:]]
-        if keys[1:] and keys[0] == "step" and keys[1].isdigit()
-        else keys
-    )
-    return f"{', '.join(words)}: " if words else ""
-
-
-def _check_names(kind: str, names: Mapping[str, int]) -> None:
-    for name in names:
-        if not _NAME.fullmatch(name):
-            raise _wrong(
-                f"{kind}: {shown(name)} is no name", "letters, digits, space, - and _; not none, all, input 1"
-            )
-    if len(set(names.values())) < len(names):
-        raise _wrong(f"{kind}: two names for one number", "one name for each")
-
-
 def _motor(table: MotorTable) -> tuple[Project, Fraction | None]:
     lead = None
     if table.lead:
         lead = table.lead.number * _LENGTH.get(table.lead.unit, Fraction(0))
         if lead <= 0:
             raise _wrong(f"motor, lead: {shown(table.lead.text)} is no length", "a length as 5 mm")
-    if (table.step_angle is None) is (table.full_steps is None):
-        raise _wrong("motor: step_angle or full_steps is needed, one of them", 'step_angle = "1.8 deg"')
     if (table.turn_distance is None) is (table.unit is None):
         raise _wrong(
             "motor: turn_distance or unit is needed, one of them", 'unit = "pulse", "turn" or "0.01 deg"'
         )
-    angle = table.step_angle or _full_step(table.full_steps or 0)
     base = Project(
         microsteps=table.microsteps,
-        step_angle=_whole(angle, {"deg": Fraction(100)}, "step_angle", "motor, step_angle"),
+        step_angle=_whole(table.step_angle, {"deg": Fraction(100)}, "step_angle", "motor, step_angle"),
         stop_mode=("slow", "immediate").index(table.stop),
         mode4=table.mode4,
         power_on_home=int(table.home_at_power_on),
     )
     turn = table.turn_distance or _turn_distance(table.unit or "", base, lead)
     return replace(base, turn_distance=turn), lead
-
-
-def _full_step(count: int) -> Quantity:
-    if count < 1 or 36000 % count or 36000 // count > PARAMETERS["step_angle"].high:
-        raise _wrong(
-            f"motor, full_steps: {shown(count)} is not possible",
-            "a divisor of 36000, at least 142; else a step_angle and microsteps with the same pulses per turn",
-        )
-    return Quantity(f"{36000 // count / 100} deg")
 
 
 def _turn_distance(unit: str, base: Project, lead: Fraction | None) -> int:
@@ -299,7 +269,7 @@ def _turn_distance(unit: str, base: Project, lead: Fraction | None) -> int:
     turns = _distances(replace(base, turn_distance=1), lead)  # of one unit, in turns
     each = turns.get(size.unit, Fraction(0)) * size.number
     if size.unit == "units" or each <= 0:
-        raise _wrong(f"motor, unit: {shown(unit)} is no unit of distance", _one_of(turns, lead))
+        raise _wrong(f"motor, unit: {shown(unit)} is no unit of distance", _one_of(turns))
     return _count(1 / each, "turn_distance", f"motor, unit: {shown(unit)}", "units per turn", Fraction(1))
 
 
@@ -324,14 +294,13 @@ def _speeds(project: Project, lead: Fraction | None) -> dict[str, Fraction]:
 def _step(entry: StepTable, number: int, file: ProgramFile, base: Project, lead: Fraction | None) -> Step:
     where = f"step {number}, "
     distances, speeds = _distances(base, lead), _speeds(base, lead)
-    move = entry.move
-    distance = _whole(move, distances, "distance", f"{where}move", is_signed=True)
+    distance = _whole(entry.move, distances, "distance", f"{where}move", is_signed=True)
     if distance and entry.speed is None:
-        raise _wrong(f"{where}speed: it is missing, and the step moves", _one_of(speeds, lead))
+        raise _wrong(f"{where}speed: it is missing, and the step moves", _one_of(speeds))
     return Step(
         distance=distance,
-        direction=int(move.is_negative),
-        speed=_whole(entry.speed, speeds, "speed", f"{where}speed") if entry.speed else 0,
+        direction=int(entry.move is not None and entry.move.is_negative),
+        speed=_whole(entry.speed, speeds, "speed", f"{where}speed"),
         start_frequency=_whole(entry.start, _HERTZ, "start_frequency", f"{where}start"),
         acceleration=_whole(entry.acceleration, _HERTZ, "acceleration", f"{where}acceleration"),
         delay=_whole(entry.delay, _TIME, "delay", f"{where}delay"),
@@ -341,13 +310,15 @@ def _step(entry: StepTable, number: int, file: ProgramFile, base: Project, lead:
     )
 
 
-def _whole(said: Quantity, each: _Each, name: str, where: str, *, is_signed: bool = False) -> int:
-    """The raw value of a quantity; `each` are raw counts in one of each unit."""
+def _whole(said: Quantity | None, each: _Each, name: str, where: str, *, is_signed: bool = False) -> int:
+    """The raw value of a quantity, 0 for None; `each` are raw counts in one of each unit."""
+    if said is None:
+        return 0
     where = f"{where}: {shown(said.text)}"
     if said.unit not in each:
-        raise _wrong(f"{where} has no unit that is possible here", _one_of(each, None))
+        raise _wrong(f"{where} has no unit that is possible here", _one_of(each))
     if said.is_negative and not is_signed:
-        raise _wrong(f"{where} is negative", _one_of(each, None))
+        raise _wrong(f"{where} is negative", _one_of(each))
     return _count(abs(said.number) * each[said.unit], name, where, said.unit, each[said.unit])
 
 
@@ -359,14 +330,14 @@ def _count(raw: Fraction, name: str, where: str, unit: str, each: Fraction) -> i
     if raw.denominator != 1:
         below, above = (f"{float(near / each):.10g}" for near in (floor(raw), ceil(raw)))
         raise _wrong(
-            f"{where} is {float(raw):.6g}, and the controller counts whole numbers",
+            f"{where} is {float(raw):.12g}, and the controller counts whole numbers",
             f"{below} or {above} {unit}",
         )
     return int(raw)
 
 
 def _input(said: int | str, file: ProgramFile, where: str) -> int:
-    words = {"none": 0} | {f"input {number}": number for number in range(1, INPUTS + 1)} | file.inputs
+    words = file.inputs | {"none": 0} | {f"input {number}": number for number in range(1, INPUTS + 1)}
     number = said if isinstance(said, int) else words.get(said.strip(), -1)
     try:
         check_value("start_input", number, expert=file.expert)
@@ -381,17 +352,17 @@ def _input(said: int | str, file: ProgramFile, where: str) -> int:
 def _output(said: str, names: Mapping[str, int], where: str) -> int:
     words = {text: action for action, text in PARAMETERS["output"].choices.items()}
     for name, number in names.items():
-        words |= {f"{name} {level}": words[f"output {number} {level}"] for level in ("on", "off")}
+        for level in ("on", "off"):
+            words.setdefault(f"{name} {level}", words[f"output {number} {level}"])
     action = words.get(said.strip())
     if action is None:
         raise _wrong(f"{where}: {shown(said)} is not possible", f"one of {', '.join(words)}")
     return action
 
 
-def _one_of(each: _Each, lead: Fraction | None) -> str:
-    return f"a number with one of {', '.join(each)}" + (
-        "" if lead or "turns" not in each else "; mm needs a lead"
-    )
+def _one_of(each: _Each) -> str:
+    needs_lead = "turns" in each and "mm" not in each
+    return f"a number with one of {', '.join(each)}" + "; mm needs a lead" * needs_lead
 
 
 def _wrong(what: str, expected: str) -> RequestError:

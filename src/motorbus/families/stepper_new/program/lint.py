@@ -12,7 +12,6 @@ from motorbus.families.stepper_new.parameters import (
     HOME_INPUT,
     PARAMETERS,
     STEP_INPUTS,
-    STEP_NAMES,
     Project,
     Step,
     outputs_after_step,
@@ -45,7 +44,6 @@ RULES: Final[dict[str, tuple[Level, str]]] = {
 """Level and reason of each rule; numbers that are missing were rules of earlier versions."""
 LONG_PAUSE: Final = 3_600_000  # ms
 LONG_PAUSES: Final = 8 * 3_600_000  # ms, of a run, or of one pass of an endless project
-_OF_MANUAL: Final = ("distance", "direction", "start_frequency", "acceleration", "speed")
 _Found: TypeAlias = Iterator[tuple[str, str]]
 
 
@@ -71,16 +69,13 @@ def lint(
     highest: float = 100_000.0,
     homing: bool = False,
     unattended: bool = False,
-    before: Project | None = None,
 ) -> list[Finding]:
     """All findings: those of the project first, then by step.
 
     `highest` is the frequency (Hz) that the motor driver follows, `homing` that input 5 is used for homing,
-    `unattended` that no operator can press a button, `before` the present project 1.
+    `unattended` that no operator can press a button.
     """
     found = [Finding(rule, 0, text) for rule, text in _of_project(project)]
-    if project.number == 1 and (text := _manual_motion(project, before)):
-        found.append(Finding("L16", 1, text))
     homing = homing or bool(project.power_on_home)
     for number in numbers(project):
         step = project.step(number)
@@ -112,6 +107,12 @@ def _of_project(project: Project) -> _Found:
         outputs = outputs_after_step(outputs, step.output)
     if outputs:
         yield "L15", f"output {', '.join(str(n) for n in (1, 2, 3) if outputs >> n - 1 & 1)}"
+    if project.number == 1:
+        step = project.step(1)
+        yield (
+            "L16",
+            f"from now on at {step.speed} rpm, from {step.start_frequency} Hz by {step.acceleration} Hz",
+        )
     if project.power_on_home:
         yield "L17", "in reverse until input 5, without a limit of travel or time"
     pauses = sum(project.step(n).delay * sequence.times(project, n) for n in numbers(project)) * (passes or 1)
@@ -119,18 +120,6 @@ def _of_project(project: Project) -> _Found:
         yield "L19", f"{pauses / 1000:g} s of pauses in all"
     if project.mode4:
         yield "L21", f"mode 4 is {project.mode4}"
-
-
-def _manual_motion(project: Project, before: Project | None) -> str:
-    """What changes for manual motion; "" if nothing does."""
-    step = project.step(1)
-    if before is None:
-        return f"{step.speed} rpm, from {step.start_frequency} Hz by {step.acceleration} Hz"
-    old = before.step(1)
-    changes = [(name, getattr(old, name), getattr(step, name)) for name in STEP_NAMES if name in _OF_MANUAL]
-    motor = ("microsteps", "step_angle", "turn_distance")
-    changes += [(name, getattr(before, name), getattr(project, name)) for name in motor]
-    return ", ".join(f"{name} {one} becomes {other}" for name, one, other in changes if one != other)
 
 
 def _motion(project: Project, step: Step, number: int, highest: float) -> _Found:
