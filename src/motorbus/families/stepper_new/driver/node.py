@@ -1,0 +1,79 @@
+"""The controller of a line, and what its driver remembers. It reports neither state nor position."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Final
+
+from motorbus.core.register import Register, RegisterMap, Value, shown
+from motorbus.errors import RequestError
+from motorbus.families.stepper_new.parameters import LEDS, OUTPUTS, TABLE, Order, Project, checked_order
+from motorbus.families.stepper_new.protocol import MOTOR, ONLY, checked_motor
+
+
+class BusState:
+    """What was read from and sent to the controller of one open bus. Other hosts, buttons and power cycles change it.
+
+    `projects`        as they were read last; forgotten at an own write, a missing reply and a reconnect
+    `unsaved`         the project that was edited last and not saved; None: none
+    `stops_asked`     number of calls of `stop`
+    `stops_accepted`  number of stops that the controller acknowledged
+    `stopping`        number of stops that are being sent
+    `may_run`         a project was started; since then neither its notice came nor a stop was acknowledged
+    `busy_until`      time (s, link clock) until which a move may last that was not waited for
+    `outputs`         the level last sent, by output 1 to 3 and 5 for the LEDs; None: unknown
+    """
+
+    def __init__(self) -> None:
+        self.projects: dict[int, Project] = {}
+        self.unsaved: Project | None = None
+        self.stops_asked = 0
+        self.stops_accepted = 0
+        self.stopping = 0
+        self.may_run = False
+        self.busy_until = -inf
+        self.outputs: dict[int, bool | None] = dict.fromkeys((*range(1, OUTPUTS + 1), LEDS))
+
+
+class Node:
+    """The one controller of a line, id 1; its frames carry no address. Raises RequestError for another id.
+
+    `motor` is the number in motor commands, `order` the byte order in dumps, `state` that of the open bus.
+    """
+
+    def __init__(
+        self,
+        node: int = ONLY,
+        motor: int = MOTOR,
+        order: Order = "little",
+        state: BusState | None = None,
+    ) -> None:
+        self.node: Final = checked_id(node)
+        self.motor: Final = checked_motor(motor)
+        self.order: Final[Order] = checked_order(order)
+        self.state: Final = BusState() if state is None else state
+
+    @property
+    def alarm(self) -> tuple[str, ...]:
+        """Always empty: the protocol reports no errors."""
+        return ()
+
+    @property
+    def table(self) -> RegisterMap:
+        """The parameters of one project."""
+        return TABLE
+
+    def raw(self, row: Register, value: Value) -> int:
+        """Value in the unit of the row -> raw value. Raises RequestError if it is not a finite number."""
+        return row.to_raw(value)
+
+
+def checked_id(node: int) -> int:
+    """The id of the only controller. Raises RequestError for another one."""
+    if isinstance(node, int) and not isinstance(node, bool) and node == ONLY:
+        return node
+    raise RequestError(
+        f"{shown(node)} is not the id of a stepper controller",
+        expected=f"{ONLY}: a line has one controller, whose frames carry no address",
+        advice="open a line for each controller; nothing was sent",
+    )

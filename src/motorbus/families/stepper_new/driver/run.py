@@ -1,0 +1,368 @@
+"""Start a stored project, and wait for its end.
+
+The controller acknowledges a start and sends EE DD at the end, two bytes without checksum and number. So a notice
+counts only after the acknowledgement, not before the project can have ended in any reading, and if no stop was sent
+since. An end of the wait stops nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from enum import Enum
+from math import inf, nan, tau
+from typing import Final, NamedTuple
+
+from motorbus.core.request import Notification, Request, Response
+from motorbus.core.setpoint import Setpoint
+from motorbus.core.steps import (
+    ASKED,
+    INTENT,
+    READABLE,
+    Emit,
+    Exclusive,
+    JournalEntry,
+    Sleep,
+    WaitFor,
+    catch,
+    gather,
+    with_cleanup,
+)
+from motorbus.errors import (
+    Interrupted,
+    MotorbusError,
+    NoReply,
+    OutcomeUnknown,
+    Refused,
+    RequestError,
+    WireError,
+)
+from motorbus.families.stepper_new.driver.io import Levels, check_seconds, checked_ports, inputs, read_input
+from motorbus.families.stepper_new.driver.node import Node
+from motorbus.families.stepper_new.driver.projects import read_project
+from motorbus.families.stepper_new.driver.requests import command, ignore
+from motorbus.families.stepper_new.driver.stop import RUN, Watch, check_idle, close_run, mark_unmoved
+from motorbus.families.stepper_new.execution.sequence import earliest_end
+from motorbus.families.stepper_new.parameters import OUTPUTS, STOP_INPUT, Project, check_value
+from motorbus.families.stepper_new.program.estimate import Estimate, estimate, reach
+from motorbus.families.stepper_new.program.file import Program
+from motorbus.families.stepper_new.protocol import COMPLETED, RATE
+
+LONGER: Final = 1.2  # share of the slowest reading that a project may take # assumption
+SPARE: Final = 2.0  # s that it may take besides # assumption
+CLOCK: Final = 0.98  # share of the shortest time before which a notice is false # assumption
+SETTLES: Final = 20 / RATE  # s by which the bus may take an acknowledgement later than the notice behind it
+REPORT: Final = 0.25  # s between two reports
+LOOK: Final = 0.02  # s between two rounds of inputs
+UNHEARD: Final = (OutcomeUnknown, NoReply, WireError)  # errors of a start that may have been received
+
+
+class Outcome(Enum):
+    """What is known at the end of the wait for a project."""
+
+    COMPLETED = "completed"  # its notice came
+    STOPPED = "stopped"  # a stop of this host was acknowledged, or input 4 read active
+    TIMEOUT = "timeout"  # no notice in time; it may still run
+    UNKNOWN = "unknown"  # the start was not acknowledged, or the notice may not be its own
+
+
+class Ran(NamedTuple):
+    """The result of a run: `seconds` from the acknowledgement to the notice (None unless completed), the time that was
+    `predicted`, and `why` the outcome is what it is."""
+
+    outcome: Outcome
+    seconds: float | None
+    predicted: Estimate
+    why: str
+
+
+class Estimated(NamedTuple):
+    """An event: a project runs since `seconds` and has done this `fraction` of its estimated time.
+
+    None for a project without end, or one that waits for inputs.
+    """
+
+    seconds: float
+    fraction: float | None
+
+
+async def start_project(node: Node, project: int, *, endless: bool = False, expert: bool = False) -> Estimate:
+    """Start project 1 to 4 (item 13) without waiting; return its estimated time.
+
+    Returns at the acknowledgement; a busy controller may acknowledge and ignore it. Raises RequestError, with nothing
+    started, for a project without steps, with errors of lint (unless `expert`), without an end (unless `endless`), and
+    while something may turn or a change is unfinished; Interrupted if a stop came before it left; OutcomeUnknown
+    without an acknowledgement; else as `dump`.
+    """
+    watch = Watch(node)
+
+    async def check_and_start() -> Estimate:
+        program = await _checked_program(node, project, endless, expert)
+        await _start(watch, program.project)
+        return estimate(program.project)
+
+    return await mark_unmoved(watch, Exclusive(check_and_start()))
+
+
+async def run(
+    node: Node,
+    project: int,
+    *,
+    timeout: float | None = None,
+    watch: Iterable[int] = (),
+    endless: bool = False,
+    expert: bool = False,
+) -> Ran:
+    """Start project 1 to 4 and wait for its end: `completed`, `stopped`, `timeout` or `unknown`, see `Outcome`.
+
+    It waits `timeout` s, else 1.2 times the slowest estimate and 2 s, and without limit for a project that waits for
+    inputs. `watch` are inputs, 1 to 5, that are read meanwhile. Reports `Estimated`, and `InputChanged`. A project that
+    may still run refuses the next motion until `stop`; the journal records it.
+
+    `endless` needs a `timeout`. An interrupted wait leaves the project running. An emergency stop raises Interrupted.
+    Raises as `start_project`.
+    """
+    if timeout is not None:
+        check_seconds("timeout", timeout)
+    elif endless:
+        raise RequestError(
+            "a project without end is not waited for",
+            expected="a timeout, or start_project()",
+            advice="nothing was sent",
+        )
+    guard = Watch(node)
+    course = Course(guard, timeout)
+    ports = checked_ports(watch) if tuple(watch) else ()
+
+    async def close() -> None:
+        if course.ran is not None and not node.state.may_run:
+            await close_run(node, course.ran.outcome.value)
+
+    async def begin() -> Levels:
+        program = await _checked_program(node, project, endless, expert)
+        levels = Levels(await inputs(node, ports) if ports else {})
+        course.expect(program.project, await Sleep(0))
+        error = await catch(_start(guard, program.project))
+        if isinstance(error, MotorbusError) and not isinstance(error, UNHEARD):
+            raise error
+        course.begin(error)
+        return levels
+
+    async def follow() -> None:
+        try:
+            await _follow(course, await Exclusive(begin()))
+        finally:
+            course.is_over = True
+
+    await mark_unmoved(guard, with_cleanup(gather(follow(), _listen(course)), close))
+    assert course.ran is not None
+    return course.ran
+
+
+# -- start -------------------------------------------------------------------------------------------------------------
+
+
+async def _checked_program(node: Node, number: int, endless: bool, expert: bool) -> Program:
+    check_value("project", number)
+    await check_idle(node, f"start of project {number}")
+    await Emit(JournalEntry(RUN, ASKED, {"node": node.node}))
+    program = await read_project(node, number)
+    project = program.project
+    errors = [str(one) for one in program.lint() if one.level == "error"]
+    refusal = ""
+    if project.is_cleared:
+        refusal, advice = "has no steps", "write it first"
+    elif errors and not expert:
+        refusal, advice = f"has errors: {'; '.join(errors)}", "correct it, or say expert=True"
+    elif earliest_end(project) is None and not endless:
+        refusal, advice = "has no end", "say endless=True; only a stop ends it"
+    if refusal:
+        raise RequestError(
+            f"project {number} {refusal}", advice=f"{advice}; nothing was started", node=node.node
+        )
+    return program
+
+
+async def _start(watch: Watch, project: Project) -> float:
+    """Start a project; return when it was acknowledged (s)."""
+    node, number = watch.node, project.number
+    facts = {
+        "node": node.node,
+        "project": number,
+        "what": f"the run of project {number}",
+        "cause": "it was started, and neither its notice nor a stop was acknowledged since",
+        "advice": "`motorbus stop {bus}` ends it",
+        READABLE: True,
+    }
+    await Emit(JournalEntry(RUN, INTENT, facts))
+    node.state.may_run = True
+    node.state.outputs.update(dict.fromkeys(range(1, OUTPUTS + 1)))
+    request = command(
+        node,
+        "start_project",
+        ignore,
+        setpoints=setpoints(node, project),
+        precondition=watch.precondition,
+        project=number,
+    )
+    try:
+        return await _with_time(request)
+    except (Refused, RequestError, Interrupted) as error:
+        if not (watch.ordered and isinstance(error, Interrupted)):
+            await close_run(node, "not started")
+        raise
+
+
+def _with_time(request: Request[None]) -> Request[float]:
+    """The same request; its value is the time of its reply (s)."""
+    decode = request.decode
+    assert decode is not None
+
+    def at(answer: Response) -> float:
+        decode(answer)
+        return answer.at
+
+    return request.with_decoder(at)
+
+
+def setpoints(node: Node, project: Project) -> tuple[Setpoint, ...]:
+    """What a start asks, for the gate: the farthest positions in rad from here, the highest speed in rad/s.
+
+    A project without end is a velocity as well.
+    """
+    fastest = max((step.speed for step in project.used), default=0) * tau / 60
+    low, high = reach(project)
+    unit = tau / project.turn_distance if project.turn_distance else nan
+    ways = [unit * far for far in (high, low) if far] or [0.0]
+    found = [Setpoint(node.node, "relative", way, -inf, inf) for way in ways]
+    if earliest_end(project) is None:
+        found.append(Setpoint(node.node, "velocity", fastest, -inf, inf))
+    return (*found, Setpoint(node.node, "speed", fastest, -inf, inf))
+
+
+# -- wait --------------------------------------------------------------------------------------------------------------
+
+
+class Course:
+    """One run: takes its acknowledgement, notices and time, and decides the outcome. Times in s, link clock."""
+
+    def __init__(self, watch: Watch, timeout: float | None) -> None:
+        self.watch: Final = watch
+        self.state: Final = watch.node.state
+        self.timeout = timeout
+        self.ran: Ran | None = None
+        self.is_over = False
+        self.begun: float | None = None  # when it was acknowledged; when it was sent if that is lost
+        self.button = False  # input 4 read active
+        self._lost: MotorbusError | None = None
+        self._notices: list[tuple[float, bool]] = []
+
+    def expect(self, project: Project, at: float) -> None:
+        """The project is about to be started."""
+        self.predicted = estimate(project)
+        earliest = earliest_end(project)
+        self._least = inf if earliest is None else earliest * CLOCK
+        self._sent = at
+        self._accepted = self.state.stops_accepted
+
+    def begin(self, start: float | MotorbusError) -> None:
+        """It was acknowledged at this time, or not."""
+        if isinstance(start, MotorbusError):
+            self._lost, self.begun = start, self._sent
+        else:
+            self.begun = start
+
+    @property
+    def deadline(self) -> float:
+        """Until when its notice is waited for (s)."""
+        assert self.begun is not None
+        if self.timeout is not None:
+            return self.begun + self.timeout
+        waits = bool(self.predicted.waits) and self._lost is None
+        return inf if waits else self.begun + self.predicted.high * LONGER + SPARE
+
+    def take(self, notice: Notification) -> bool:
+        """Take a notice; True if the outcome is known."""
+        if notice.kind == COMPLETED:
+            self._notices.append((notice.at, self.watch.is_stopped or self.state.stopping > 0))
+            self.decide(notice.at)
+        return self.ran is not None
+
+    def decide(self, now: float) -> None:
+        """Set `ran` if the outcome is known now. While a stop is being sent it is not."""
+        if self.ran is not None or self.begun is None or self.state.stopping:
+            return
+        own = [one for one in self._notices if self._may_be_own(one[0])]
+        if self.state.stops_accepted > self._accepted:
+            self._end(Outcome.STOPPED, "a stop of this host was acknowledged")
+        elif self.button:
+            self._end(Outcome.STOPPED, "input 4, which stops projects, was active")
+        elif own:
+            at, is_doubtful = own[0]
+            self.state.may_run = False
+            if is_doubtful:
+                self._end(Outcome.UNKNOWN, "its notice came after a stop that was not acknowledged")
+            else:
+                seconds = max(0.0, at - self.begun)
+                self._end(Outcome.COMPLETED, f"its notice came {seconds:.3f} s after the start", seconds)
+        elif now >= self.deadline:
+            self._end_late()
+
+    def _may_be_own(self, at: float) -> bool:
+        assert self.begun is not None
+        return at > self.begun - SETTLES and at - self._sent >= self._least
+
+    def _end_late(self) -> None:
+        if self._lost is not None:
+            self._end(
+                Outcome.UNKNOWN, f"no acknowledgement ({self._lost.summary}) and no notice came; it may run"
+            )
+        elif self._notices:
+            first = self._notices[0][0] - self._sent
+            self._end(
+                Outcome.UNKNOWN, f"a notice came after {first:.3f} s, which is too early; it may still run"
+            )
+        else:
+            self._end(Outcome.TIMEOUT, "no notice came in time; it may still run")
+
+    def _end(self, outcome: Outcome, why: str, seconds: float | None = None) -> None:
+        self.ran = Ran(outcome, seconds, self.predicted, why)
+
+
+async def _listen(course: Course) -> None:
+    """Listen without a pause, also while inputs are read."""
+    while course.ran is None and not course.is_over:
+        await WaitFor(course.take, LOOK)
+
+
+async def _follow(course: Course, levels: Levels) -> None:
+    """Report, read the watched inputs, and decide, until the outcome is known."""
+    reported = -inf
+    course.decide(await Sleep(0))
+    while course.ran is None:
+        now = await Sleep(0)
+        if now - reported >= REPORT:
+            reported = now
+            await Emit(_estimated(course, now))
+        for port in levels.settled:
+            await _read_watched(course, levels, port)
+        pause = LOOK if levels.settled or now >= course.deadline else min(REPORT, course.deadline - now)
+        await WaitFor(course.take, pause)
+        course.decide(await Sleep(0))
+
+
+def _estimated(course: Course, now: float) -> Estimated:
+    assert course.begun is not None
+    seconds, predicted = now - course.begun, course.predicted
+    is_timed = not (predicted.waits or predicted.endless) and 0 < predicted.seconds < inf
+    return Estimated(seconds, min(1.0, seconds / predicted.seconds) if is_timed else None)
+
+
+async def _read_watched(course: Course, levels: Levels, port: int) -> None:
+    active = await catch(read_input(course.watch.node, port))
+    if isinstance(active, NoReply | WireError):
+        return
+    if isinstance(active, MotorbusError):
+        raise active
+    if change := levels.take(port, active, await Sleep(0)):
+        course.button = course.button or (port == STOP_INPUT and change.active)
+        await Emit(change)

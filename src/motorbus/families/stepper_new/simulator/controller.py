@@ -1,0 +1,247 @@
+"""One simulated controller: what it does with a command, and what a test does to it.
+
+It has no clock: the moment (s) is an argument, or that of the bus.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from math import inf
+from typing import Final, NamedTuple
+
+from motorbus.core.family import Remark
+from motorbus.core.request import TimeoutClass
+from motorbus.core.simulated import PoweredDevice
+from motorbus.errors import RequestError
+from motorbus.families.stepper_new.execution.machine import Machine, Phase
+from motorbus.families.stepper_new.parameters import HOME_INPUT, INPUTS, Order, Project, check_value
+from motorbus.families.stepper_new.protocol import MOTOR, Command, decode_request, encode_reply
+from motorbus.families.stepper_new.simulator.memory import Memory
+from motorbus.families.stepper_new.simulator.quirks import Quirks
+
+STORE_TIME: Final = 0.03  # s that a save or a clear takes before its reply # assumption
+LOG: Final = 1000  # remarks that are kept
+
+
+class Storing(NamedTuple):
+    """A save or a clear: this project is stored as `number` from `begun` to `end` (s)."""
+
+    number: int
+    project: Project
+    begun: float
+    end: float
+
+
+class Controller(PoweredDevice):
+    """A simulated controller. `store` is its memory, `machine` what it does, `log` what it does not report to a host.
+
+    `position` counts from power-on or homing; `offset` is the place of its zero (pulses).
+    """
+
+    def __init__(self, quirks: Quirks, motor: int, order: Order) -> None:
+        self.quirks: Final = quirks
+        self.motor: Final = motor
+        self.store: Final = Memory(quirks, order)
+        self.machine: Final = Machine(tick_ms=quirks.ramp_tick_ms)
+        self.log: list[Remark] = []
+        self.now = 0.0
+        self.offset = 0
+        self.notices: list[float] = []
+        self.on_power_off: Callable[[], object] = list  # set by the bus
+        self._storing: Storing | None = None
+        self._remarks = 0
+        self._crossing: tuple[object, bool, float] = (None, False, inf)
+        self.power_on()
+
+    # -- for tests and the control socket ----------------------------------------------------------------------------
+
+    @property
+    def memory(self) -> Mapping[str, int]:
+        """The raw value of each row of the project that is edited."""
+        return self.store.values
+
+    @property
+    def position(self) -> int:
+        """In pulses, forward positive; no host can read it."""
+        return self.machine.position(self.now)
+
+    def set_input(self, port: int, active: bool) -> None:
+        """Set input 1 to 5; a home switch that is not free has input 5. Raises RequestError for another port."""
+        if port not in range(1, INPUTS + 1):
+            raise RequestError(f"there is no input {port}", expected=f"1 to {INPUTS}")
+        if port != HOME_INPUT or self.quirks.home_switch == "free":
+            self._set_input(port, active, self.now)
+
+    def put(self, number: int, project: Project) -> None:
+        """Store a project as if it had been written and saved."""
+        check_value("project", number)
+        self.store.put(number, replace(project, number=number))
+
+    def notice(self) -> None:
+        """Send a notice without a cause."""
+        self.notices.append(self.now)
+
+    def midway(self) -> float:
+        """When half of a save or a clear is done (s); inf if none runs."""
+        return inf if self._storing is None else (self._storing.begun + self._storing.end) / 2
+
+    def power_off(self) -> None:
+        """Motion, outputs, edits and a save that runs are lost."""
+        if self._storing is not None and self.quirks.save_cut == "empty":
+            self.store.stored[self._storing.number] = Project()
+        self._storing = None
+        self.machine.power_off(self.now)
+        self._collect()
+        self.notices.clear()
+        self.on_power_off()
+
+    def power_on(self) -> None:
+        """At rest, or homing."""
+        self.store.power_on()
+        first = self.store.project(1)
+        wired = {"wired": self._is_closed(self.now), "stuck": True, "never": False}
+        if self.quirks.home_switch in wired:
+            rest = self.machine.inputs - {HOME_INPUT}
+            self.machine.inputs = rest | {HOME_INPUT} if wired[self.quirks.home_switch] else rest
+        self.machine.power_on(self.now, home_with=first if first.power_on_home else None)
+        self._collect()
+
+    def status(self) -> dict[str, object]:
+        """Its state; position in pulses."""
+        machine, run = self.machine, self.machine.run
+        return {
+            "powered": self.plugged,
+            "phase": machine.phase.value,
+            "position": self.position,
+            "frequency": machine.frequency(self.now),
+            "homed": machine.is_homed,
+            "project": run.project.number if run else None,
+            "step": run.place.step if run else None,
+            "pass": run.round if run else None,
+            "outputs": [bool(machine.outputs >> bit & 1) for bit in range(3)],
+            "leds": machine.leds,
+            "inputs": sorted(machine.inputs),
+            "selected": self.store.selected,
+            "saving": self._storing.number if self._storing else None,
+        }
+
+    # -- time --------------------------------------------------------------------------------------------------------
+
+    def due(self) -> float:
+        """The next moment (s) at which something happens by itself; inf if none."""
+        stored = inf if self._storing is None else self._storing.end
+        return min(stored, self.machine.until, self._home_crossing())
+
+    def advance(self, to: float) -> None:
+        """Let time pass until this moment (s)."""
+        while (moment := self.due()) <= to:
+            self.now = max(self.now, moment)
+            if self._storing is not None and self._storing.end <= moment:
+                self.store.put(self._storing.number, self._storing.project)
+                self._storing = None
+            elif self._home_crossing() <= moment:
+                self._set_input(HOME_INPUT, HOME_INPUT not in self.machine.inputs, moment)
+            self.machine.advance(moment)
+            self._collect()
+        self.now = max(self.now, to)
+        self.machine.advance(self.now)
+
+    def _collect(self) -> None:
+        self.notices += [one.at for one in self.machine.events if one.kind == "completed"]
+        self.machine.events.clear()
+
+    # -- the home switch ---------------------------------------------------------------------------------------------
+
+    def _is_closed(self, at: float) -> bool:
+        return self.machine.position(at) + self.offset <= self.quirks.home_at
+
+    def _home_crossing(self) -> float:
+        """When the motion meets or leaves a wired home switch (s)."""
+        motion, is_closed = self.machine.motion, HOME_INPUT in self.machine.inputs
+        if self.quirks.home_switch != "wired" or motion is None or (motion.sign > 0) is not is_closed:
+            return inf
+        if self._crossing[0] is not motion or self._crossing[1] is not is_closed:
+            start = self.machine.base + self.offset
+            away = self.quirks.home_at + 1 - start if is_closed else start - self.quirks.home_at
+            self._crossing = motion, is_closed, self.machine.since + motion.moment(away)
+        return self._crossing[2]
+
+    def _set_input(self, port: int, active: bool, at: float) -> None:
+        self.machine.advance(at)
+        place = self.machine.position(at)
+        is_homing = self.machine.phase is Phase.HOMING
+        start = self.store.project(self.store.selected)  # assumption: input 3 starts the selected project
+        self.machine.set_input(port, active, at, start=start if self.plugged else None)
+        if is_homing and self.machine.phase is not Phase.HOMING and port == HOME_INPUT:
+            self.offset += place
+        self._collect()
+
+    # -- requests ----------------------------------------------------------------------------------------------------
+
+    def reply(self, request: bytes, at: float) -> tuple[bytes, float]:
+        """Carry out a request with a correct checksum; the reply, and when it is ready (s). No reply: b""."""
+        self.advance(at)
+        ready = at + self.quirks.turnaround
+        found = decode_request(request)
+        refusal = self._refusal(request, found)
+        if found is None or refusal:
+            self._remark(refusal)
+            return b"", ready
+        command, values = found
+        number = values.get("project", 0)
+        if command.reply_within is TimeoutClass.STORE:
+            begun, ready = ready, ready + STORE_TIME
+            saved = (
+                replace(self.store.working, number=number) if command.name == "save_project" else Project()
+            )
+            self._storing = Storing(number, saved, begun, ready)
+        elif command.is_edit:
+            self._edit(command, values)
+        else:
+            self._act(command, values, at)
+        self._collect()
+        image = self.store.image(number) if command.name == "read_project" else b""
+        level = int(values.get("port") in self.machine.inputs)
+        return encode_reply(request, selected=self.store.selected, level=level, image=image), ready
+
+    def _refusal(self, request: bytes, found: tuple[Command, dict[str, int]] | None) -> str:
+        """Why it stays silent; "" if it does not. That it is silent is an assumption."""
+        if found is None:
+            return f"unknown command {request[2]:02X} {request[3]:02X}"
+        command, values = found
+        if command.code[0] == MOTOR and request[2] != self.motor:
+            return f"motor {request[2]} is another one"
+        try:
+            for name, raw in values.items():
+                check_value(name, raw, expert=True)
+        except RequestError as error:
+            return f"{command.name}: {error.summary}"
+        return ""
+
+    def _edit(self, command: Command, values: Mapping[str, int]) -> None:
+        run = self.machine.run
+        if run is not None:
+            self._remark(f"{command.name} while project {run.project.number} runs, which is not changed")
+        self.store.edit(command.name, values)
+        if command.name == "set_stop_mode" and (run is None or run.project.number == self.store.selected):
+            self.machine.stop_mode = values["stop_mode"]
+
+    def _act(self, command: Command, values: Mapping[str, int], at: float) -> None:
+        machine, manual = self.machine, self.store.project(1)
+        actions: dict[str, Callable[[], bool | None]] = {
+            "start_project": lambda: machine.start(self.store.project(values["project"]), at),
+            "jog_forward": lambda: machine.jog(manual, 1, at),
+            "jog_reverse": lambda: machine.jog(manual, -1, at),
+            "run_once": lambda: machine.run_once(manual, at),
+            "home": lambda: machine.home(manual, at),
+            "stop_project": lambda: machine.stop_project(at),
+            "stop_motor": lambda: machine.stop_motor(at),
+            "set_output": lambda: machine.set_output(values["port"], values["level"], at),
+        }
+        if command.name in actions and actions[command.name]() is False:
+            self._remark(f"{command.name} is ignored while it is {machine.phase.value}")
+
+    def _remark(self, text: str) -> None:
+        self._remarks += 1
+        self.log = [*self.log[1 - LOG :], Remark(self._remarks, self.now, text)]
