@@ -386,7 +386,6 @@ def check_value(name: str, raw: object, *, step: int = 0, expert: bool = False) 
         f"{f'step {step}, ' if step else ''}{name}: {shown(raw)} is not possible",
         expected=allowed(name, expert=expert),
         cause="inputs 3 and 4 start and stop projects" if taken else "",
-        advice="nothing was sent",
     )
 
 

@@ -191,7 +191,6 @@ def encode(name: str, /, *, motor: int = MOTOR, **values: int) -> bytes:
             raise RequestError(
                 f"{name}: {field} {values[field]} does not fit its bytes",
                 expected=f"0 to {(1 << 8 * size) - 1}",
-                advice="nothing was sent",
             )
         body[at : at + size] = values[field].to_bytes(size, "little")
     return bytes(body) + bytes((sum(body) & 0xFF,))
@@ -210,7 +209,6 @@ def check(name: str, values: Mapping[str, int], *, expert: bool = False) -> None
         raise RequestError(
             f"loop_first, loop_last: {first} to {last} is no range",
             expected="the first step, then the last, or 0 for both",
-            advice="nothing was sent",
         )
 
 

@@ -116,5 +116,5 @@ def _wrong(what: str) -> RequestError:
     return RequestError(
         f"this backup cannot be used: {what}",
         expected="a file of `motorbus stepper read --all`",
-        advice="take another copy of it; nothing was sent",
+        advice="take another copy of it",
     )

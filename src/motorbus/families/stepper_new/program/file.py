@@ -366,7 +366,7 @@ def _one_of(each: _Each) -> str:
 
 
 def _wrong(what: str, expected: str) -> RequestError:
-    return RequestError(what, expected=expected, advice="correct the file; nothing was sent")
+    return RequestError(what, expected=expected, advice="correct the file")
 
 
 # -- writing ---------------------------------------------------------------------------------------------------------
