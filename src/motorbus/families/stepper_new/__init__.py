@@ -1,0 +1,67 @@
+"""A programmable controller for one stepper motor: 27 commands, four stored projects of up to ten steps.
+
+It replies with an acknowledgement, a dump of a project or the level of one input, and sends one notice: the
+project that was started has ended. It reports neither position nor state nor errors, so positions and times
+are estimates by a model of the controller (`execution`).
+
+`Controller` and `AsyncController` are the controller; `Program` is a project as a file, `Backup` a copy of all
+projects. The other names are results and events of their methods.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from motorbus.core.family import DeviceTypes, Family, LinkSpec, Option
+from motorbus.families.stepper_new.driver.bus import StepperDriver
+from motorbus.families.stepper_new.driver.controller import AsyncController, Controller
+from motorbus.families.stepper_new.driver.io import InputChanged, Watched
+from motorbus.families.stepper_new.driver.manual import Homed, Moved
+from motorbus.families.stepper_new.driver.projects import Written
+from motorbus.families.stepper_new.driver.run import Estimated, Outcome, Ran
+from motorbus.families.stepper_new.driver.stop import Promise
+from motorbus.families.stepper_new.parameters import TABLES
+from motorbus.families.stepper_new.program.backup import Backup
+from motorbus.families.stepper_new.program.estimate import Estimate
+from motorbus.families.stepper_new.program.file import Program
+from motorbus.families.stepper_new.program.lint import Finding
+from motorbus.families.stepper_new.protocol import MOTOR, ONLY, RATE
+
+__all__ = [
+    "FAMILY",
+    "AsyncController",
+    "Backup",
+    "Controller",
+    "Estimate",
+    "Estimated",
+    "Finding",
+    "Homed",
+    "InputChanged",
+    "Moved",
+    "Outcome",
+    "Program",
+    "Promise",
+    "Ran",
+    "StepperDriver",
+    "Watched",
+    "Written",
+]
+
+_SETTINGS: Final = (
+    Option("motor", int, MOTOR, "number of the motor in its commands; the manual knows 3"),
+    Option(
+        "dump_order", str, "little", "byte of a number that is first in a dump: the lowest or the highest",
+        ("little", "big"), "the manual has the lowest first in requests and does not say it of the dump",
+    ),
+)  # fmt: skip
+
+FAMILY: Final = Family(
+    name="stepper",
+    link=LinkSpec("bytes", RATE, (RATE,), _SETTINGS, only=ONLY),
+    registers=TABLES,
+    devices=DeviceTypes(Controller, AsyncController),
+    driver=StepperDriver,
+    simulator_module="motorbus.families.stepper_new.simulator",
+    recording_module="motorbus.families.stepper_new.recording",
+    cli="motorbus.families.stepper_new.cli",
+)
