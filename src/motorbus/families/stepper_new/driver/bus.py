@@ -16,6 +16,7 @@ from motorbus.families.stepper_new import protocol
 from motorbus.families.stepper_new.driver import manual, run, stop
 from motorbus.families.stepper_new.driver.node import BusState, Node
 from motorbus.families.stepper_new.driver.projects import dump_once
+from motorbus.families.stepper_new.driver.requests import STOPS, command, ignore
 from motorbus.families.stepper_new.parameters import PROJECTS, checked_order
 
 MODEL: Final = "stepper controller"
@@ -86,8 +87,18 @@ class StepperDriver(HalfDuplexSerial):
 
     def stop(self, nodes: Mapping[int, Response | None]) -> Stop:
         """Both stop commands; without waiting for a reply if the controller has not replied yet."""
-        requests = stop.stop_requests(self.node(), acknowledged=bool(nodes))
-        return Stop(requests, stop.Promise.STOP_ACCEPTED.value)
+        requests = [command(self.node(), name, ignore) for name in STOPS]
+        frames = [
+            Request[Response](
+                one.wire,
+                one.expected if nodes else (),
+                priority=one.priority,
+                effect=one.effect,
+                repeatable=True,
+            )
+            for one in requests
+        ]
+        return Stop(tuple(frames), stop.Promise.STOP_ACCEPTED.value)
 
     def identify(self, node: int) -> Runnable[Identity]:
         return identify(self.node(node))

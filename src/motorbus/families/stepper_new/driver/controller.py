@@ -23,7 +23,6 @@ class ControllerMethods(Node):
     difference = device_method(projects.difference)
     write_project = device_method(projects.write_project)
     write = device_method(projects.write)
-    select = device_method(projects.select)
     save = device_method(projects.save)
     clear = device_method(projects.clear)
     backup = device_method(projects.backup)

@@ -15,16 +15,12 @@ from typing import Any, Final, TypeVar
 from motorbus.core.steps import INTENT, OUTCOME, REACHED, Emit, Exclusive, Guard, JournalEntry, Sleep, catch
 from motorbus.errors import LinkError, MotorbusError, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.stepper_new.driver.node import Node
-from motorbus.families.stepper_new.driver.projects import (
-    MANUAL,
-    bring,
-    cached,
-    check_free,
-    read_image,
-)
-from motorbus.families.stepper_new.driver.stop import MOTOR_FIRST, RUN, Watch, close_run, end_motion
+from motorbus.families.stepper_new.driver.projects import MANUAL, bring, cached, check_free, read_image
+from motorbus.families.stepper_new.driver.requests import STOPS
+from motorbus.families.stepper_new.driver.stop import RUN, Watch, close_run, end_motion, mark_unmoved
 from motorbus.families.stepper_new.execution.ramp import slowest_stop
 from motorbus.families.stepper_new.parameters import (
+    STEPS,
     Project,
     amended,
     check_project,
@@ -46,8 +42,8 @@ VERBS: Final = ("jog", "move_by", "home", "keep_time")
 class Loan(Guard):
     """Project 1 reads as `wanted` inside the block. At its end the motor is stopped and project 1 is as before.
 
-    `rests`: the motion has ended by itself. `keeps_moving`: it is not stopped at the end. `on_error` gets the error of
-    the block before the clean-up. `supply_lost`: project 1 was as before without being given back.
+    `on_error` gets the error of the block before the clean-up. `rests`: the motion has ended by itself. `supply_lost`:
+    project 1 was as before without being given back.
     """
 
     def __init__(
@@ -56,21 +52,20 @@ class Loan(Guard):
         verb: str,
         before: Project,
         wanted: Project,
-        on_error: Callable[[BaseException], None] | None = None,
+        on_error: Callable[[BaseException], None],
     ) -> None:
         self.node: Final = watch.node
         self.watch: Final = watch
         self.verb: Final = verb
         self.before: Final = before
         self.wanted: Final = wanted
-        self.on_error = on_error
-        self.lends = wanted != before
-        self.rests = self.keeps_moving = self.supply_lost = False
-        self._open = self._lent = False
+        self.on_error: Final = on_error
+        self.rests = self.supply_lost = self._is_open = self._is_lent = False
 
     async def enter(self) -> None:
-        if not self.lends:
+        if self.wanted == self.before:
             return
+        self._check()
         await self._begin()
         if not await bring(self.node, self.before, self.wanted):
             raise VerificationFailed(
@@ -80,7 +75,23 @@ class Loan(Guard):
                 node=self.node.node,
             )
         await self._note(LENT)
-        self._lent = True
+        self._is_lent = True
+
+    def _check(self) -> None:
+        """Raise RequestError if edits would be lost, or project 1 could not be given back."""
+        unsaved = self.node.state.unsaved
+        if unsaved is not None and unsaved.number != MANUAL:
+            raise RequestError(
+                f"{self.verb}() would lose the edits of project {unsaved.number} that are not saved",
+                advice=f"save({unsaved.number}) first; nothing was sent",
+                node=self.node.node,
+            )
+        for error in check_project(replace(self.before, total_steps=STEPS), expert=True):
+            raise RequestError(
+                f"project 1 could not be given back: {error.summary}",
+                advice="write a valid project 1; nothing was sent",
+                node=self.node.node,
+            )
 
     async def _begin(self) -> None:
         changed = differences(self.before, self.wanted)
@@ -92,26 +103,25 @@ class Loan(Guard):
             "lent": {name: new for name, (_, new) in changed.items()},
             "what": f"the loan of project 1 to {self.verb}()",
         }
-        self._open = True
+        self._is_open = True
         try:
             await Emit(JournalEntry(self.verb, INTENT, facts))
         except MotorbusError:
-            self._open = False
+            self._is_open = False
             raise
 
     async def leave(self, error: BaseException | None) -> None:
-        if error is not None and self.on_error is not None:
+        if error is not None:
             self.on_error(error)
-        if self.watch.ordered and not (self.keeps_moving and error is None):
-            await end_motion(self.node, MOTOR_FIRST)
+        if self.watch.ordered:
+            await end_motion(self.node, STOPS[::-1])
             if not self.rests:
                 await Sleep(slowest_stop(replace(self.wanted, total_steps=1)))
-        if self._open:
+        if self._is_open:
             await self._note(RETURNING)
-            found = await give_back(self.node, self.before, self.wanted, is_read=self._lent)
+            found = await give_back(self.node, self.before, self.wanted, is_read=self._is_lent)
             self.supply_lost = found and self.watch.ordered
             await self._note(OUTCOME, outcome="old")
-            self._open = False
 
     async def _note(self, state: str, **facts: object) -> None:
         await Emit(JournalEntry(self.verb, state, {"node": self.node.node, **facts}))
@@ -122,54 +132,52 @@ async def give_back(node: Node, before: Project, lent: Project, *, is_read: bool
 
     `is_read`: it was read as `lent`; else what reads as before may be what is stored, so the edits are undone unread.
     """
-    error: object = None
-    for attempt in range(TRIES):
-        shown = await catch(read_image(node, MANUAL))
-        if shown == before and is_read:
-            return attempt == 0
-        if isinstance(shown, Project):
-            error = await catch(bring(node, lent if shown == before else shown, before))
-            if not isinstance(error, MotorbusError):
-                return False
-        else:
-            error = shown
-        if isinstance(error, LinkError):
-            break
-    assert isinstance(error, MotorbusError)
-    error.add_note("project 1 may still be lent: recover() gives it back, and so does a power cycle")
-    raise error
+    tries = 0
+    while True:
+        error = await catch(_bring_back(node, before, lent, is_read))
+        if not isinstance(error, MotorbusError):
+            return error and not tries
+        tries += 1
+        if tries == TRIES or isinstance(error, LinkError):
+            error.add_note("project 1 may still be lent: recover() gives it back, and so does a power cycle")
+            raise error
+
+
+async def _bring_back(node: Node, before: Project, lent: Project, is_read: bool) -> bool:
+    shown = await read_image(node, MANUAL)
+    if shown == before and is_read:
+        return True
+    await bring(node, lent if shown == before else shown, before)
+    return False
 
 
 async def lend(
-    watch: Watch,
+    node: Node,
     verb: str,
-    change: Callable[[Project], Awaitable[Project]],
-    motion: Callable[[Project], Awaitable[T]],
+    change: Callable[[Project], Project],
+    motion: Callable[[Watch, Project], Awaitable[T]],
     *,
     ends: bool = True,
-    keeps_moving: bool = False,
-    on_error: Callable[[BaseException], None] | None = None,
+    on_error: Callable[[BaseException], None] = lambda error: None,
 ) -> T:
     """Make a manual motion with project 1 as `change` makes it, then stop, then give project 1 back.
 
     `ends`: the motion ends by itself; else the motor decelerates after the stop, which is waited for. Nothing is edited
-    where it is so already; with `keeps_moving` that is required, and the motion is not stopped.
-    Raises RequestError, with nothing sent that changes anything, while something may still turn, a change is
-    unfinished, another project has edits that are not saved, or project 1 could not be given back; VerificationFailed
-    if project 1 does not read as wanted; OutcomeUnknown if the controller lost its supply meanwhile or the stop is not
-    acknowledged; and what `motion` raises.
+    where project 1 is so already. An error is `unmoved` if the motion request did not leave; `on_error` gets it, before
+    project 1 is given back if it was lent, and once more at the end.
+
+    Raises RequestError, with nothing written, while a project may run or a change is unfinished, for unsaved edits of
+    another project, and if project 1 could not be given back; VerificationFailed if it does not read as wanted;
+    OutcomeUnknown if the controller lost its supply or the stop is not acknowledged; and what `motion` raises.
     """
-    node = watch.node
+    watch = Watch(node)
 
     async def work() -> T:
         await check_free(node, verb)
         before = await cached(node, MANUAL)
-        loan = Loan(watch, verb, before, await change(before), on_error)
-        loan.keeps_moving = keeps_moving
-        if loan.lends:
-            _check_loan(node, loan)
+        loan = Loan(watch, verb, before, change(before), on_error)
         async with loan:
-            value = await motion(loan.wanted)
+            value = await motion(watch, loan.wanted)
             loan.rests = ends
         if loan.supply_lost:
             raise OutcomeUnknown(
@@ -180,29 +188,19 @@ async def lend(
             )
         return value
 
-    return await Exclusive(work())
-
-
-def _check_loan(node: Node, loan: Loan) -> None:
-    unsaved = node.state.unsaved
-    refusal = ""
-    if loan.keeps_moving:
-        refusal, advice = "with wait=False needs what project 1 contains already", "wait for it"
-    elif unsaved is not None and unsaved.number != MANUAL:
-        refusal = f"would lose the edits of project {unsaved.number} that are not saved"
-        advice = f"save({unsaved.number}) first"
-    elif errors := check_project(replace(loan.before, total_steps=len(loan.before.steps)), expert=True):
-        refusal, advice = f"could not give project 1 back: {errors[0].summary}", "write a valid project 1"
-    if refusal:
-        raise RequestError(f"{loan.verb}() {refusal}", advice=f"{advice}; nothing was sent", node=node.node)
+    try:
+        return await mark_unmoved(watch, Exclusive(work()))
+    except BaseException as error:
+        on_error(error)
+        raise
 
 
 async def recover(node: Node, change: str, facts: Mapping[str, Any]) -> str:
     """Stop the motor and give project 1 back after a crash; `change` and `facts` are those of the journal.
 
-    Returns "old"; "stopped" for a project that may have run. May be called again. Raises
-    RequestError for facts of something else, for a bus with another motor or byte order, and if something else has
-    written project 1 since: then nothing is edited. Raises OutcomeUnknown if the stop is not acknowledged.
+    Returns "old"; "stopped" for a project that may have run. May be called again. Raises RequestError for facts of
+    something else, for a bus with another motor or byte order, and if something else has written project 1 since: then
+    nothing is edited. Raises OutcomeUnknown if the stop is not acknowledged.
     """
     if change == RUN:
         await end_motion(node)
@@ -213,7 +211,7 @@ async def recover(node: Node, change: str, facts: Mapping[str, Any]) -> str:
 
 
 async def _recover(node: Node, change: str, before: Project, lent: Project, reached: tuple[str, ...]) -> str:
-    await end_motion(node, MOTOR_FIRST)
+    await end_motion(node, STOPS[::-1])
     shown = await read_image(node, MANUAL)
     if LENT in reached and RETURNING not in reached:
         values, changed = values_of(shown), differences(before, lent)

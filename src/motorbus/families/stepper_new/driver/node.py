@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import inf
 from typing import Final
 
 from motorbus.core.register import Register, RegisterMap, Value, shown
@@ -20,7 +19,6 @@ class BusState:
     `stops_accepted`  number of stops that the controller acknowledged
     `stopping`        number of stops that are being sent
     `may_run`         a project was started; since then neither its notice came nor a stop was acknowledged
-    `busy_until`      time (s, link clock) until which a move may last that was not waited for
     `outputs`         the level last sent, by output 1 to 3 and 5 for the LEDs; None: unknown
     """
 
@@ -31,7 +29,6 @@ class BusState:
         self.stops_accepted = 0
         self.stopping = 0
         self.may_run = False
-        self.busy_until = -inf
         self.outputs: dict[int, bool | None] = dict.fromkeys((*range(1, OUTPUTS + 1), LEDS))
 
 

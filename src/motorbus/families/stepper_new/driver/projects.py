@@ -201,8 +201,8 @@ def _different(node: Node, wanted: Project, found: Project, state: str) -> Verif
 
 
 async def check_free(node: Node, verb: str) -> None:
-    """Raise RequestError while something may turn, or a change of this bus is unfinished in the journal."""
-    await check_idle(node, f"{verb}()")
+    """Raise RequestError while a project may run, or a change of this bus is unfinished in the journal."""
+    check_idle(node, f"{verb}()")
     await Emit(JournalEntry(verb, ASKED, {"node": node.node}))
 
 
@@ -322,35 +322,7 @@ async def _store(node: Node, before: Project, wanted: Project) -> None:
     raise _different(node, wanted, before, f"saved {TRIES} times")
 
 
-# -- select, save, clear -----------------------------------------------------------------------------------------------
-
-
-async def select(node: Node, project: int) -> int:
-    """Select project 1 to 4 without a change of its number of steps, which is returned; input 3 then starts it.
-
-    Edits that were not saved are lost. Raises RequestError for a cleared project, VerificationFailed if it reads
-    different afterwards.
-    """
-    check_value("project", project)
-    return await Exclusive(_select(node, project))
-
-
-async def _select(node: Node, number: int) -> int:
-    await check_free(node, "select")
-    before = await read_image(node, number)
-    if before.is_cleared:
-        raise RequestError(
-            f"project {number} has no steps, and its selection would give it one",
-            expected="a project with steps",
-            advice="write it; nothing was changed",
-            node=node.node,
-        )
-    unsaved, node.state.unsaved = node.state.unsaved, None
-    await command(node, "select_project", ignore, project=number, total_steps=before.total_steps)
-    found = await read_back(node, before)
-    if found != before and (unsaved is None or unsaved.number != number):
-        raise _different(node, before, found, "it was selected; save nothing now")
-    return before.total_steps
+# -- save, clear ------------------------------------------------------------------------------------------------------
 
 
 async def save(node: Node, project: int) -> Written:

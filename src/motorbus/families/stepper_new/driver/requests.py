@@ -24,7 +24,7 @@ _PRIORITIES: Final = {
     Effect.TORQUE: Priority.CONTROL,
     Effect.MOTION: Priority.CONTROL,
 }
-_STOPS: Final = ("stop_project", "stop_motor")
+STOPS: Final = ("stop_project", "stop_motor")
 
 
 def ignore(reply: bytes) -> None:
@@ -59,7 +59,7 @@ def command(
         wire,
         (Expected(node.node, expected_key(wire), row.reply_length),),
         take,
-        priority=Priority.STOP if name in _STOPS else _PRIORITIES[row.effect],
+        priority=Priority.STOP if name in STOPS else _PRIORITIES[row.effect],
         effect=row.effect,
         setpoints=setpoints,
         reply_within=row.reply_within,

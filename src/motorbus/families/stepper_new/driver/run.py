@@ -12,7 +12,7 @@ from enum import Enum
 from math import inf, nan, tau
 from typing import Final, NamedTuple
 
-from motorbus.core.request import Notification, Request, Response
+from motorbus.core.request import Notification, Response
 from motorbus.core.setpoint import Setpoint
 from motorbus.core.steps import (
     ASKED,
@@ -42,9 +42,8 @@ from motorbus.families.stepper_new.driver.projects import read_project
 from motorbus.families.stepper_new.driver.requests import command, ignore
 from motorbus.families.stepper_new.driver.stop import RUN, Watch, check_idle, close_run, mark_unmoved
 from motorbus.families.stepper_new.execution.sequence import earliest_end
-from motorbus.families.stepper_new.parameters import OUTPUTS, STOP_INPUT, Project, check_value
+from motorbus.families.stepper_new.parameters import OUTPUTS, STOP_INPUT, Project
 from motorbus.families.stepper_new.program.estimate import Estimate, estimate, reach
-from motorbus.families.stepper_new.program.file import Program
 from motorbus.families.stepper_new.protocol import COMPLETED, RATE
 
 LONGER: Final = 1.2  # share of the slowest reading that a project may take # assumption
@@ -90,15 +89,15 @@ async def start_project(node: Node, project: int, *, endless: bool = False, expe
 
     Returns at the acknowledgement; a busy controller may acknowledge and ignore it. Raises RequestError, with nothing
     started, for a project without steps, with errors of lint (unless `expert`), without an end (unless `endless`), and
-    while something may turn or a change is unfinished; Interrupted if a stop came before it left; OutcomeUnknown
-    without an acknowledgement; else as `dump`.
+    while a project may run or a change is unfinished; Interrupted if a stop came before it left; OutcomeUnknown without
+    an acknowledgement; else as `dump`.
     """
     watch = Watch(node)
 
     async def check_and_start() -> Estimate:
-        program = await _checked_program(node, project, endless, expert)
-        await _start(watch, program.project)
-        return estimate(program.project)
+        found = await _checked_project(node, project, endless, expert)
+        await _start(watch, found)
+        return estimate(found)
 
     return await mark_unmoved(watch, Exclusive(check_and_start()))
 
@@ -124,27 +123,18 @@ async def run(
     if timeout is not None:
         check_seconds("timeout", timeout)
     elif endless:
-        raise RequestError(
-            "a project without end is not waited for",
-            expected="a timeout, or start_project()",
-            advice="nothing was sent",
-        )
-    guard = Watch(node)
+        raise RequestError("a project without end needs a timeout", advice="or use start_project()")
+    guard, ports = Watch(node), checked_ports(watch)
     course = Course(guard, timeout)
-    ports = checked_ports(watch) if tuple(watch) else ()
-
-    async def close() -> None:
-        if course.ran is not None and not node.state.may_run:
-            await close_run(node, course.ran.outcome.value)
 
     async def begin() -> Levels:
-        program = await _checked_program(node, project, endless, expert)
-        levels = Levels(await inputs(node, ports) if ports else {})
-        course.expect(program.project, await Sleep(0))
-        error = await catch(_start(guard, program.project))
-        if isinstance(error, MotorbusError) and not isinstance(error, UNHEARD):
-            raise error
-        course.begin(error)
+        found = await _checked_project(node, project, endless, expert)
+        levels = Levels(await inputs(node, ports))
+        course.expect(found, await Sleep(0))
+        start = await catch(_start(guard, found))
+        if isinstance(start, MotorbusError) and not isinstance(start, UNHEARD):
+            raise start
+        course.begin(start)
         return levels
 
     async def follow() -> None:
@@ -153,7 +143,15 @@ async def run(
         finally:
             course.is_over = True
 
-    await mark_unmoved(guard, with_cleanup(gather(follow(), _listen(course)), close))
+    async def listen() -> None:
+        while course.ran is None and not course.is_over:
+            await WaitFor(course.take, LOOK)
+
+    async def close() -> None:
+        if course.ran is not None and not node.state.may_run:
+            await close_run(node, course.ran.outcome.value)
+
+    await mark_unmoved(guard, with_cleanup(gather(follow(), listen()), close))
     assert course.ran is not None
     return course.ran
 
@@ -161,34 +159,29 @@ async def run(
 # -- start -------------------------------------------------------------------------------------------------------------
 
 
-async def _checked_program(node: Node, number: int, endless: bool, expert: bool) -> Program:
-    check_value("project", number)
-    await check_idle(node, f"start of project {number}")
+async def _checked_project(node: Node, number: int, endless: bool, expert: bool) -> Project:
+    check_idle(node, f"start of project {number}")
     await Emit(JournalEntry(RUN, ASKED, {"node": node.node}))
     program = await read_project(node, number)
-    project = program.project
-    errors = [str(one) for one in program.lint() if one.level == "error"]
-    refusal = ""
-    if project.is_cleared:
-        refusal, advice = "has no steps", "write it first"
-    elif errors and not expert:
-        refusal, advice = f"has errors: {'; '.join(errors)}", "correct it, or say expert=True"
-    elif earliest_end(project) is None and not endless:
-        refusal, advice = "has no end", "say endless=True; only a stop ends it"
-    if refusal:
-        raise RequestError(
-            f"project {number} {refusal}", advice=f"{advice}; nothing was started", node=node.node
-        )
-    return program
+    errors = [] if expert else [str(one) for one in program.lint() if one.level == "error"]
+    refusals = {
+        "has no steps; write it first": program.project.is_cleared,
+        f"has errors: {'; '.join(errors)}": errors,
+        "has no end; say endless=True": earliest_end(program.project) is None and not endless,
+    }
+    for refusal, applies in refusals.items():
+        if applies:
+            raise RequestError(f"project {number} {refusal}", advice="nothing was started", node=node.node)
+    return program.project
 
 
 async def _start(watch: Watch, project: Project) -> float:
     """Start a project; return when it was acknowledged (s)."""
-    node, number = watch.node, project.number
+    node = watch.node
     facts = {
         "node": node.node,
-        "project": number,
-        "what": f"the run of project {number}",
+        "project": project.number,
+        "what": f"the run of project {project.number}",
         "cause": "it was started, and neither its notice nor a stop was acknowledged since",
         "advice": "`motorbus stop {bus}` ends it",
         READABLE: True,
@@ -202,26 +195,15 @@ async def _start(watch: Watch, project: Project) -> float:
         ignore,
         setpoints=setpoints(node, project),
         precondition=watch.precondition,
-        project=number,
+        project=project.number,
     )
     try:
-        return await _with_time(request)
+        answer: Response = await request.with_decoder(lambda answer: answer)
     except (Refused, RequestError, Interrupted) as error:
         if not (watch.ordered and isinstance(error, Interrupted)):
             await close_run(node, "not started")
         raise
-
-
-def _with_time(request: Request[None]) -> Request[float]:
-    """The same request; its value is the time of its reply (s)."""
-    decode = request.decode
-    assert decode is not None
-
-    def at(answer: Response) -> float:
-        decode(answer)
-        return answer.at
-
-    return request.with_decoder(at)
+    return answer.at
 
 
 def setpoints(node: Node, project: Project) -> tuple[Setpoint, ...]:
@@ -232,11 +214,11 @@ def setpoints(node: Node, project: Project) -> tuple[Setpoint, ...]:
     fastest = max((step.speed for step in project.used), default=0) * tau / 60
     low, high = reach(project)
     unit = tau / project.turn_distance if project.turn_distance else nan
-    ways = [unit * far for far in (high, low) if far] or [0.0]
-    found = [Setpoint(node.node, "relative", way, -inf, inf) for way in ways]
+    asked = [("relative", unit * far) for far in (high, low) if far] or [("relative", 0.0)]
     if earliest_end(project) is None:
-        found.append(Setpoint(node.node, "velocity", fastest, -inf, inf))
-    return (*found, Setpoint(node.node, "speed", fastest, -inf, inf))
+        asked.append(("velocity", fastest))
+    asked.append(("speed", fastest))
+    return tuple(Setpoint(node.node, quantity, value, -inf, inf) for quantity, value in asked)
 
 
 # -- wait --------------------------------------------------------------------------------------------------------------
@@ -247,12 +229,11 @@ class Course:
 
     def __init__(self, watch: Watch, timeout: float | None) -> None:
         self.watch: Final = watch
-        self.state: Final = watch.node.state
-        self.timeout = timeout
+        self.timeout: Final = timeout
         self.ran: Ran | None = None
         self.is_over = False
         self.begun: float | None = None  # when it was acknowledged; when it was sent if that is lost
-        self.button = False  # input 4 read active
+        self.is_button_pressed = False  # input 4
         self._lost: MotorbusError | None = None
         self._notices: list[tuple[float, bool]] = []
 
@@ -262,7 +243,7 @@ class Course:
         earliest = earliest_end(project)
         self._least = inf if earliest is None else earliest * CLOCK
         self._sent = at
-        self._accepted = self.state.stops_accepted
+        self._accepted = self.watch.node.state.stops_accepted
 
     def begin(self, start: float | MotorbusError) -> None:
         """It was acknowledged at this time, or not."""
@@ -274,48 +255,47 @@ class Course:
     @property
     def deadline(self) -> float:
         """Until when its notice is waited for (s)."""
-        assert self.begun is not None
+        begun = self.begun or self._sent
         if self.timeout is not None:
-            return self.begun + self.timeout
-        waits = bool(self.predicted.waits) and self._lost is None
-        return inf if waits else self.begun + self.predicted.high * LONGER + SPARE
+            return begun + self.timeout
+        if self.predicted.waits and self._lost is None:
+            return inf
+        return begun + self.predicted.high * LONGER + SPARE
 
     def take(self, notice: Notification) -> bool:
         """Take a notice; True if the outcome is known."""
         if notice.kind == COMPLETED:
-            self._notices.append((notice.at, self.watch.is_stopped or self.state.stopping > 0))
+            self._notices.append((notice.at, self.watch.is_stopped or self.watch.node.state.stopping > 0))
             self.decide(notice.at)
         return self.ran is not None
 
     def decide(self, now: float) -> None:
         """Set `ran` if the outcome is known now. While a stop is being sent it is not."""
-        if self.ran is not None or self.begun is None or self.state.stopping:
+        state, begun = self.watch.node.state, self.begun
+        if self.ran is not None or begun is None or state.stopping:
             return
-        own = [one for one in self._notices if self._may_be_own(one[0])]
-        if self.state.stops_accepted > self._accepted:
+        own = [
+            (at, is_doubtful)
+            for at, is_doubtful in self._notices
+            if at > begun - SETTLES and at - self._sent >= self._least
+        ]
+        if state.stops_accepted > self._accepted:
             self._end(Outcome.STOPPED, "a stop of this host was acknowledged")
-        elif self.button:
+        elif self.is_button_pressed:
             self._end(Outcome.STOPPED, "input 4, which stops projects, was active")
         elif own:
+            state.may_run = False
             at, is_doubtful = own[0]
-            self.state.may_run = False
             if is_doubtful:
                 self._end(Outcome.UNKNOWN, "its notice came after a stop that was not acknowledged")
             else:
-                seconds = max(0.0, at - self.begun)
+                seconds = max(0.0, at - begun)
                 self._end(Outcome.COMPLETED, f"its notice came {seconds:.3f} s after the start", seconds)
-        elif now >= self.deadline:
-            self._end_late()
-
-    def _may_be_own(self, at: float) -> bool:
-        assert self.begun is not None
-        return at > self.begun - SETTLES and at - self._sent >= self._least
-
-    def _end_late(self) -> None:
-        if self._lost is not None:
-            self._end(
-                Outcome.UNKNOWN, f"no acknowledgement ({self._lost.summary}) and no notice came; it may run"
-            )
+        elif now < self.deadline:
+            return
+        elif self._lost is not None:
+            why = f"neither an acknowledgement ({self._lost.summary}) nor a notice came; it may run"
+            self._end(Outcome.UNKNOWN, why)
         elif self._notices:
             first = self._notices[0][0] - self._sent
             self._end(
@@ -327,11 +307,12 @@ class Course:
     def _end(self, outcome: Outcome, why: str, seconds: float | None = None) -> None:
         self.ran = Ran(outcome, seconds, self.predicted, why)
 
-
-async def _listen(course: Course) -> None:
-    """Listen without a pause, also while inputs are read."""
-    while course.ran is None and not course.is_over:
-        await WaitFor(course.take, LOOK)
+    def estimated(self, now: float) -> Estimated:
+        """How far it is at this time."""
+        seconds, predicted = now - (self.begun or now), self.predicted
+        if predicted.waits or predicted.endless or not 0 < predicted.seconds < inf:
+            return Estimated(seconds, None)
+        return Estimated(seconds, min(1.0, seconds / predicted.seconds))
 
 
 async def _follow(course: Course, levels: Levels) -> None:
@@ -342,19 +323,12 @@ async def _follow(course: Course, levels: Levels) -> None:
         now = await Sleep(0)
         if now - reported >= REPORT:
             reported = now
-            await Emit(_estimated(course, now))
+            await Emit(course.estimated(now))
         for port in levels.settled:
             await _read_watched(course, levels, port)
         pause = LOOK if levels.settled or now >= course.deadline else min(REPORT, course.deadline - now)
         await WaitFor(course.take, pause)
         course.decide(await Sleep(0))
-
-
-def _estimated(course: Course, now: float) -> Estimated:
-    assert course.begun is not None
-    seconds, predicted = now - course.begun, course.predicted
-    is_timed = not (predicted.waits or predicted.endless) and 0 < predicted.seconds < inf
-    return Estimated(seconds, min(1.0, seconds / predicted.seconds) if is_timed else None)
 
 
 async def _read_watched(course: Course, levels: Levels, port: int) -> None:
@@ -364,5 +338,6 @@ async def _read_watched(course: Course, levels: Levels, port: int) -> None:
     if isinstance(active, MotorbusError):
         raise active
     if change := levels.take(port, active, await Sleep(0)):
-        course.button = course.button or (port == STOP_INPUT and change.active)
+        if port == STOP_INPUT and change.active:
+            course.is_button_pressed = True
         await Emit(change)
