@@ -213,7 +213,7 @@ def test_a_damaged_file_is_read_or_refused(data: st.DataObject) -> None:
 
 # -- backups -------------------------------------------------------------------------------------------
 
-BACKUP = Backup(dumps={1: DUMP_A, 2: DUMP_B, 4: b"\xff\xaa\x3e\x04\0\0" + bytes(220)}, made="2026-01-02")
+BACKUP = Backup(dumps={1: DUMP_A, 2: DUMP_B, 4: b"\xff\xaa\x3e\x04\0\0" + bytes(220)})
 
 
 def test_a_backup_reads_the_same(tmp_path: Path) -> None:

@@ -30,18 +30,14 @@ class BackupFile(Struct, kw_only=True, forbid_unknown_fields=True):
     format: Literal[1]
     kind: Literal["stepper backup"]
     dump_order: Order = "little"
-    made: str = ""
-    version: str = ""
     project: Annotated[list[ProjectTable], Meta(min_length=1, max_length=PROJECTS)]
 
 
 class Backup(Struct, frozen=True, kw_only=True):
-    """Dumps of 226 bytes by project; `made` is their time and `version` that of motorbus, as text."""
+    """Dumps of 226 bytes by project; `order` is that of the bytes of a number in them."""
 
     dumps: dict[int, bytes]
     order: Order = "little"
-    made: str = ""
-    version: str = ""
 
     @property
     def projects(self) -> tuple[int, ...]:
@@ -62,9 +58,6 @@ class Backup(Struct, frozen=True, kw_only=True):
     def text(self) -> str:
         """The file; comments give each project as a program."""
         lines = ["format = 1", f'kind = "{KIND}"', f'dump_order = "{self.order}"']
-        lines += [
-            f'{key} = "{text}"' for key, text in (("made", self.made), ("version", self.version)) if text
-        ]
         for number in self.projects:
             dump = self.dumps[number]
             rows = [
@@ -100,7 +93,7 @@ class Backup(Struct, frozen=True, kw_only=True):
             dumps[entry.number] = dump
         if len(dumps) < len(file.project):
             raise _wrong("a project is in it twice")
-        return cls(dumps=dumps, order=file.dump_order, made=file.made, version=file.version)
+        return cls(dumps=dumps, order=file.dump_order)
 
     @classmethod
     def load(cls, path: str) -> Backup:
