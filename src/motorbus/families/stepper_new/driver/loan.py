@@ -157,14 +157,15 @@ async def lend(
     change: Callable[[Project], Project],
     motion: Callable[[Watch, Project], Awaitable[T]],
     *,
+    prepare: Callable[[], Awaitable[None]] | None = None,
     ends: bool = True,
     on_error: Callable[[BaseException], None] = lambda error: None,
 ) -> T:
     """Make a manual motion with project 1 as `change` makes it, then stop, then give project 1 back.
 
-    `ends`: the motion ends by itself; else the motor decelerates after the stop, which is waited for. Nothing is edited
-    where project 1 is so already. An error is `unmoved` if the motion request did not leave; `on_error` gets it, before
-    project 1 is given back if it was lent, and once more at the end.
+    `prepare` runs before project 1 is read. `ends`: the motion ends by itself; else the motor decelerates after the
+    stop, which is waited for. Nothing is edited where project 1 is so already. An error is `unmoved` if the motion
+    request did not leave; `on_error` gets it, before project 1 is given back.
 
     Raises RequestError, with nothing written, while a project may run or a change is unfinished, for unsaved edits of
     another project, and if project 1 could not be given back; VerificationFailed if it does not read as wanted;
@@ -174,6 +175,8 @@ async def lend(
 
     async def work() -> T:
         await check_free(node, verb)
+        if prepare is not None:
+            await prepare()
         before = await cached(node, MANUAL)
         loan = Loan(watch, verb, before, change(before), on_error)
         async with loan:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from math import inf, tau
 from typing import Final, NamedTuple
 
@@ -168,6 +169,10 @@ async def home(
         seconds = await _until_home(watch, begun, deadline)
         return Homed(node.node, seconds, velocity_of(project), Promise.STOP_ACCEPTED)
 
+    return await lend(node, "home", change, turn, prepare=partial(_check_released, node))
+
+
+async def _check_released(node: Node) -> None:
     for _ in range(READINGS):
         if await read_input(node, HOME_INPUT):
             raise NotHomed(
@@ -176,7 +181,6 @@ async def home(
                 advice="move forward, away from the switch; nothing was moved",
                 node=node.node,
             )
-    return await lend(node, "home", change, turn)
 
 
 async def _until_home(watch: Watch, begun: float, deadline: float) -> float:

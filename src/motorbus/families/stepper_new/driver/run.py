@@ -12,7 +12,7 @@ from enum import Enum
 from math import inf, nan, tau
 from typing import Final, NamedTuple
 
-from motorbus.core.request import Notification, Response
+from motorbus.core.request import Notification
 from motorbus.core.setpoint import Setpoint
 from motorbus.core.steps import (
     ASKED,
@@ -21,6 +21,7 @@ from motorbus.core.steps import (
     Emit,
     Exclusive,
     JournalEntry,
+    Progress,
     Sleep,
     WaitFor,
     catch,
@@ -74,16 +75,6 @@ class Ran(NamedTuple):
     why: str
 
 
-class Estimated(NamedTuple):
-    """An event: a project runs since `seconds` and has done this `fraction` of its estimated time.
-
-    None for a project without end, or one that waits for inputs.
-    """
-
-    seconds: float
-    fraction: float | None
-
-
 async def start_project(node: Node, project: int, *, endless: bool = False, expert: bool = False) -> Estimate:
     """Start project 1 to 4 (item 13) without waiting; return its estimated time.
 
@@ -114,8 +105,8 @@ async def run(
     """Start project 1 to 4 and wait for its end: `completed`, `stopped`, `timeout` or `unknown`, see `Outcome`.
 
     It waits `timeout` s, else 1.2 times the slowest estimate and 2 s, and without limit for a project that waits for
-    inputs. `watch` are inputs, 1 to 5, that are read meanwhile. Reports `Estimated`, and `InputChanged`. A project that
-    may still run refuses the next motion until `stop`; the journal records it.
+    inputs. `watch` are inputs, 1 to 5, that are read meanwhile. Reports `Progress` in ms, estimated, and
+    `InputChanged`. A project that may still run refuses the next motion until `stop`; the journal records it.
 
     `endless` needs a `timeout`. An interrupted wait leaves the project running. An emergency stop raises Interrupted.
     Raises as `start_project`.
@@ -198,12 +189,11 @@ async def _start(watch: Watch, project: Project) -> float:
         project=project.number,
     )
     try:
-        answer: Response = await request.with_decoder(lambda answer: answer)
+        return await request.with_decoder(lambda answer: answer.at)
     except (Refused, RequestError, Interrupted) as error:
         if not (watch.ordered and isinstance(error, Interrupted)):
             await close_run(node, "not started")
         raise
-    return answer.at
 
 
 def setpoints(node: Node, project: Project) -> tuple[Setpoint, ...]:
@@ -232,7 +222,7 @@ class Course:
         self.timeout: Final = timeout
         self.ran: Ran | None = None
         self.is_over = False
-        self.begun: float | None = None  # when it was acknowledged; when it was sent if that is lost
+        self.is_pending = True  # neither an acknowledgement nor its loss is known
         self.is_button_pressed = False  # input 4
         self._lost: MotorbusError | None = None
         self._notices: list[tuple[float, bool]] = []
@@ -242,25 +232,25 @@ class Course:
         self.predicted = estimate(project)
         earliest = earliest_end(project)
         self._least = inf if earliest is None else earliest * CLOCK
-        self._sent = at
+        self._sent = self.start = at
         self._accepted = self.watch.node.state.stops_accepted
 
-    def begin(self, start: float | MotorbusError) -> None:
-        """It was acknowledged at this time, or not."""
+    def begin(self, start: float | MotorbusError | None) -> None:
+        """It was acknowledged at this time, or not; None in a dry run."""
+        self.is_pending = False
         if isinstance(start, MotorbusError):
-            self._lost, self.begun = start, self._sent
+            self._lost = start
         else:
-            self.begun = start
+            self.start = start or self._sent
 
     @property
     def deadline(self) -> float:
         """Until when its notice is waited for (s)."""
-        begun = self.begun or self._sent
         if self.timeout is not None:
-            return begun + self.timeout
+            return self.start + self.timeout
         if self.predicted.waits and self._lost is None:
             return inf
-        return begun + self.predicted.high * LONGER + SPARE
+        return self.start + self.predicted.high * LONGER + SPARE
 
     def take(self, notice: Notification) -> bool:
         """Take a notice; True if the outcome is known."""
@@ -271,13 +261,13 @@ class Course:
 
     def decide(self, now: float) -> None:
         """Set `ran` if the outcome is known now. While a stop is being sent it is not."""
-        state, begun = self.watch.node.state, self.begun
-        if self.ran is not None or begun is None or state.stopping:
+        state = self.watch.node.state
+        if self.ran is not None or self.is_pending or state.stopping:
             return
         own = [
             (at, is_doubtful)
             for at, is_doubtful in self._notices
-            if at > begun - SETTLES and at - self._sent >= self._least
+            if at > self.start - SETTLES and at - self._sent >= self._least
         ]
         if state.stops_accepted > self._accepted:
             self._end(Outcome.STOPPED, "a stop of this host was acknowledged")
@@ -289,7 +279,7 @@ class Course:
             if is_doubtful:
                 self._end(Outcome.UNKNOWN, "its notice came after a stop that was not acknowledged")
             else:
-                seconds = max(0.0, at - begun)
+                seconds = max(0.0, at - self.start)
                 self._end(Outcome.COMPLETED, f"its notice came {seconds:.3f} s after the start", seconds)
         elif now < self.deadline:
             return
@@ -307,23 +297,18 @@ class Course:
     def _end(self, outcome: Outcome, why: str, seconds: float | None = None) -> None:
         self.ran = Ran(outcome, seconds, self.predicted, why)
 
-    def estimated(self, now: float) -> Estimated:
-        """How far it is at this time."""
-        seconds, predicted = now - (self.begun or now), self.predicted
-        if predicted.waits or predicted.endless or not 0 < predicted.seconds < inf:
-            return Estimated(seconds, None)
-        return Estimated(seconds, min(1.0, seconds / predicted.seconds))
-
 
 async def _follow(course: Course, levels: Levels) -> None:
     """Report, read the watched inputs, and decide, until the outcome is known."""
-    reported = -inf
+    reported, whole = -inf, course.predicted.seconds
     course.decide(await Sleep(0))
     while course.ran is None:
         now = await Sleep(0)
-        if now - reported >= REPORT:
+        if now - reported >= REPORT and whole < inf:
             reported = now
-            await Emit(course.estimated(now))
+            await Emit(
+                Progress(round(1000 * (now - course.start)), round(1000 * whole), "running, estimated")
+            )
         for port in levels.settled:
             await _read_watched(course, levels, port)
         pause = LOOK if levels.settled or now >= course.deadline else min(REPORT, course.deadline - now)
