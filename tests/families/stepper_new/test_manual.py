@@ -64,6 +64,7 @@ def as_step(one: Bench, move: Callable[[], object]) -> Project:
 def test_move_goes_by_the_angle_in_whole_pulses(one: Bench, angle: float) -> None:
     moved = one.device.move_by(angle, velocity=tau)
     assert moved.angle == pytest.approx(angle, abs=tau / 1600 / 2)
+    assert str(moved).startswith(f"estimated: {moved.angle:.6g} rad at 60 RPM in at most ")
     assert one.simulated.position == round(moved.angle / tau * 1600)
     assert (moved.velocity > 0) is (angle > 0)
     assert one.simulated.machine.phase is Phase.IDLE
@@ -273,6 +274,7 @@ def test_home_ends_at_the_switch_and_counts_from_it() -> None:
     with bench(made(), **AT_HOME) as one:
         homed = one.device.home(deadline=8.0)
         assert homed.velocity == pytest.approx(tau)
+        assert str(homed) == f"input 5 was active after {homed.seconds:.1f} s in reverse at 60 RPM"
         assert homed.seconds == pytest.approx(0.5, abs=0.2)
         assert one.simulated.status()["homed"] is True
         assert one.simulated.position == 0

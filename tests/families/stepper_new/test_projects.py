@@ -99,6 +99,7 @@ def test_dump_of_another_project_is_refused(one: Bench) -> None:
 def test_only_what_differs_is_sent_and_one_dump_verifies_it(one: Bench) -> None:
     written = one.device.write_project(Program(project=PICK.with_step(3, delay=1000)))
     assert written == (2, {"step_3_delay": (0, 1000)}, "saved")
+    assert str(written) == "project 2 saved, parameters changed: 1"
     assert [frame[:11] for frame in one.sent()] == [
         "FF AA 3E 02", "FF AA 3E 02", "FF AA 6E 02", "FF AA 03 07", "FF AA 3E 02", SAVE_2, "FF AA 3E 02",
     ]  # fmt: skip

@@ -56,6 +56,10 @@ class Moved(NamedTuple):
     seconds: float
     promise: Promise
 
+    def __str__(self) -> str:
+        rpm = abs(self.velocity) * 60 / tau
+        return f"estimated: {self.angle:.6g} rad at {rpm:.0f} RPM in at most {self.seconds:.3f} s"
+
 
 class Homed(NamedTuple):
     """Input 5 was active after `seconds` in reverse at `velocity` (rad/s, estimated), and the stop was acknowledged."""
@@ -64,6 +68,10 @@ class Homed(NamedTuple):
     seconds: float
     velocity: float
     promise: Promise
+
+    def __str__(self) -> str:
+        rpm = self.velocity * 60 / tau
+        return f"input {HOME_INPUT} was active after {self.seconds:.1f} s in reverse at {rpm:.0f} RPM"
 
 
 # -- by an angle, for a time -------------------------------------------------------------------------------------------

@@ -64,6 +64,9 @@ class Written(NamedTuple):
     changes: Changes
     proof: str
 
+    def __str__(self) -> str:
+        return f"project {self.project} {self.proof}, parameters changed: {len(self.changes)}"
+
 
 # -- read --------------------------------------------------------------------------------------------------------------
 

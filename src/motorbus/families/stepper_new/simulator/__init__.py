@@ -7,12 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from motorbus.core.family import Option
 from motorbus.core.switches import options as quirk_options
 from motorbus.core.switches import switched
 from motorbus.errors import RequestError
-from motorbus.families.stepper_new.parameters import checked_order
-from motorbus.families.stepper_new.protocol import MOTOR, ONLY, checked_motor
+from motorbus.families.stepper_new.protocol import ONLY, checked_motor
 from motorbus.families.stepper_new.simulator.bus import StepperBus
 from motorbus.families.stepper_new.simulator.controller import Controller
 from motorbus.families.stepper_new.simulator.quirks import Quirks
@@ -20,18 +18,13 @@ from motorbus.families.stepper_new.simulator.quirks import Quirks
 __all__ = ["OPTIONS", "Controller", "Quirks", "StepperBus", "simulate"]
 
 MODEL = "stepper"
-OPTIONS = (
-    Option("motor", int, MOTOR, "its motor number; it does not reply to others", span=(1, 255)),
-    Option("dump_order", str, "little", "the byte of a number that is first in a dump", ("little", "big")),
-    *quirk_options(Quirks),
-)
+OPTIONS = quirk_options(Quirks)
 """Options of a simulated bus, beside its id."""
 
 
 def simulate(ids: Iterable[int] = (ONLY,), model: str = "", /, **options: object) -> StepperBus:
-    """A simulated line with its one controller, id 1, at rest. The options are motor, dump_order and those of `Quirks`.
-
-    Their values may be text. Raises RequestError for other ids, an unknown model or option, or an invalid value.
+    """A simulated line with its one controller, id 1, at rest. The options are the fields of `Quirks`; their values may
+    be text. Raises RequestError for other ids, an unknown model or option, or an invalid value.
     """
     found = tuple(ids)
     if found != (ONLY,):
@@ -42,6 +35,6 @@ def simulate(ids: Iterable[int] = (ONLY,), model: str = "", /, **options: object
         )
     if model.lower() not in ("", MODEL):
         raise RequestError(f"there is no simulated stepper controller {model!r}", expected=MODEL)
-    motor = checked_motor(int(str(options.pop("motor", MOTOR))))
-    order = checked_order(options.pop("dump_order", "little"))
-    return StepperBus(Controller(switched(Quirks, "stepper", options), motor, order))
+    quirks = switched(Quirks, "stepper", options)
+    checked_motor(quirks.motor)
+    return StepperBus(Controller(quirks))

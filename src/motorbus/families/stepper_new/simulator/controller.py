@@ -15,7 +15,7 @@ from motorbus.core.request import TimeoutClass
 from motorbus.core.simulated import PoweredDevice
 from motorbus.errors import RequestError
 from motorbus.families.stepper_new.execution.machine import Machine, Phase
-from motorbus.families.stepper_new.parameters import HOME_INPUT, INPUTS, Order, Project, check_value
+from motorbus.families.stepper_new.parameters import HOME_INPUT, INPUTS, Project, check_value
 from motorbus.families.stepper_new.protocol import MOTOR, Command, decode_request, encode_reply
 from motorbus.families.stepper_new.simulator.memory import Memory
 from motorbus.families.stepper_new.simulator.quirks import Quirks
@@ -39,10 +39,9 @@ class Controller(PoweredDevice):
     `position` counts from power-on or homing; `offset` is the place of its zero (pulses).
     """
 
-    def __init__(self, quirks: Quirks, motor: int, order: Order) -> None:
+    def __init__(self, quirks: Quirks) -> None:
         self.quirks: Final = quirks
-        self.motor: Final = motor
-        self.store: Final = Memory(quirks, order)
+        self.store: Final = Memory(quirks)
         self.machine: Final = Machine(tick_ms=quirks.ramp_tick_ms)
         self.log: list[Remark] = []
         self.now = 0.0
@@ -210,7 +209,7 @@ class Controller(PoweredDevice):
         if found is None:
             return f"unknown command {request[2]:02X} {request[3]:02X}"
         command, values = found
-        if command.code[0] == MOTOR and request[2] != self.motor:
+        if command.code[0] == MOTOR and request[2] != self.quirks.motor:
             return f"motor {request[2]} is another one"
         try:
             for name, raw in values.items():

@@ -13,9 +13,9 @@ from typing import Final
 from motorbus.families.stepper_new.edits import edited
 from motorbus.families.stepper_new.parameters import (
     PROJECTS,
-    Order,
     Project,
     Step,
+    checked_order,
     encode_image,
     values_of,
     with_steps,
@@ -35,9 +35,9 @@ class Memory:
     `selected_at_power_on` is 1. # assumption
     """
 
-    def __init__(self, quirks: Quirks, order: Order) -> None:
+    def __init__(self, quirks: Quirks) -> None:
         self.quirks: Final = quirks
-        self.order: Final[Order] = order
+        self.order: Final = checked_order(quirks.dump_order)
         self.stored = dict.fromkeys(range(1, PROJECTS + 1), Project())
         if quirks.shipped == "example":
             self.stored[1] = EXAMPLE

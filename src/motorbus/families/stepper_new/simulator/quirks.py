@@ -19,6 +19,9 @@ class Quirks:
     """Behaviour of the simulated controller. Times are in s, in ms where the name says so; positions in pulses."""
 
     # fmt: off
+    motor: int = switch(3, "its motor number; it does not reply to others", source="manual", span=(1, 255))
+    dump_order: str = switch("little", "the byte of a number that is first in a dump", "little", "big",
+        source="manual has the lowest first in requests and does not say it of the dump")
     shipped: str = switch("example",
         "when new, project 1 holds the values of the manual's examples, or all four are cleared",
         "example", "cleared", source=_ASSUMED)
