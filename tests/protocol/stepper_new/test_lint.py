@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 
 from motorbus.families.stepper_new.parameters import Project, Step, decode_image, with_steps
-from motorbus.families.stepper_new.program.estimate import estimate, net_units, reach, show_duration
+from motorbus.families.stepper_new.program.estimate import estimate, net_units, reach
 from motorbus.families.stepper_new.program.lint import RULES, lint
 from tests.protocol.stepper_new.projects import projects
 from tests.protocol.stepper_new.vectors import DUMP_A, DUMP_B
@@ -81,12 +81,11 @@ def test_rules_that_depend_on_conditions() -> None:
     waiting = made(replace(GOOD, start_input=5), BACK)
     assert rules(waiting) == []
     assert rules(waiting, unattended=True) == ["L22"]
-    assert rules(waiting, homing=True) == ["L13"]
 
 
 @given(projects())
 def test_any_project_is_judged_and_estimated(project: Project) -> None:
-    for finding in lint(project, unattended=True, homing=True):
+    for finding in lint(project, unattended=True):
         assert finding.rule in RULES
         assert "\n" not in str(finding)
     found = estimate(project)
@@ -113,14 +112,6 @@ def test_the_band_is_that_of_the_readings() -> None:
     found = estimate(A)
     assert found.low == found.seconds == pytest.approx(1.685587, abs=1e-6)
     assert found.high == pytest.approx(2.428, abs=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("seconds", "text"),
-    [(0.04, "0.0 s"), (99.94, "99.9 s"), (99.95, "1 min 40 s"), (3599.6, "1 h 0 min"), (7500, "2 h 5 min")],
-)
-def test_a_duration_as_text(seconds: float, text: str) -> None:
-    assert show_duration(seconds) == text
 
 
 def test_net_displacement_counts_the_loop_and_what_moves() -> None:

@@ -47,16 +47,6 @@ def test_a_file_is_read() -> None:
 
 
 @pytest.mark.parametrize(
-    ("unit", "turn"),
-    [("pulse", 1600), ("0.001 mm", 5000), ("0.01 deg", 36000), ("turn", 1), ("2 pulses", 800)],
-)
-def test_the_unit_of_distances(unit: str, turn: int) -> None:
-    motor = MOTOR.replace("turn_distance = 5000", f'unit = "{unit}"')
-    found = Program.parse(file(motor=motor).replace("10 mm", "1 turn")).project
-    assert (found.turn_distance, found.step(1).distance) == (turn, turn)
-
-
-@pytest.mark.parametrize(
     ("speed", "rpm"), [("2 rpm", 2), ("1600 Hz", 60), ("6 deg/s", 1), ("10 mm/s", 120), ("0.5 cm/s", 60)]
 )
 def test_the_units_of_a_speed(speed: str, rpm: int) -> None:
@@ -88,19 +78,8 @@ def test_the_units_of_a_speed(speed: str, rpm: int) -> None:
             "^motor, step_angle: '2.56 deg'",
             "0.01 to 2.55 deg",
         ),
-        (file(motor=MOTOR.replace("turn_distance = 5000", "")), "^motor: turn_distance or unit", "unit"),
-        (file(motor=MOTOR + "unit = 'pulse'"), "^motor: turn_distance or unit", "unit"),
+        (file(motor=MOTOR.replace("turn_distance = 5000", "")), "^motor: .* field `turn_distance`", "lead"),
         (file(motor=MOTOR + "stop = 'hard'"), "^motor, stop: 'hard' is not possible", "hard"),
-        (
-            file(motor=MOTOR.replace("turn_distance = 5000", 'unit = "0.3 mm"')),
-            "^motor, unit: '0.3 mm' is 16.6666666667",
-            "16 or 17 units per turn",
-        ),
-        (
-            file(motor=MOTOR.replace("turn_distance = 5000", 'unit = "5 units"')),
-            "^motor, unit: '5 units'",
-            "mm",
-        ),
         (file(motor=MOTOR.replace("5 mm", "5 rpm")), "^motor, lead: '5 rpm' is no length", "5 mm"),
         (file().replace("10 mm", "10"), "^step 1, move: '10' is not possible", "with a unit in quotes"),
         (file().replace('"10 mm"', "10"), "^step 1, move: 10 is not possible", "with a unit in quotes"),

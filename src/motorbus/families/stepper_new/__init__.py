@@ -18,7 +18,7 @@ from motorbus.families.stepper_new.driver.controller import AsyncController, Con
 from motorbus.families.stepper_new.driver.io import InputChanged, Watched
 from motorbus.families.stepper_new.driver.manual import Homed, Moved
 from motorbus.families.stepper_new.driver.projects import Written
-from motorbus.families.stepper_new.driver.run import Estimated, Outcome, Ran
+from motorbus.families.stepper_new.driver.run import Outcome, Ran
 from motorbus.families.stepper_new.driver.stop import Promise
 from motorbus.families.stepper_new.parameters import TABLES
 from motorbus.families.stepper_new.program.backup import Backup
@@ -33,7 +33,6 @@ __all__ = [
     "Backup",
     "Controller",
     "Estimate",
-    "Estimated",
     "Finding",
     "Homed",
     "InputChanged",

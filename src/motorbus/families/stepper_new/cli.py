@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from math import tau
@@ -16,27 +16,18 @@ from cyclopts import App, Group, Parameter
 from motorbus.cli import consent, dry, target
 from motorbus.cli.device_command import DeviceCommand, device_command, family_command
 from motorbus.cli.exits import Exit
-from motorbus.cli.output import Output
+from motorbus.cli.output import Bar, Output
 from motorbus.cli.parameters import Silent
 from motorbus.core import units
+from motorbus.core.steps import Progress
 from motorbus.errors import Interrupted, MotorbusError, NoReply, OutcomeUnknown, RequestError
 from motorbus.families.stepper_new.driver.controller import Controller
 from motorbus.families.stepper_new.driver.io import InputChanged
 from motorbus.families.stepper_new.driver.projects import Written
-from motorbus.families.stepper_new.driver.run import Estimated, Outcome, Ran
+from motorbus.families.stepper_new.driver.run import Outcome, Ran
 from motorbus.families.stepper_new.edits import edited
 from motorbus.families.stepper_new.execution import ramp, sequence
-from motorbus.families.stepper_new.parameters import (
-    ALL_OUTPUTS,
-    BLANK,
-    INPUTS,
-    LEDS,
-    PARAMETERS,
-    PROJECTS,
-    check_value,
-    decode_image,
-    encode_image,
-)
+from motorbus.families.stepper_new.parameters import BLANK, PARAMETERS, PROJECTS, decode_image, encode_image
 from motorbus.families.stepper_new.program import estimate
 from motorbus.families.stepper_new.program.backup import KIND, Backup
 from motorbus.families.stepper_new.program.file import Program, read_text, read_toml
@@ -44,12 +35,14 @@ from motorbus.families.stepper_new.protocol import REPLY_LENGTH, decode_request,
 
 Device = Annotated[str, Parameter(name="BUS", help="As stepper:/dev/ttyUSB0.")]
 File = Annotated[str, Parameter(name="FILE", help="A program, or a backup of all projects.")]
-ProjectNumber = Annotated[int | None, Parameter(help="Project 1 to 4.")]
+Number = Annotated[int | None, Parameter(help="Project 1 to 4.")]
 Expert = Annotated[bool, Parameter(negative="", help="Allow errors of `check`.")]
+Endless = Annotated[bool, Parameter(negative="", help="Allow a project without end; needs --timeout.")]
 Run = DeviceCommand[Controller]
 LEVELS: Final = {"on": True, "off": False}
 WORDS: Final = {True: "active", False: "inactive", None: "unknown"}
-PORTS: Final = {"all": ALL_OUTPUTS, "leds": LEDS, "1": 1, "2": 2, "3": 3}
+PORTS: Final = {"1": 1, "2": 2, "3": 3, "all": 4, "leds": 5}
+COLUMNS: Final = ("step", "times", "units", "pulses", "Hz", "motion s", "pause s", "output", "wait", "stop")
 
 app = App(
     name="stepper",
@@ -66,7 +59,7 @@ command = partial(device_command, app, Controller, Device)
 @family_command(
     app,
     "check FILE",
-    "Opens no port. Exit code 1 if a finding is an error, with --strict for any finding.",
+    "Opens no port. Exit code 1 if a finding is an error.",
     "check examples/pick_and_place.toml",
     "check feed.toml --unattended --highest 20000",
 )
@@ -75,44 +68,29 @@ def check(
     /,
     *,
     highest: Annotated[float, Parameter(help="Frequency (Hz) that the driver follows.")] = 100_000.0,
-    homing: Annotated[bool, Parameter(negative="", help="Input 5 is used for homing.")] = False,
     unattended: Annotated[bool, Parameter(negative="", help="No operator is present.")] = False,
-    strict: Annotated[bool, Parameter(negative="", help="Any finding is a failure.")] = False,
     output: Silent,
 ) -> Exit:
     """Show the steps of a program, its duration, and what does not do what it seems to say."""
     program = Program.load(file)
-    found = program.lint(highest=highest, homing=homing, unattended=unattended)
-    project, duration = program.project, program.estimate()
-    rows = []
-    for number, step in enumerate(project.used, 1):
-        hertz, pulses = ramp.ramp_of(project, step).run, ramp.pulses_of(project, step)
-        seconds = estimate.step_seconds(project, step)
-        action = PARAMETERS["output"].choices[step.output] if step.output else ""
-        rows.append(
-            (number, sequence.times(project, number), step.sign * step.distance, pulses, f"{hertz:.6g}",
-             f"{seconds:.3f}", f"{step.delay / 1000:g}", action, step.start_input or "", step.stop_input or "")
-        )  # fmt: skip
-    columns = (
-        ">step",
-        ">times",
-        ">units",
-        ">pulses",
-        ">Hz",
-        ">motion s",
-        ">pause s",
-        "output",
-        "wait",
-        "stop",
-    )
+    duration, found = program.estimate(), program.lint(highest=highest, unattended=unattended)
+    rows = [_step_row(program, number) for number in estimate.numbers(program.project)]
     facts = [{"rule": one.rule, "level": one.level, "step": one.step, "text": one.text} for one in found]
     times = {name: getattr(duration, name) for name in duration.__struct_fields__}
     output.document("motorbus.stepper.check/1", {"file": file, "findings": facts, "estimate": times})
-    output.table(program.name or file, columns, rows)
-    findings = [str(one) for one in found] or ["no findings"]
-    output.text("\n".join([str(duration), *findings]))
-    failed = any(one.level == "error" for one in found) or (strict and found)
-    return Exit.FAILURE if failed else Exit.OK
+    output.table(program.name or file, [f">{column}" for column in COLUMNS], rows)
+    output.text("\n".join([str(duration), *(str(one) for one in found)]))
+    return Exit.FAILURE if any(one.level == "error" for one in found) else Exit.OK
+
+
+def _step_row(program: Program, number: int) -> list[object]:
+    project, step = program.project, program.project.step(number)
+    move = [ramp.pulses_of(project, step), f"{ramp.ramp_of(project, step).run:.6g}"]
+    seconds = [f"{estimate.step_seconds(project, step):.3f}", f"{step.delay / 1000:g}"]
+    action = PARAMETERS["output"].choices[step.output] if step.output else ""
+    units_ = step.sign * step.distance
+    ports = [step.start_input or "", step.stop_input or ""]
+    return [number, sequence.times(project, number), units_, *move, *seconds, action, *ports]
 
 
 @command(
@@ -127,23 +105,26 @@ def write(
     run: Run,
     /,
     *,
-    project: ProjectNumber = None,
+    project: Number = None,
     save: Annotated[bool, Parameter(help="Save it; else power-off loses it.")] = True,
     expert: Expert = False,
 ) -> Exit:
     """Write a program into a project, or a backup into all of its projects, verified."""
     source = read_text(file)
-    if read_toml(source).get("kind") == KIND:
-        backup = Backup.parse(source)
+    backup = Backup.parse(source) if read_toml(source).get("kind") == KIND else None
+    if backup:
         chosen = backup.projects if project is None else (project,)
         programs = [Program(project=replace(backup.project(number), number=number)) for number in chosen]
-        action: Callable[[Controller], Any] = lambda one: one.restore(backup, chosen)  # noqa: E731
     else:
         program = Program.parse(source)
-        programs = [
-            replace(program, project=replace(program.project, number=project or program.project.number))
-        ]
-        action = lambda one: (one.write_project(programs[0], save=save, expert=expert),)  # noqa: E731
+        number = project or program.project.number
+        programs = [replace(program, project=replace(program.project, number=number))]
+
+    def action(one: Controller) -> tuple[Written, ...]:
+        if backup:
+            return one.restore(backup, chosen)
+        return (one.write_project(programs[0], save=save, expert=expert),)
+
     with target.opened(run.bus, run.options, run.output) as bus:
         one = Controller(bus)
         changed = [number for wanted in programs if (number := _show_changes(one, wanted, run.output))]
@@ -155,9 +136,8 @@ def write(
         question = f"write project {', '.join(map(str, changed))}"
         agreed = run.yes or not changed
         consent.consent_to(question, run.output, yes=agreed, rehearse=lambda: action(Controller(rehearsal)))
-        results: tuple[Written, ...] = action(one)
-    text = "\n".join(map(str, results))
-    return run.show({"projects": [written(one) for one in results]}, text)
+        results = action(one)
+    return run.show({"projects": [written(one) for one in results]}, "\n".join(map(str, results)))
 
 
 def _show_changes(one: Controller, wanted: Program, output: Output) -> int:
@@ -185,7 +165,7 @@ def read(
     run: Run,
     /,
     *,
-    project: ProjectNumber = None,
+    project: Number = None,
     all_: Annotated[bool, Parameter(name="--all", negative="", help="A backup of all projects.")] = False,
 ) -> Exit:
     """Read a project as a program file, project 1 by default, or all of them as a backup file."""
@@ -210,7 +190,7 @@ _ERRORS: Final[Mapping[Outcome, type[MotorbusError]]] = {
     "run BUS",
     "Exit code 0 if its notice came, 5 if none came in time, 10 if it was stopped, 1 if\n"
     "unknown. Ctrl-C ends the wait, not the project: `motorbus stop` does.",
-    "run stepper:/dev/ttyUSB0 --project 2 --watch 1,2 --progress",
+    "run stepper:/dev/ttyUSB0 --project 2 --watch 1,2",
     "run stepper:sim --project 1 --yes",
     consent="a way of more than 180 degrees",
 )
@@ -221,23 +201,13 @@ def run(
     project: Annotated[int, Parameter(help="Project 1 to 4.")],
     timeout: Annotated[str, Parameter(help="Longest wait, as 90s; else by its estimate.")] = "",
     watch: Annotated[str, Parameter(help="Inputs to read meanwhile, as 1,2.")] = "",
-    progress: Annotated[bool, Parameter(negative="", help="Print progress and changes of inputs.")] = False,
-    endless: Annotated[
-        bool, Parameter(negative="", help="Allow a project without end; needs --timeout.")
-    ] = False,
+    endless: Endless = False,
     expert: Expert = False,
 ) -> Exit:
     """Start a project and wait for its end."""
     seconds = units.parse(timeout, "time") if timeout else None
-    ports = tuple(_whole(port, "input") for port in watch.split(",")) if watch else ()
+    ports = [int(port) if port.isdigit() else 0 for port in watch.split(",")] if watch else []
     common: dict[str, Any] = {"endless": endless, "expert": expert}
-    check_value("project", project)
-
-    def report(event: object) -> None:
-        if progress and isinstance(event, Estimated | InputChanged):
-            run.output.document("motorbus.stepper.event/1", event._asdict())
-            run.output.text(_event_text(event))
-
     with target.opened(run.bus, run.options, run.output) as bus:
         one, rehearsal = Controller(bus), dry.DryBus(bus)
         start = partial(Controller(rehearsal).start_project, project, **common)
@@ -250,7 +220,8 @@ def run(
             f"start project {project}, {question}", run.output, yes=run.yes or not question, rehearse=start
         )
         procedure = Controller.run.function(one, project, timeout=seconds, watch=ports, **common)
-        ran: Ran = bus.run(procedure, report=report)
+        with run.output.progress(f"project {project}") as bar:
+            ran: Ran = bus.run(procedure, report=partial(_report, run.output, bar))
     took = "" if ran.seconds is None else f" in {ran.seconds:.3f} s"
     facts = {"project": project, "outcome": ran.outcome.value, "seconds": ran.seconds, "why": ran.why}
     run.show(facts, f"project {project} {ran.outcome.value}{took}: {ran.why}\nestimate: {ran.predicted}")
@@ -270,11 +241,13 @@ def _far(program: Program) -> str:
     return f"which turns by up to {units.show(angle, 'position')}" if angle > consent.FAR else ""
 
 
-def _event_text(event: Estimated | InputChanged) -> str:
-    if isinstance(event, InputChanged):
-        return f"input {event.port} {WORDS[event.active]}"
-    share = "" if event.fraction is None else f", {100 * event.fraction:.0f} %"
-    return f"estimated: {event.seconds:.2f} s{share}"
+def _report(output: Output, bar: Bar, event: object) -> None:
+    """Show the progress of a run, and changes of inputs."""
+    if isinstance(event, Progress):
+        bar.advance(event.done, event.total, event.what)
+    elif isinstance(event, InputChanged):
+        output.document("motorbus.stepper.input/1", event._asdict())
+        output.text(f"{event.at:.3f} s: input {event.port} {WORDS[event.active]}")
 
 
 # -- inputs and outputs --------------------------------------------------------------------------------
@@ -282,10 +255,9 @@ def _event_text(event: Estimated | InputChanged) -> str:
 
 @command(
     "io BUS [PORT=LEVEL...]",
-    "Without PORT=LEVEL it reads the inputs, each by two equal readings. Outputs cannot be\n"
-    "read; what is connected to one may move.",
+    "Without PORT=LEVEL it reads the inputs, each by two equal readings; `motorbus monitor`\n"
+    "watches them. Outputs cannot be read; what is connected to one may move.",
     "io stepper:/dev/ttyUSB0",
-    "io stepper:/dev/ttyUSB0 --seconds 30",
     "io stepper:sim 1=on leds=off",
     consent="",
 )
@@ -293,40 +265,19 @@ def io(
     run: Run,
     /,
     *levels: Annotated[str, Parameter(name="PORT=LEVEL", help="1, 2, 3, all or leds; on or off.")],
-    seconds: Annotated[str, Parameter(help="Watch the inputs for a time, as 30s.")] = "",
 ) -> Exit:
-    """Read or watch the inputs, or set outputs."""
+    """Read the inputs, or set outputs."""
     wanted = [_level(text) for text in levels]
-    if wanted:
 
-        def set_all(one: Controller) -> dict[int, bool | None]:
-            for port, active in wanted:
-                one.set_output(port, active)
-            return dict(one.last_commanded)
+    def set_all(one: Controller) -> dict[int, bool | None]:
+        for port, active in wanted:
+            one.set_output(port, active)
+        return dict(one.last_commanded)
 
-        commanded = run.write(set_all)
-        shown = {
-            ("leds" if port == LEDS else f"output {port}"): WORDS[one] for port, one in commanded.items()
-        }
-        return run.show({"last_commanded": {str(port): one for port, one in commanded.items()}}, **shown)
-    if not seconds:
-        active = run.read(lambda one: one.inputs())
-        return run.show({"inputs": {str(n): one for n, one in active.items()}}, **_inputs(active))
-
-    def report(event: object) -> None:
-        if isinstance(event, InputChanged):
-            run.output.document("motorbus.stepper.event/1", event._asdict())
-            run.output.text(f"{event.at:.3f} s: {_event_text(event)}")
-
-    with target.opened(run.bus, run.options, run.output) as bus:
-        procedure = Controller.watch_inputs.function(Controller(bus), seconds=units.parse(seconds, "time"))
-        watched = bus.run(procedure, report=report)
-    facts = {"inputs": {str(n): one for n, one in watched.levels.items()}, "rate": watched.rate}
-    return run.show(facts, f"{len(watched.changes)} changes; {watched.rate:.1f} readings per second")
-
-
-def _inputs(levels: Mapping[int, bool]) -> dict[str, str]:
-    return {f"input {port}": WORDS[active] for port, active in levels.items()}
+    name = "last_commanded" if wanted else "inputs"
+    found = run.write(set_all) if wanted else run.read(lambda one: one.inputs())
+    shown = {f"{'output' if wanted else 'input'} {port}": WORDS[active] for port, active in found.items()}
+    return run.show({name: {str(port): active for port, active in found.items()}}, **shown)
 
 
 def _level(text: str) -> tuple[int, bool]:
@@ -334,13 +285,6 @@ def _level(text: str) -> tuple[int, bool]:
     if port not in PORTS or level not in LEVELS:
         raise RequestError(f"{text} is no PORT=LEVEL", expected="1, 2, 3, all or leds, = on or off")
     return PORTS[port], LEVELS[level]
-
-
-def _whole(text: str, name: str) -> int:
-    try:
-        return units.whole(text)
-    except ValueError:
-        raise RequestError(f"{name} {text!r} is not a number", expected=f"1 to {INPUTS}") from None
 
 
 # -- what the commands of all families use of this family ----------------------------------------------

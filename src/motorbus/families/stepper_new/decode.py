@@ -6,17 +6,8 @@ from motorbus.core.decode import Fields, counted
 from motorbus.core.family import Explanation
 from motorbus.core.recording import RecordedFrame
 from motorbus.errors import RequestError
-from motorbus.families.stepper_new import protocol
-from motorbus.families.stepper_new.parameters import (
-    ALL_OUTPUTS,
-    LEDS,
-    PARAMETERS,
-    ROW_LENGTH,
-    TABLE,
-    Order,
-    check_project,
-    decode_image,
-)
+from motorbus.families.stepper_new import parameters, protocol
+from motorbus.families.stepper_new.parameters import PARAMETERS, ROW_LENGTH, TABLE, Order
 from motorbus.families.stepper_new.protocol import REPLY_LENGTH, Command
 from motorbus.families.stepper_new.recording import Recording
 
@@ -130,8 +121,8 @@ def _image(fields: Fields, order: Order, number: int) -> str:
         else:
             fields.take(row.size, name, _meaning(name, int.from_bytes(image[row.address : at], order)))
     fields.take_rest("reserved", _reserved(image[at:]))
-    project = decode_image(image, order)
-    faults = [] if project.is_cleared else check_project(project, expert=True)
+    project = parameters.decode_image(image, order)
+    faults = [] if project.is_cleared else parameters.check_project(project, expert=True)
     if project.number != number and not project.is_cleared:
         return f"the reply names project {number} and its image {project.number}"
     return f"{faults[0].summary} ({faults[0].expected})" if faults else ""
@@ -144,7 +135,9 @@ def _reserved(data: bytes) -> str:
 def _meaning(name: str, raw: int, command: Command | None = None) -> str:
     """A number in words; the ports of outputs differ from those of inputs."""
     if name == "port" and command and command.name == "set_output":
-        return {ALL_OUTPUTS: f"{raw} (all outputs)", LEDS: f"{raw} (both LEDs)"}.get(raw, str(raw))
+        return {parameters.ALL_OUTPUTS: f"{raw} (all outputs)", parameters.LEDS: f"{raw} (both LEDs)"}.get(
+            raw, str(raw)
+        )
     name = name if name in PARAMETERS else name.split("_", 2)[2]
     if name == "step_angle":
         return f"{raw / 100:g}° ({raw})"

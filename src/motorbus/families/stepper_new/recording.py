@@ -7,14 +7,7 @@ from typing import Any, Final
 from motorbus.core.recording import RecordedEvent, RecordedFrame
 from motorbus.core.request import Noise
 from motorbus.families.stepper_new import protocol
-from motorbus.families.stepper_new.protocol import (
-    DUMP_LENGTH,
-    HEADER,
-    NOTICE,
-    READ_PROJECT,
-    REPLY_LENGTH,
-    REQUEST_LENGTH,
-)
+from motorbus.families.stepper_new.protocol import DUMP_LENGTH, HEADER, NOTICE, REPLY_LENGTH, REQUEST_LENGTH
 
 
 class Recording:
@@ -74,7 +67,7 @@ class Recording:
         if self._direction != "rx" and protocol.is_request(head):
             return REQUEST_LENGTH, "request"
         is_reply = self._direction != "tx" and len(head) >= REPLY_LENGTH and protocol.is_reply(head)
-        if is_reply and head[2] == READ_PROJECT:
+        if is_reply and head[2] == protocol.READ_PROJECT:
             return DUMP_LENGTH, "reply"
         rest = head[REPLY_LENGTH:] if is_reply else head[2:]
         if self._direction != "rx" and len(head) == REQUEST_LENGTH and not _starts_in(rest):

@@ -13,20 +13,11 @@ from functools import partial
 from math import inf
 from typing import Final, NamedTuple
 
+from motorbus.families.stepper_new import parameters
 from motorbus.families.stepper_new.execution import ramp, sequence
 from motorbus.families.stepper_new.execution.ramp import Motion
 from motorbus.families.stepper_new.execution.sequence import Place
-from motorbus.families.stepper_new.parameters import (
-    HOME_INPUT,
-    IMMEDIATE,
-    LEDS,
-    START_INPUT,
-    STOP_INPUT,
-    Project,
-    Step,
-    outputs_after_port,
-    outputs_after_step,
-)
+from motorbus.families.stepper_new.parameters import HOME_INPUT, START_INPUT, STOP_INPUT, Project, Step
 
 FIRST: Final = Place(1)
 EMPTY_PASS: Final = 0.001  # s of a pass of an endless project in which nothing takes time, assumption
@@ -207,9 +198,9 @@ class Machine:
     def set_output(self, port: int, level: int, at: float) -> None:
         """Switch outputs (1 to 3, 4 for all) or the LEDs (5), at any time."""
         self.advance(at)
-        if port == LEDS:
+        if port == parameters.LEDS:
             self.leds = bool(level)
-        self.outputs = outputs_after_port(self.outputs, port, level)
+        self.outputs = parameters.outputs_after_port(self.outputs, port, level)
 
     def set_input(self, port: int, active: bool, at: float, *, start: Project | None = None) -> None:
         """Set an input, 1 to 5; `start` is the project that input 3 starts."""
@@ -250,7 +241,7 @@ class Machine:
         slow = self.motion.slowing(self._now - self.since) if self.motion else None
         if self.phase is Phase.SLOWING:
             return
-        if slow is None or self.stop_mode == IMMEDIATE:
+        if slow is None or self.stop_mode == parameters.IMMEDIATE:
             self._rest()
             then()
         else:
@@ -299,7 +290,7 @@ class Machine:
         """Outputs and motor at the same moment."""
         run = self._running()
         project, step = run.project, run.step
-        self.outputs = outputs_after_step(self.outputs, step.output)
+        self.outputs = parameters.outputs_after_step(self.outputs, step.output)
         pulses = ramp.pulses_of(project, step)
         self._go(Phase.MOVE, ramp.motion(ramp.ramp_of(project, step), pulses, step.sign, self.tick_ms))
         self._happen("begins")

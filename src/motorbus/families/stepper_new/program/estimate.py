@@ -34,23 +34,13 @@ class Estimate(Struct, frozen=True, kw_only=True):
 
     def __str__(self) -> str:
         waits = f" + {self.waits} wait{'s' * (self.waits > 1)}" if self.waits else ""
-        text = f"at least {show_duration(self.seconds)}{waits}" + " for each pass, endless" * self.endless
-        if show_duration(self.low) != show_duration(self.high):
-            text += f"; {show_duration(self.low)} to {show_duration(self.high)} in other readings of the acceleration"
+        text = f"at least {self.seconds:.1f} s{waits}" + " for each pass, endless" * self.endless
+        band = f"{self.low:.1f} s to {self.high:.1f} s"
+        text += f"; {band} in other readings of the acceleration" * (self.low < self.high)
         if self.cuts:
             times = "once" if self.cuts == 1 else f"{self.cuts} times"
             text += f"; less where a stop input ends a step early, {times} at most"
         return text
-
-
-def show_duration(seconds: float) -> str:
-    """`41.6 s`, `4 min 12 s`, `2 h 5 min`."""
-    if seconds < 99.95:
-        return f"{seconds:.1f} s"
-    minutes, rest = divmod(round(seconds), 60)
-    if minutes < 60:
-        return f"{minutes} min {rest} s"
-    return f"{minutes // 60} h {minutes % 60} min"
 
 
 def estimate(project: Project) -> Estimate:

@@ -19,20 +19,8 @@ from msgspec import Meta, Struct
 
 from motorbus.core.register import shown
 from motorbus.errors import RequestError
-from motorbus.families.stepper_new.parameters import (
-    ENDLESS,
-    INPUTS,
-    OUTPUTS,
-    PARAMETERS,
-    STEPS,
-    Order,
-    Project,
-    Step,
-    check_project,
-    check_value,
-    decode_image,
-    with_steps,
-)
+from motorbus.families.stepper_new import parameters
+from motorbus.families.stepper_new.parameters import ENDLESS, INPUTS, PARAMETERS, STEPS, Order, Project, Step
 from motorbus.families.stepper_new.program.estimate import Estimate, estimate
 from motorbus.families.stepper_new.program.lint import Finding, lint
 from motorbus.families.stepper_new.protocol import DUMP_LENGTH, HEADER, READ_PROJECT, REPLY_LENGTH
@@ -82,12 +70,11 @@ def _range(name: str) -> Meta:
 
 
 class MotorTable(Struct, kw_only=True, forbid_unknown_fields=True):
-    """The motor, with `unit` (of distances) or `turn_distance` (units per turn)."""
+    """The motor; `turn_distance` are user units per turn, `lead` is the travel of one turn."""
 
     microsteps: Annotated[int, _range("microsteps")]
     step_angle: Quantity
-    turn_distance: Annotated[int, _range("turn_distance")] | None = None
-    unit: str | None = None
+    turn_distance: Annotated[int, _range("turn_distance")]
     lead: Quantity | None = None
     stop: Literal["slow", "immediate"] = "slow"
     mode4: Annotated[int, _range("mode4")] = 0
@@ -126,7 +113,7 @@ class ProgramFile(Struct, kw_only=True, forbid_unknown_fields=True):
     motor: MotorTable
     loop: LoopTable | None = None
     inputs: dict[str, Annotated[int, Meta(ge=1, le=INPUTS)]] = {}
-    outputs: dict[str, Annotated[int, Meta(ge=1, le=OUTPUTS)]] = {}
+    outputs: dict[str, Annotated[int, Meta(ge=1, le=parameters.OUTPUTS)]] = {}
     step: Annotated[list[StepTable], Meta(min_length=1, max_length=STEPS)]
 
 
@@ -162,8 +149,8 @@ class Program:
             base = replace(base, loop_first=loop.first, loop_last=loop.last, loop_count=loop.count)
         steps = tuple(_step(entry, number, file, base, lead) for number, entry in enumerate(file.step, 1))
         return cls(
-            project=with_steps(base, steps), name=file.name, inputs=file.inputs, outputs=file.outputs, lead=lead,
-            expert=file.expert,
+            project=parameters.with_steps(base, steps), name=file.name, inputs=file.inputs,
+            outputs=file.outputs, lead=lead, expert=file.expert,
         )  # fmt: skip
 
     @classmethod
@@ -179,11 +166,13 @@ class Program:
             raise RequestError(
                 "no dump of a project", received=data[:12], expected="226 bytes that begin with FF AA 3E"
             )
-        return cls(project=replace(decode_image(data[REPLY_LENGTH:], order), number=data[3]), name=name)
+        return cls(
+            project=replace(parameters.decode_image(data[REPLY_LENGTH:], order), number=data[3]), name=name
+        )
 
     def text(self) -> str:
         """The file. Raises RequestError for numbers that no file may hold, as those of a cleared project."""
-        for error in check_project(self.project, expert=True):
+        for error in parameters.check_project(self.project, expert=True):
             raise error
         return "\n".join(_lines(self)) + "\n"
 
@@ -244,44 +233,21 @@ def _motor(table: MotorTable) -> tuple[Project, Fraction | None]:
         lead = table.lead.number * _LENGTH.get(table.lead.unit, Fraction(0))
         if lead <= 0:
             raise _wrong(f"motor, lead: {shown(table.lead.text)} is no length", "a length as 5 mm")
-    if (table.turn_distance is None) is (table.unit is None):
-        raise _wrong(
-            "motor: turn_distance or unit is needed, one of them", 'unit = "pulse", "turn" or "0.01 deg"'
-        )
     base = Project(
         microsteps=table.microsteps,
         step_angle=_whole(table.step_angle, {"deg": Fraction(100)}, "step_angle", "motor, step_angle"),
+        turn_distance=table.turn_distance,
         stop_mode=("slow", "immediate").index(table.stop),
         mode4=table.mode4,
         power_on_home=int(table.home_at_power_on),
     )
-    turn = table.turn_distance or _turn_distance(table.unit or "", base, lead)
-    return replace(base, turn_distance=turn), lead
-
-
-def _turn_distance(unit: str, base: Project, lead: Fraction | None) -> int:
-    """User units per turn, by the size of one unit."""
-    words = {"pulse": "1 pulse", "turn": "1 turn"}
-    try:
-        size = Quantity(words.get(unit, unit))
-    except ValueError as error:
-        raise _wrong(f"motor, unit: {error}", 'pulse, turn, "0.01 deg", with a lead "0.001 mm"') from None
-    turns = _distances(replace(base, turn_distance=1), lead)  # of one unit, in turns
-    each = turns.get(size.unit, Fraction(0)) * size.number
-    if size.unit == "units" or each <= 0:
-        raise _wrong(f"motor, unit: {shown(unit)} is no unit of distance", _one_of(turns))
-    return _count(1 / each, "turn_distance", f"motor, unit: {shown(unit)}", "units per turn", Fraction(1))
+    return base, lead
 
 
 def _distances(project: Project, lead: Fraction | None) -> dict[str, Fraction]:
     """User units in one of each unit of distance."""
-    turn, pulses = project.turn_distance, project.pulses_per_turn or Fraction(1)
-    each = {
-        "units": Fraction(1),
-        "pulses": turn / pulses,
-        "turns": Fraction(turn),
-        "deg": Fraction(turn, 360),
-    }
+    turn, pulses = Fraction(project.turn_distance), project.pulses_per_turn or Fraction(1)
+    each = {"units": Fraction(1), "pulses": turn / pulses, "turns": turn, "deg": turn / 360}
     return each | ({unit: size * turn / lead for unit, size in _LENGTH.items()} if lead else {})
 
 
@@ -319,20 +285,15 @@ def _whole(said: Quantity | None, each: _Each, name: str, where: str, *, is_sign
         raise _wrong(f"{where} has no unit that is possible here", _one_of(each))
     if said.is_negative and not is_signed:
         raise _wrong(f"{where} is negative", _one_of(each))
-    return _count(abs(said.number) * each[said.unit], name, where, said.unit, each[said.unit])
-
-
-def _count(raw: Fraction, name: str, where: str, unit: str, each: Fraction) -> int:
-    row = PARAMETERS[name]
+    raw, row = abs(said.number) * each[said.unit], PARAMETERS[name]
+    low, high, below, above = (
+        f"{float(count / each[said.unit]):.10g}" for count in (row.low, row.high, floor(raw), ceil(raw))
+    )
     if not row.low <= raw <= row.high:
-        limits = " to ".join(f"{float(limit / each):.10g}" for limit in (row.low, row.high))
-        raise _wrong(f"{where} is not possible", f"{limits} {unit} (raw {row.low} to {row.high})")
+        raise _wrong(f"{where} is not possible", f"{low} to {high} {said.unit} (raw {row.low} to {row.high})")
     if raw.denominator != 1:
-        below, above = (f"{float(near / each):.10g}" for near in (floor(raw), ceil(raw)))
-        raise _wrong(
-            f"{where} is {float(raw):.12g}, and the controller counts whole numbers",
-            f"{below} or {above} {unit}",
-        )
+        fault = f"{where} is {float(raw):.12g}, and the controller counts whole numbers"
+        raise _wrong(fault, f"{below} or {above} {said.unit}")
     return int(raw)
 
 
@@ -340,7 +301,7 @@ def _input(said: int | str, file: ProgramFile, where: str) -> int:
     words = file.inputs | {"none": 0} | {f"input {number}": number for number in range(1, INPUTS + 1)}
     number = said if isinstance(said, int) else words.get(said.strip(), -1)
     try:
-        check_value("start_input", number, expert=file.expert)
+        parameters.check_value("start_input", number, expert=file.expert)
     except RequestError as error:
         hint = "; 3 and 4 with expert = true" if number in (3, 4) else ""
         raise _wrong(

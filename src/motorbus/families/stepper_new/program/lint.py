@@ -7,15 +7,9 @@ from typing import Final, Literal, TypeAlias
 
 from msgspec import Struct
 
+from motorbus.families.stepper_new import parameters
 from motorbus.families.stepper_new.execution import ramp, sequence
-from motorbus.families.stepper_new.parameters import (
-    HOME_INPUT,
-    PARAMETERS,
-    STEP_INPUTS,
-    Project,
-    Step,
-    outputs_after_step,
-)
+from motorbus.families.stepper_new.parameters import PARAMETERS, Project, Step
 from motorbus.families.stepper_new.program.estimate import net_units, numbers
 
 Level: TypeAlias = Literal["error", "warning", "note"]
@@ -63,20 +57,13 @@ class Finding(Struct, frozen=True):
         return f"{self.rule} {self.level}: {where}{self.text} ({RULES[self.rule][1]})"
 
 
-def lint(
-    project: Project,
-    *,
-    highest: float = 100_000.0,
-    homing: bool = False,
-    unattended: bool = False,
-) -> list[Finding]:
+def lint(project: Project, *, highest: float = 100_000.0, unattended: bool = False) -> list[Finding]:
     """All findings: those of the project first, then by step.
 
-    `highest` is the frequency (Hz) that the motor driver follows, `homing` that input 5 is used for homing,
-    `unattended` that no operator can press a button.
+    `highest` is the frequency (Hz) that the motor driver follows, `unattended` that no operator can press a button.
     """
     found = [Finding(rule, 0, text) for rule, text in _of_project(project)]
-    homing = homing or bool(project.power_on_home)
+    homing = bool(project.power_on_home)
     for number in numbers(project):
         step = project.step(number)
         rules = [*_motion(project, step, number, highest), *_pauses(step), *_inputs(step, homing, unattended)]
@@ -104,7 +91,7 @@ def _of_project(project: Project) -> _Found:
         yield "L11", f"{net:+d} units in each pass{total}"
     outputs = 0
     for step in project.used:
-        outputs = outputs_after_step(outputs, step.output)
+        outputs = parameters.outputs_after_step(outputs, step.output)
     if outputs:
         yield "L15", f"output {', '.join(str(n) for n in (1, 2, 3) if outputs >> n - 1 & 1)}"
     if project.number == 1:
@@ -157,9 +144,9 @@ def _pauses(step: Step) -> _Found:
 
 def _inputs(step: Step, homing: bool, unattended: bool) -> _Found:
     for port in (step.start_input, step.stop_input):
-        if port and port not in STEP_INPUTS:
+        if port and port not in parameters.STEP_INPUTS:
             yield "L12", f"input {port}"
-    if homing and HOME_INPUT in (step.start_input, step.stop_input):
+    if homing and parameters.HOME_INPUT in (step.start_input, step.stop_input):
         yield "L13", "input 5"
     if step.start_input and step.start_input == step.stop_input:
         yield "L14", f"input {step.start_input}"
