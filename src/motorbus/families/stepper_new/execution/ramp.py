@@ -45,51 +45,49 @@ def pulses_of(project: Project, step: Step) -> int:
     return floor(step.distance * (project.pulses_per_unit or Fraction(0))) if step.speed else 0
 
 
+class Piece(NamedTuple):
+    """A part of a move: its first frequency (Hz), the slope (Hz/s) and the duration (s)."""
+
+    start: float
+    slope: float
+    duration: float
+
+
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """A move of so many pulses (None: endless) from time 0; `sign` is 1 forward, -1 in reverse.
-
-    It rises from `start` to `peak` (Hz) by `rate` (Hz/s), is steady for `steady` s, then falls to `start`.
-    """
+    """A move of so many pulses (None: endless) from time 0; `sign` is 1 forward, -1 in reverse."""
 
     sign: int
     pulses: int | None
-    start: float
-    peak: float
-    rate: float
-    rises: bool
-    steady: float
-    falls: bool
-
-    @property
-    def ramp(self) -> float:
-        """Duration (s) of one ramp."""
-        return (self.peak - self.start) / self.rate if self.rate else 0.0
+    pieces: tuple[Piece, ...]
 
     @property
     def duration(self) -> float:
         """In s; infinite for an endless move."""
-        return self.ramp * (self.rises + self.falls) + self.steady
+        return sum(piece.duration for piece in self.pieces)
+
+    @property
+    def peak(self) -> float:
+        """The highest frequency in Hz."""
+        return max((one.start + max(0.0, one.slope * one.duration) for one in self.pieces), default=0.0)
 
     def frequency(self, at: float) -> float:
         """In Hz at this moment; 0 before the beginning and after the end."""
-        if not 0 <= at < self.duration:
-            return 0.0
-        rise = self.ramp if self.rises else 0.0
-        if at < rise:
-            return self.start + self.rate * at
-        return self.peak - self.rate * max(0.0, at - rise - self.steady)
+        for start, slope, duration in self.pieces if at >= 0 else ():
+            if at < duration:
+                return start + slope * at
+            at -= duration
+        return 0.0
 
     def done(self, at: float) -> int:
         """Pulses until this moment."""
         if self.pulses is not None and at >= self.duration:
             return self.pulses
-        rise = self.ramp if self.rises else 0.0
-        up = max(0.0, min(at, rise))
-        even = max(0.0, min(at - rise, self.steady))
-        down = max(0.0, at - rise - self.steady)
-        found = self.start * up + self.rate * up * up / 2
-        found += self.peak * (even + down) - self.rate * down * down / 2
+        found = 0.0
+        for start, slope, duration in self.pieces:
+            time = max(0.0, min(at, duration))
+            found += start * time + slope * time * time / 2
+            at -= time
         whole = floor(found + _NOISE * max(1.0, found))
         return whole if self.pulses is None else min(whole, self.pulses)
 
@@ -97,7 +95,7 @@ class Motion:
         """When so many pulses are done (s); infinite for more than there are."""
         if pulses <= 0:
             return 0.0
-        if not self.peak or (self.pulses is not None and pulses > self.pulses):
+        if not self.pieces or (self.pulses is not None and pulses > self.pulses):
             return inf
         low, high = 0.0, 1.0 if self.pulses is None else self.duration
         while self.done(high) < pulses:
@@ -110,27 +108,30 @@ class Motion:
     def slowing(self, at: float) -> Motion | None:
         """The motion of a slow stop at this moment, down to the start frequency; None if it ends at once."""
         now = self.frequency(at)
+        start, rate, _ = self.pieces[0] if self.pieces else Piece(0.0, 0.0, 0.0)
         left = inf if self.pulses is None else self.pulses - self.done(at)
-        if not self.rate or now <= self.start or left <= 0:
+        if rate <= 0 or now <= start or left <= 0:
             return None
-        pulses = floor((now * now - self.start * self.start) / (2 * self.rate))
-        return Motion(self.sign, int(min(pulses, left)), self.start, now, self.rate, False, 0.0, True)
+        pulses = min(floor((now * now - start * start) / (2 * rate)), left)
+        return Motion(self.sign, int(pulses), (Piece(now, -rate, (now - start) / rate),))
 
 
 def motion(ramp: Ramp, pulses: int | None, sign: int, tick_ms: float = TICK_MS) -> Motion:
     """The move of so many pulses; None: endless."""
     start, run, _ = ramp
     if pulses == 0 or run <= 0:
-        return Motion(sign, 0, start, 0.0, 0.0, False, 0.0, False)
+        return Motion(sign, 0, ())
     rate = ramp.rate(tick_ms) if run > start else 0.0
     if not rate:
-        return Motion(sign, pulses, run, run, 0.0, False, inf if pulses is None else pulses / run, False)
+        return Motion(sign, pulses, (Piece(run, 0.0, inf if pulses is None else pulses / run),))
     if pulses is None:
-        return Motion(sign, None, start, run, rate, True, inf, False)
-    on_ramps = (run * run - start * start) / rate
-    if on_ramps <= pulses:
-        return Motion(sign, pulses, start, run, rate, True, (pulses - on_ramps) / run, True)
-    return Motion(sign, pulses, start, sqrt(start * start + rate * pulses), rate, True, 0.0, True)
+        return Motion(sign, None, (Piece(start, rate, (run - start) / rate), Piece(run, 0.0, inf)))
+    peak = min(run, sqrt(start * start + rate * pulses))
+    time = (peak - start) / rate
+    steady = max(0.0, (pulses - (run * run - start * start) / rate) / run)
+    return Motion(
+        sign, pulses, (Piece(start, rate, time), Piece(peak, 0.0, steady), Piece(peak, -rate, time))
+    )
 
 
 # -- bounds over the readings ----------------------------------------------------------------------------------------
