@@ -155,13 +155,10 @@ _BY_CODE: Final = {command.code: command for command in _ALL}
 
 
 def command_at(data: bytes) -> Command | None:
-    """The command that bytes 2 and 3 of a request or a reply name; None if none.
-
-    That every motor number takes the commands of motor 3 is an assumption.
-    """
+    """The command that bytes 2 and 3 of a request or a reply name; None if none."""
     if data[2] & 0x0F == 0x0E:
         return _BY_CODE.get((data[2],))
-    return _BY_CODE.get((MOTOR if data[2] else 0, data[3]))
+    return _BY_CODE.get((MOTOR if data[2] else 0, data[3]))  # every motor has these commands # assumption
 
 
 # -- requests --------------------------------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from motorbus.families.stepper_new.execution.sequence import Place
 from motorbus.families.stepper_new.parameters import HOME_INPUT, START_INPUT, STOP_INPUT, Project, Step
 
 FIRST: Final = Place(1)
-EMPTY_PASS: Final = 0.001  # s of a pass of an endless project in which nothing takes time, assumption
+EMPTY_PASS: Final = 0.001  # s of a pass of an endless project in which nothing takes time # assumption
 
 
 class Phase(Enum):
@@ -131,27 +131,25 @@ class Machine:
         self.outputs, self.leds, self.is_homed = 0, False, False
 
     def start(self, project: Project, at: float, *, by_command: bool = True) -> bool:
-        """Start a project. False if it is busy; then the start is ignored, assumption."""
+        """Start a project. False if it is busy."""
         if not self._is_free(at):
             return False
-        self.stop_mode = project.stop_mode  # assumption: of each project
+        self.stop_mode = project.stop_mode  # the stop mode belongs to each project # assumption
         self.run = Run(project, by_command, self._now)
         if sequence.last_step(project):
             self._begin_step()
         else:
-            self._finish("ended")  # assumption: at once, with a notice
+            self._finish("ended")  # a project without steps ends at once, with a notice # assumption
         self.advance(at)
         return True
 
     def jog(self, project: Project, sign: int, at: float) -> bool:
-        """Turn until stopped with the speed of step 1 of this project; False if it is busy.
-
-        The opposite jog command stops and reverses, assumption.
-        """
+        """Turn until stopped with the speed of step 1 of this project; False if it is busy."""
         is_free = self._is_free(at)
         if is_free:
             self._move_by_hand(Phase.JOG, project, None, sign)
         elif self.phase is Phase.JOG and self.motion and self.motion.sign != sign:
+            # the opposite jog command stops and reverses # assumption
             self._stop(partial(self._move_by_hand, Phase.JOG, project, None, sign))
         else:
             return False
@@ -182,15 +180,15 @@ class Machine:
         return True
 
     def stop_project(self, at: float) -> None:
-        """Stop the project; a manual motion continues, assumption."""
+        """Stop the project."""
         self.advance(at)
-        if self.run is not None:
+        if self.run is not None:  # stop project leaves a manual motion alone # assumption
             self._stop(partial(self._finish, "stopped"))
             self.advance(at)
 
     def stop_motor(self, at: float) -> None:
-        """Stop the motor; it ends the project, assumption."""
-        self.stop_project(at)
+        """Stop the motor."""
+        self.stop_project(at)  # stop motor ends the project too # assumption
         if self.is_busy and self.run is None:
             self._stop(self._end_manual)
             self.advance(at)
@@ -210,7 +208,7 @@ class Machine:
         if not rises:
             return
         if port == HOME_INPUT and self.phase is Phase.HOMING:
-            self._rest()
+            self._rest()  # homing ends at once in every stop mode # assumption
             self.base, self.is_homed = 0, True
             self._happen("homed")
             self._end_manual()
@@ -249,7 +247,7 @@ class Machine:
 
     def _is_free(self, at: float) -> bool:
         self.advance(at)
-        return self.phase is Phase.IDLE
+        return self.phase is Phase.IDLE  # a busy controller acknowledges and ignores a start # assumption
 
     def _move_by_hand(self, phase: Phase, project: Project, pulses: int | None, sign: int) -> None:
         self.stop_mode = project.stop_mode
@@ -280,7 +278,7 @@ class Machine:
 
     def _begin_step(self) -> None:
         port = self._running().step.start_input
-        if port and port not in self.inputs:  # assumption: an input that is active already starts it
+        if port and port not in self.inputs:  # an active input starts a step at once # assumption
             self._rest(Phase.WAIT)
             self._happen("waits")
         else:
@@ -319,12 +317,12 @@ class Machine:
         self._begin_step()
 
     def _finish(self, kind: str) -> None:
-        """The project has ended; its outputs stay, assumption. The notice follows a natural end of a command."""
+        """The project has ended. The notice follows a natural end of one that a command started."""
         self._happen(kind)
         self._rest()
         if kind == "ended" and self._running().by_command:
             self._happen("completed")
-        self.run = None
+        self.run = None  # the outputs stay as they are at its end # assumption
 
     def _happen(self, kind: str) -> None:
         self.events.append(Happening(self._now, kind, self.run.place.step if self.run else 0))

@@ -1,9 +1,7 @@
 """One move: up from the start frequency, steady at the running frequency, and down again.
 
-The manual gives the acceleration in Hz and does not say per what. Here the frequency grows by it in every tick of time,
-1 ms by default; `slowest` also bounds the other readings. Assumptions: the move is symmetric; it is steady where the
-running frequency is not above the start frequency or the acceleration is 0; a start frequency of 0 is taken for 1 Hz; a
-move at speed 0 does not begin; pulses that are not whole are cut off; a distance of 0 does not move.
+The manual gives the acceleration in Hz and does not say per what. Here the frequency grows by it in every tick
+of time, 1 ms by default; `slowest` also bounds the other readings. A move at speed 0 does not begin.
 """
 
 from __future__ import annotations
@@ -15,7 +13,7 @@ from typing import Final, NamedTuple
 
 from motorbus.families.stepper_new.parameters import IMMEDIATE, Project, Step
 
-TICK_MS: Final = 1.0
+TICK_MS: Final = 1.0  # ms in which the frequency grows by the acceleration # assumption
 READINGS: Final = {"per pulse": 0.0, "per 1 ms": 1.0, "per 10 ms": 10.0}
 """Readings of the acceleration: ticks in ms, 0 for per pulse. The manual's example takes 0.82, 0.69 or 1.43 s."""
 _NOISE: Final = 1e-9  # relative, of a pulse that is just due
@@ -37,12 +35,13 @@ class Ramp(NamedTuple):
 def ramp_of(project: Project, step: Step) -> Ramp:
     """The ramp of a step; `run` is 0 for a step that does not move."""
     run = step.speed * (project.pulses_per_turn or Fraction(0)) / 60
-    return Ramp(step.start_frequency or 1.0, float(run), step.acceleration)
+    return Ramp(step.start_frequency or 1.0, float(run), step.acceleration)  # start 0 is 1 Hz # assumption
 
 
 def pulses_of(project: Project, step: Step) -> int:
     """The pulses that a step sends; 0 at speed 0."""
-    return floor(step.distance * (project.pulses_per_unit or Fraction(0))) if step.speed else 0
+    exact = step.distance * (project.pulses_per_unit or Fraction(0))
+    return floor(exact) if step.speed else 0  # the part of a pulse is cut off # assumption
 
 
 class Piece(NamedTuple):
@@ -122,16 +121,15 @@ def motion(ramp: Ramp, pulses: int | None, sign: int, tick_ms: float = TICK_MS) 
     if pulses == 0 or run <= 0:
         return Motion(sign, 0, ())
     rate = ramp.rate(tick_ms) if run > start else 0.0
-    if not rate:
+    if not rate:  # no ramp if the start frequency is not below the running frequency # assumption
         return Motion(sign, pulses, (Piece(run, 0.0, inf if pulses is None else pulses / run),))
     if pulses is None:
         return Motion(sign, None, (Piece(start, rate, (run - start) / rate), Piece(run, 0.0, inf)))
     peak = min(run, sqrt(start * start + rate * pulses))
     time = (peak - start) / rate
     steady = max(0.0, (pulses - (run * run - start * start) / rate) / run)
-    return Motion(
-        sign, pulses, (Piece(start, rate, time), Piece(peak, 0.0, steady), Piece(peak, -rate, time))
-    )
+    down = Piece(peak, -rate, time)  # the ramp down is as steep as the ramp up # assumption
+    return Motion(sign, pulses, (Piece(start, rate, time), Piece(peak, 0.0, steady), down))
 
 
 # -- bounds over the readings ----------------------------------------------------------------------------------------

@@ -1,7 +1,6 @@
 """The order of the steps of a project, and how often it runs.
 
-After the last step of the step loop follows its first, as often as the loop counts; the loop begins anew in each pass
-of the project. Assumptions: both counts are totals, and a project loop of 0 or 1 runs once.
+After the last step of the step loop follows its first, as often as the loop counts.
 """
 
 from __future__ import annotations
@@ -28,14 +27,16 @@ def last_step(project: Project) -> int:
 
 def passes(project: Project) -> int | None:
     """How often the project runs; None: until it is stopped."""
-    return None if project.is_endless else max(1, project.project_loop)
+    return (
+        None if project.is_endless else max(1, project.project_loop)
+    )  # counts are totals, 0 is 1 # assumption
 
 
 def following(project: Project, place: Place) -> Place | None:
     """The next place in the same pass of the project; None at its end."""
     step, lap = place
     if project.has_loop and step == project.loop_last and lap < project.loop_count:
-        return Place(project.loop_first, lap + 1)
+        return Place(project.loop_first, lap + 1)  # the loop begins again in each pass # assumption
     if step >= last_step(project):
         return None
     return Place(step + 1, lap if step + 1 <= project.loop_last else 1)
