@@ -123,7 +123,7 @@ def test_supply_lost_during_the_motion_is_told(one: Bench) -> None:
 
 def test_controller_that_shows_what_is_stored_is_not_moved() -> None:
     with bench(MINE, read_view="stored") as one:
-        with pytest.raises(VerificationFailed, match="cannot be read back") as caught:
+        with pytest.raises(VerificationFailed, match="cannot be read") as caught:
             one.device.jog(*JOG)
         assert caught.value.unmoved
         assert not [frame for frame in one.sent() if frame.startswith("FF AA 03 0C")]

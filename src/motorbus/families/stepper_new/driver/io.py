@@ -145,5 +145,4 @@ def check_seconds(name: str, seconds: float, longest: float = 1e9) -> None:
         raise RequestError(
             f"{name} {shown(seconds)} is not possible",
             expected=f"s, above 0 and at most {longest:g}",
-            advice="nothing was sent",
         )

@@ -14,22 +14,13 @@ from typing import Any, Final, TypeVar
 
 from motorbus.core.steps import INTENT, OUTCOME, REACHED, Emit, Exclusive, Guard, JournalEntry, Sleep, catch
 from motorbus.errors import LinkError, MotorbusError, OutcomeUnknown, RequestError, VerificationFailed
+from motorbus.families.stepper_new import parameters
 from motorbus.families.stepper_new.driver.node import Node
 from motorbus.families.stepper_new.driver.projects import MANUAL, bring, cached, check_free, read_image
 from motorbus.families.stepper_new.driver.requests import STOPS
 from motorbus.families.stepper_new.driver.stop import RUN, Watch, close_run, end_motion, mark_unmoved
 from motorbus.families.stepper_new.execution.ramp import slowest_stop
-from motorbus.families.stepper_new.parameters import (
-    STEPS,
-    Project,
-    amended,
-    check_project,
-    checked_order,
-    decode_image,
-    differences,
-    encode_image,
-    values_of,
-)
+from motorbus.families.stepper_new.parameters import STEPS, Project, amended, differences, encode_image
 
 T = TypeVar("T")
 
@@ -69,8 +60,7 @@ class Loan(Guard):
         await self._begin()
         if not await bring(self.node, self.before, self.wanted):
             raise VerificationFailed(
-                "edits of project 1 cannot be read back, so nothing was moved",
-                cause="this controller shows what is stored while something else is edited",
+                "project 1 shows what is stored, so its edits cannot be read, and nothing was moved",
                 advice="write step 1 of project 1, save it, and call run_once()",
                 node=self.node.node,
             )
@@ -83,24 +73,18 @@ class Loan(Guard):
         if unsaved is not None and unsaved.number != MANUAL:
             raise RequestError(
                 f"{self.verb}() would lose the edits of project {unsaved.number} that are not saved",
-                advice=f"save({unsaved.number}) first; nothing was sent",
-                node=self.node.node,
+                advice=f"save({unsaved.number}) first",
             )
-        for error in check_project(replace(self.before, total_steps=STEPS), expert=True):
-            raise RequestError(
-                f"project 1 could not be given back: {error.summary}",
-                advice="write a valid project 1; nothing was sent",
-                node=self.node.node,
-            )
+        for error in parameters.check_project(replace(self.before, total_steps=STEPS), expert=True):
+            raise RequestError(f"project 1 could not be given back: {error.summary}", expected=error.expected)
 
     async def _begin(self) -> None:
-        changed = differences(self.before, self.wanted)
         facts: dict[str, object] = {
             "node": self.node.node,
             "motor": self.node.motor,
             "order": self.node.order,
             "image": encode_image(self.before, self.node.order).hex(),
-            "lent": {name: new for name, (_, new) in changed.items()},
+            "lent": {name: new for name, (_, new) in differences(self.before, self.wanted).items()},
             "what": f"the loan of project 1 to {self.verb}()",
         }
         self._is_open = True
@@ -163,7 +147,7 @@ async def lend(
 ) -> T:
     """Make a manual motion with project 1 as `change` makes it, then stop, then give project 1 back.
 
-    `prepare` runs before project 1 is read. `ends`: the motion ends by itself; else the motor decelerates after the
+    `prepare` runs after project 1 was read. `ends`: the motion ends by itself; else the motor decelerates after the
     stop, which is waited for. Nothing is edited where project 1 is so already. An error is `unmoved` if the motion
     request did not leave; `on_error` gets it, before project 1 is given back.
 
@@ -175,9 +159,9 @@ async def lend(
 
     async def work() -> T:
         await check_free(node, verb)
+        before = await cached(node, MANUAL)
         if prepare is not None:
             await prepare()
-        before = await cached(node, MANUAL)
         loan = Loan(watch, verb, before, change(before), on_error)
         async with loan:
             value = await motion(watch, loan.wanted)
@@ -186,8 +170,6 @@ async def lend(
             raise OutcomeUnknown(
                 f"{verb}() was cut short: the controller lost its supply, and the motor is at an unknown position",
                 cause="project 1 read as before the loan, though it was read back as lent",
-                advice="check the supply",
-                node=node.node,
             )
         return value
 
@@ -217,12 +199,11 @@ async def _recover(node: Node, change: str, before: Project, lent: Project, reac
     await end_motion(node, STOPS[::-1])
     shown = await read_image(node, MANUAL)
     if LENT in reached and RETURNING not in reached:
-        values, changed = values_of(shown), differences(before, lent)
+        values, changed = parameters.values_of(shown), differences(before, lent)
         if foreign := [name for name, pair in changed.items() if values[name] not in pair]:
             raise RequestError(
                 f"something else has written project 1 since: {', '.join(foreign)}",
-                advice="if it is right, `motorbus recover BUS --forget` ends the loan; nothing was edited",
-                node=node.node,
+                advice="if it is right, `motorbus recover BUS --forget` ends the loan",
             )
         before = amended(shown, {name: old for name, (old, _) in changed.items()})
     await Sleep(slowest_stop(replace(shown, total_steps=1)))
@@ -235,18 +216,15 @@ async def _recover(node: Node, change: str, before: Project, lent: Project, reac
 def _checked_facts(node: Node, change: str, facts: Mapping[str, Any]) -> tuple[Project, Project]:
     """Project 1 before the loan, and lent. Raises RequestError for facts of something else or of another bus."""
     try:
-        order, motor = checked_order(facts["order"]), facts["motor"]
-        before = replace(decode_image(bytes.fromhex(facts["image"]), order), number=MANUAL)
+        order, motor = parameters.checked_order(facts["order"]), facts["motor"]
+        before = replace(parameters.decode_image(bytes.fromhex(facts["image"]), order), number=MANUAL)
         lent = amended(before, facts["lent"])
         encode_image(lent)
     except (LookupError, TypeError, ValueError, AttributeError) as error:
-        raise RequestError(
-            f"the journal entry {change!r} is not a loan of project 1: {error}", advice="nothing was sent"
-        ) from error
+        raise RequestError(f"the journal entry {change!r} is not a loan of project 1: {error}") from error
     if (order, motor) != (node.order, node.motor) or change not in VERBS:
         raise RequestError(
             f"the journal entry {change!r} is of a bus with motor={motor},dump_order={order}",
             expected=f"one of {', '.join(VERBS)}, and the bus as it was opened then",
-            advice="nothing was sent",
         )
     return before, lent

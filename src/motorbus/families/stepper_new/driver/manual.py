@@ -86,7 +86,7 @@ async def move_by(node: Node, angle: float, *, velocity: float | None = None, wa
     after each error that is not `unmoved`.
     """
     if not wait:
-        raise RequestError("a stepper controller waits for its moves", advice="nothing was sent")
+        raise RequestError("a move of the stepper controller is always waited for")
     check_finite("angle", angle)
     return await lend(node, "move_by", _shaped(angle, _rpm(velocity)), _move_once)
 
@@ -186,7 +186,7 @@ async def _check_released(node: Node) -> None:
             raise NotHomed(
                 f"input {HOME_INPUT} is active before homing",
                 cause="it stands at the home switch, or the switch is stuck or active at rest",
-                advice="move forward, away from the switch; nothing was moved",
+                advice="move forward, away from the switch",
                 node=node.node,
             )
 
@@ -326,22 +326,14 @@ def checked(project: Project) -> Project:
     """This project 1. Raises RequestError if it gives no pulses per turn, or no speed."""
     if project.pulses_per_unit and project.step(1).speed and not project.is_cleared:
         return project
-    raise RequestError(
-        "project 1 gives no speed in step 1, or no pulses per turn",
-        expected="both, for manual motion takes them from it",
-        advice="write project 1; nothing was sent that changes anything",
-    )
+    raise RequestError("project 1 gives no speed in step 1, or no pulses per turn", advice="write project 1")
 
 
 def checked_pulses(project: Project) -> int:
     """The pulses of the single move. Raises RequestError for none: that may be a move without end."""
     if pulses := pulses_of(project, project.step(1)):
         return pulses
-    raise RequestError(
-        "this move is less than one pulse",
-        expected=f"at least {pulse_angle(project):.4g} rad",
-        advice="nothing was moved",
-    )
+    raise RequestError(f"this move is less than one pulse of {pulse_angle(project):.4g} rad")
 
 
 def _rpm(velocity: float | None) -> int | None:
@@ -353,11 +345,9 @@ def _rpm(velocity: float | None) -> int | None:
     rpm = round(exact)
     if 0 < rpm <= MAX_RPM and abs(rpm - exact) <= ROUNDING * exact:
         return rpm
-    near = [one for one in (int(exact), int(exact) + 1) if 0 < one <= MAX_RPM] or [MAX_RPM]
     raise RequestError(
         f"velocity {velocity:.6g} rad/s is {velocity * 60 / tau:.4g} RPM, and speeds are whole RPM",
-        expected=" or ".join(f"{one * tau / 60:.4g} rad/s ({one} RPM)" for one in near),
-        advice="nothing was sent",
+        expected=f"a whole RPM, from {tau / 60:.4g} rad/s (1 RPM) to {MAX_RPM} RPM",
     )
 
 
@@ -367,11 +357,7 @@ def rpm_below(velocity: float) -> int:
     rpm = int(min(velocity * 60 / tau * EXACT, MAX_RPM))
     if rpm >= 1:
         return rpm
-    raise RequestError(
-        f"velocity {velocity:.4g} rad/s is below 1 RPM, and speeds are whole RPM",
-        expected=f"at least {tau / 60:.4g} rad/s",
-        advice="nothing was sent",
-    )
+    raise RequestError(f"velocity {velocity:.4g} rad/s is below {tau / 60:.4g} rad/s, which is 1 RPM")
 
 
 def paced(project: Project, rpm: int) -> Project:
@@ -402,11 +388,8 @@ def _shaped(angle: float, rpm: int | None) -> Callable[[Project], Project]:
         if max(unit, distance) > MAX_DISTANCE:
             unit, distance = HUNDREDTHS, round(turns * HUNDREDTHS)
         if distance > MAX_DISTANCE:
-            raise RequestError(
-                f"{angle:.6g} rad is too far for one move",
-                expected=f"at most {MAX_DISTANCE * tau / unit:.6g} rad",
-                advice="make several moves; nothing was moved",
-            )
+            most = MAX_DISTANCE * tau / unit
+            raise RequestError(f"{angle:.6g} rad is too far for one move", expected=f"at most {most:.6g} rad")
         direction = REVERSE if angle < 0 else 1 - REVERSE
         move = replace(project, turn_distance=unit).with_step(1, distance=distance, direction=direction)
         checked_pulses(move)
@@ -418,4 +401,4 @@ def _shaped(angle: float, rpm: int | None) -> Callable[[Project], Project]:
 def check_finite(name: str, value: float) -> None:
     """Raise RequestError unless this is a finite number."""
     if not is_number(value):
-        raise RequestError(f"{name} {shown(value)} is not a finite number", advice="nothing was sent")
+        raise RequestError(f"{name} {shown(value)} is not a finite number")

@@ -72,5 +72,5 @@ def checked_id(node: int) -> int:
     raise RequestError(
         f"{shown(node)} is not the id of a stepper controller",
         expected=f"{ONLY}: a line has one controller, whose frames carry no address",
-        advice="open a line for each controller; nothing was sent",
+        advice="open a line for each controller",
     )

@@ -7,7 +7,7 @@ what is stored is an assumption. So a project that does not read as wanted after
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
@@ -16,29 +16,19 @@ from motorbus.core.request import Request
 from motorbus.core.steps import ASKED, READABLE, Emit, Exclusive, JournalEntry, Progress, catch
 from motorbus.errors import (
     FramingError,
-    MotorbusError,
     OutcomeUnknown,
     RequestError,
     UnexpectedReply,
     VerificationFailed,
     WireError,
 )
+from motorbus.families.stepper_new import parameters
 from motorbus.families.stepper_new.driver.io import read_input
 from motorbus.families.stepper_new.driver.node import Node
 from motorbus.families.stepper_new.driver.requests import command, ignore
 from motorbus.families.stepper_new.driver.stop import check_idle
 from motorbus.families.stepper_new.edits import Edit, edits, edits_between
-from motorbus.families.stepper_new.parameters import (
-    PROJECTS,
-    STEPS,
-    Project,
-    amended,
-    check_project,
-    check_value,
-    decode_image,
-    differences,
-    values_of,
-)
+from motorbus.families.stepper_new.parameters import PROJECTS, STEPS, Project, check_value, differences
 from motorbus.families.stepper_new.program.backup import Backup
 from motorbus.families.stepper_new.program.file import Program
 from motorbus.families.stepper_new.protocol import REPLY_LENGTH
@@ -82,31 +72,28 @@ async def dump(node: Node, project: int = 1) -> bytes:
     Raises FramingError if no two of five readings are equal, UnexpectedReply for the image of another project.
     """
     seen: list[bytes] = []
-    for _ in range(READINGS):
-        data = await dump_once(node, project)
-        if data in seen:
-            node.state.projects[project] = _decoded(node, data, project)
-            return data
+    while (data := await dump_once(node, project)) not in seen:
         seen.append(data)
-    raise FramingError(
-        f"project {project} read different {READINGS} times",
-        expected="two equal readings",
-        cause="the line damages bytes, and a dump has no checksum",
-        advice="check cable and ground; nothing was written",
-        node=node.node,
-    )
-
-
-def _decoded(node: Node, data: bytes, number: int) -> Project:
-    project = decode_image(data[REPLY_LENGTH:], node.order)
-    if project.number not in (0, number) or project.total_steps > STEPS:
+        if len(seen) == READINGS:
+            raise FramingError(
+                f"project {project} read different {READINGS} times",
+                cause="the line damages bytes, and a dump has no checksum",
+                advice="check cable and ground",
+                node=node.node,
+            )
+    found = _decode(node, data)
+    if found.number not in (0, project) or found.total_steps > STEPS:
         raise UnexpectedReply(
-            f"the dump of project {number} is of project {project.number} with {project.total_steps} steps",
+            f"the dump of project {project} is of project {found.number} with {found.total_steps} steps",
             received=data,
-            expected=f"project {number}, or 0 if it was cleared, and at most {STEPS} steps",
             node=node.node,
         )
-    return replace(project, number=number)
+    node.state.projects[project] = replace(found, number=project)
+    return data
+
+
+def _decode(node: Node, data: bytes) -> Project:
+    return parameters.decode_image(data[REPLY_LENGTH:], node.order)
 
 
 async def read_image(node: Node, number: int) -> Project:
@@ -139,7 +126,7 @@ async def read(node: Node, /, *names: str, project: int = 1) -> dict[str, Value]
 async def read_raw(node: Node, /, *names: str, project: int = 1) -> dict[str, int]:
     """Parameters of a project as raw values by name; see `read`."""
     rows = [node.table[name] for name in names or node.table]
-    values = values_of(await read_image(node, project))
+    values = parameters.values_of(await read_image(node, project))
     return {row.name: values[row.name] for row in rows}
 
 
@@ -148,47 +135,42 @@ async def read_raw(node: Node, /, *names: str, project: int = 1) -> dict[str, in
 
 async def read_back(node: Node, wanted: Project) -> Project:
     """The project of this number as it reads now: by one dump if it is as wanted, else by two equal ones."""
-    number = wanted.number
-    data = await dump_once(node, number)
-    if replace(decode_image(data[REPLY_LENGTH:], node.order), number=number) == wanted:
-        node.state.projects[number] = wanted
-        return wanted
-    return await read_image(node, number)
+    shown = _decode(node, await dump_once(node, wanted.number))
+    if replace(shown, number=wanted.number) != wanted:
+        return await read_image(node, wanted.number)
+    node.state.projects[wanted.number] = wanted
+    return wanted
 
 
-async def bring(node: Node, shown: Project, wanted: Project, *, full: bool = False) -> bool:
+async def bring(node: Node, shown: Project, wanted: Project) -> bool:
     """Edit a project until it reads as wanted, without a save. False: it still reads as `shown`.
 
-    What differs is edited, then everything, each followed by a read; with `full` everything at once. A controller that
-    reads as before after both shows what is stored, so its edits cannot be read. Raises VerificationFailed if it reads
-    as neither, OutcomeUnknown for a command without an acknowledgement. Call it inside `Exclusive`.
+    What differs is edited, then everything, each followed by a read; everything at once if nothing differs. A
+    controller that reads as before after both shows what is stored, so its edits cannot be read. Raises
+    VerificationFailed if it reads as neither, OutcomeUnknown for a command without an acknowledgement. Call it inside
+    `Exclusive`.
     """
-    for everything in (full, True):
-        orders = edits(wanted, rows=STEPS) if everything else edits_between(shown, wanted)
-        await _send(node, wanted.number, _requests(node, orders))
-        found = await read_back(node, wanted)
-        if found == wanted:
-            return True
+    for orders in (edits_between(shown, wanted), edits(wanted, rows=STEPS)):
+        if orders:
+            await _send(node, wanted.number, orders)
+            found = await read_back(node, wanted)
+            if found == wanted:
+                return True
     if found == shown:
         return False
     raise _different(node, wanted, found, "it was edited; power-off brings back what is stored")
 
 
-def _requests(node: Node, orders: Sequence[Edit]) -> list[Request[None]]:
-    found = []
+async def _send(node: Node, project: int, orders: list[Edit]) -> None:
+    requests = []
     for edit in orders:
         values: dict[str, Any] = dict(edit.values)
-        found.append(command(node, edit.command, ignore, expert=True, **values))
-    return found
-
-
-async def _send(node: Node, project: int, orders: Sequence[Request[None]]) -> None:
+        requests.append(command(node, edit.command, ignore, expert=True, **values))
     if node.state.unsaved is not None and node.state.unsaved.number != project:
         node.state.unsaved = None  # the selection loses these edits
-    for done, order in enumerate(orders):
-        await Emit(Progress(done, len(orders), f"writing project {project}"))
-        await order
-    await Emit(Progress(len(orders), len(orders), f"writing project {project}"))
+    for done, request in enumerate(requests, 1):
+        await request
+        await Emit(Progress(done, len(requests), f"writing project {project}"))
 
 
 def _different(node: Node, wanted: Project, found: Project, state: str) -> VerificationFailed:
@@ -222,19 +204,15 @@ async def write_project(
     RequestError, with nothing written; VerificationFailed if it reads different after three tries; OutcomeUnknown for a
     command without an acknowledgement. A second call completes what an error has left.
     """
-    wanted = _wanted(program, project, expert)
-
-    def merged(before: Project) -> Project:
-        return replace(wanted, steps=wanted.used + before.steps[wanted.total_steps :])
-
-    return await Exclusive(_write(node, "write_project", wanted.number, merged, save))
+    number, change = _merge(program, project, expert)
+    return await Exclusive(_write(node, "write_project", number, change, save))
 
 
 async def difference(node: Node, program: Program, project: int | None = None) -> Changes:
     """What `write_project` would change. Only reads. Raises as it does before anything is written."""
-    wanted = _wanted(program, project, True)
-    before = await read_image(node, wanted.number)
-    return differences(before, replace(wanted, steps=wanted.used + before.steps[wanted.total_steps :]))
+    number, change = _merge(program, project, True)
+    before = await read_image(node, number)
+    return differences(before, change(before))
 
 
 async def write(node: Node, /, *, project: int = 1, save: bool = True, **values: Value) -> Written:
@@ -246,44 +224,33 @@ async def write(node: Node, /, *, project: int = 1, save: bool = True, **values:
     check_value("project", project)
     raws = {name: _raw(node, name, value) for name, value in values.items()}
 
-    def changed(before: Project) -> Project:
+    def change(before: Project) -> Project:
         if before.is_cleared and "total_steps" not in raws:
-            raise RequestError(
-                f"project {project} has no steps",
-                expected="total_steps among the parameters, 1 to 10",
-                advice="nothing was written",
-                node=node.node,
-            )
-        return amended(before, raws)
+            raise RequestError(f"project {project} has no steps", advice="write total_steps, 1 to 10, too")
+        return parameters.amended(before, raws)
 
-    return await Exclusive(_write(node, "write", project, changed, save))
+    return await Exclusive(_write(node, "write", project, change, save))
 
 
-def _wanted(program: Program, project: int | None, expert: bool) -> Project:
-    """The project to write. Raises RequestError for what no request can carry, and for errors of lint."""
+def _merge(program: Program, project: int | None, expert: bool) -> tuple[int, Callable[[Project], Project]]:
+    """The number of the project to write, and what it becomes. Raises RequestError for what cannot be written."""
     number = program.project.number if project is None else project
     check_value("project", number)
     wanted = replace(program.project, number=number)
-    if errors := check_project(wanted, expert=True):
-        raise errors[0]
-    found = [str(one) for one in program.lint() if one.level == "error"]
-    if found and not expert:
+    for error in parameters.check_project(wanted, expert=True):
+        raise error
+    errors = [str(one) for one in program.lint() if one.level == "error"]
+    if errors and not expert:
         raise RequestError(
-            f"the program for project {number} has errors: {'; '.join(found)}",
-            expected="a program without errors of lint",
-            advice="correct it, or write it with expert=True; nothing was sent",
+            f"the program has errors: {'; '.join(errors)}", advice="correct it, or say expert=True"
         )
-    return wanted
+    return number, lambda before: replace(wanted, steps=wanted.used + before.steps[wanted.total_steps :])
 
 
 def _raw(node: Node, name: str, value: Value) -> int:
     row = node.table[name]
     if row.protected or not row.writable:
-        raise RequestError(
-            f"{name} is not written by name",
-            cause=row.note,
-            advice="write a program that contains it; nothing was sent",
-        )
+        raise RequestError(f"{name} is not written by name", cause=row.note, advice="write a program")
     raw = row.to_raw(value)
     row.encode(raw, row.given(value))  # raises
     return raw
@@ -314,9 +281,9 @@ async def _store(node: Node, before: Project, wanted: Project) -> None:
     selected, and a save alone would store that one.
     """
     for _ in range(TRIES):
-        shows_edits = await bring(node, before, wanted, full=before == wanted)
+        shows_edits = await bring(node, before, wanted)
         error = await catch(command(node, "save_project", ignore, project=wanted.number))
-        if isinstance(error, MotorbusError) and not isinstance(error, OutcomeUnknown | WireError):
+        if error is not None and not isinstance(error, OutcomeUnknown | WireError):
             raise error
         before = await read_back(node, wanted)
         if before == wanted and (error is None or not shows_edits):
@@ -325,7 +292,7 @@ async def _store(node: Node, before: Project, wanted: Project) -> None:
     raise _different(node, wanted, before, f"saved {TRIES} times")
 
 
-# -- save, clear ------------------------------------------------------------------------------------------------------
+# -- save, clear -------------------------------------------------------------------------------------------------------
 
 
 async def save(node: Node, project: int) -> Written:
@@ -336,16 +303,12 @@ async def save(node: Node, project: int) -> Written:
     """
     unsaved = node.state.unsaved
     if unsaved is None or unsaved.number != project:
-        raise RequestError(
-            f"project {project} has no edits of this host that are not saved",
-            advice="write_project() saves what it writes; nothing was sent",
-            node=node.node,
-        )
+        raise RequestError(f"project {project} has no edits of this host that are not saved")
     wanted = unsaved
     return await Exclusive(_write(node, "save", project, lambda before: wanted, True))
 
 
-async def clear(node: Node, project: int, *, expert: bool = False) -> None:
+async def clear(node: Node, project: int, *, expert: bool = False) -> Written:
     """Set all of project 1 to 4 to zero, stored and edited, and read it back (item 17a).
 
     Raises RequestError for project 1 unless `expert`: manual motion takes its speed from it. Raises VerificationFailed
@@ -354,35 +317,27 @@ async def clear(node: Node, project: int, *, expert: bool = False) -> None:
     check_value("project", project)
     if project == MANUAL and not expert:
         raise RequestError(
-            "project 1 is not cleared: jog, single move and homing take their speed from its step 1",
-            expected="project 2, 3 or 4",
-            advice="clear it with expert=True; nothing was sent",
-            node=node.node,
+            "project 1 is kept: manual motion takes its speed from it", advice="say expert=True"
         )
-    await Exclusive(_clear(node, project))
+    return await Exclusive(_clear(node, project))
 
 
 async def _clear(node: Node, number: int) -> Written:
     await check_free(node, "clear")
-    before = await read_image(node, number)
+    before, blank = await read_image(node, number), Project(number=number)
     if is_blank(before):
         return Written(number, {}, "unchanged")
-    await empty(node, number)
-    return Written(number, differences(before, Project(number=number)), "saved")
-
-
-async def empty(node: Node, number: int) -> None:
-    """Clear a project and read it. A second clear has no other effect, so one try may stay without a reply."""
     if node.state.unsaved is not None and node.state.unsaved.number == number:
         node.state.unsaved = None
     error = await catch(command(node, "clear_project", ignore, project=number))
     if isinstance(error, OutcomeUnknown | WireError):
-        await command(node, "clear_project", ignore, project=number)
-    elif error is not None:
+        error = await catch(command(node, "clear_project", ignore, project=number))  # twice is as once
+    if error is not None:
         raise error
     found = await read_image(node, number)
     if not is_blank(found):
-        raise _different(node, Project(number=number), found, "it was cleared")
+        raise _different(node, blank, found, "it was cleared")
+    return Written(number, differences(before, blank), "saved")
 
 
 def is_blank(project: Project) -> bool:
@@ -399,14 +354,16 @@ async def backup(node: Node, projects: Iterable[int] = range(1, PROJECTS + 1)) -
     Edits that were not saved are read in place of what is stored, an assumption. Reports `Progress`. Raises
     RequestError for another number, and while project 1 is lent to an unfinished motion; else as `dump`.
     """
-    numbers = _numbers(projects)
+    numbers = tuple(dict.fromkeys(projects))
+    for number in numbers:
+        check_value("project", number)
 
     async def read_all() -> Backup:
         await Emit(JournalEntry("backup", ASKED, {"node": node.node, READABLE: True}))
         dumps = {}
-        for done, number in enumerate(numbers):
-            await Emit(Progress(done, len(numbers), f"reading project {number}"))
+        for done, number in enumerate(numbers, 1):
             dumps[number] = await dump(node, number)
+            await Emit(Progress(done, len(numbers), "reading projects"))
         return Backup(dumps=dumps, order=node.order)
 
     return await Exclusive(read_all())
@@ -419,36 +376,29 @@ async def restore(node: Node, backup: Backup, projects: Iterable[int] | None = N
     manual does not name cannot be written. Raises RequestError, with nothing sent, for numbers that no request can
     carry; else as `write_project`, with a note that names the restored projects.
     """
-    numbers = _numbers(backup.projects if projects is None else projects)
-    wanted = {number: replace(backup.project(number), number=number) for number in numbers}
-    for project in wanted.values():
-        for error in [] if project.is_cleared else check_project(project, expert=True):
+    numbers = dict.fromkeys(backup.projects if projects is None else projects)
+    wanted = [replace(backup.project(number), number=number) for number in numbers]
+    for project in wanted:
+        for error in [] if project.is_cleared else parameters.check_project(project, expert=True):
             raise RequestError(
                 f"project {project.number} of this backup: {error.summary}", expected=error.expected
             )
+    done: list[Written] = []
 
     async def write_all() -> tuple[Written, ...]:
-        done: list[Written] = []
-        try:
-            for number, project in wanted.items():
-                if project.is_cleared:
-                    done.append(await _clear(node, number))
-                else:
-                    done.append(await _write(node, "restore", number, _constant(project), True))
-        except BaseException as error:
-            error.add_note(f"restored: {', '.join(str(one.project) for one in done) or 'no project'}")
-            raise
+        for project in wanted:
+            number, change = project.number, _constant(project)
+            blank = project.is_cleared
+            work = _clear(node, number) if blank else _write(node, "restore", number, change, True)
+            done.append(await work)
         return tuple(done)
 
-    return await Exclusive(write_all())
+    try:
+        return await Exclusive(write_all())
+    except BaseException as error:
+        error.add_note(f"restored: {', '.join(str(one.project) for one in done) or 'no project'}")
+        raise
 
 
-def _constant(project: Project) -> Callable[[Any], Project]:
+def _constant(project: Project) -> Callable[[Project], Project]:
     return lambda before: project
-
-
-def _numbers(projects: Iterable[int]) -> tuple[int, ...]:
-    numbers = tuple(dict.fromkeys(projects))
-    for number in numbers:
-        check_value("project", number)
-    return numbers

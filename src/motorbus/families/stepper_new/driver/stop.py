@@ -111,9 +111,7 @@ class Watch:
     def precondition(self, stops: Stops) -> MotorbusError | None:
         """See `Request.precondition`."""
         if self.is_stopped:
-            return Interrupted(
-                "a stop came before the motion began", advice="repeat the call; nothing was moved"
-            )
+            return Interrupted("a stop came before the motion began", advice="repeat the call")
         self._stops, self._count = stops, stops(self.node.node)
         self.ordered = True
         return None
