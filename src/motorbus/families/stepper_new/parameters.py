@@ -40,120 +40,92 @@ Order: TypeAlias = Literal["little", "big"]
 """The byte of a number that is first in a dump: the lowest or the highest."""
 
 
-def _row(name: str, address: int, size: int, low: int, high: int, source: str, **more: Any) -> Register:
+def _row(
+    name: str, address: int, size: int, low: int, high: int, items: str, note: str = "", **more: Any
+) -> Register:
+    """`items` are those of the manual; in its item 15 a place is [row][byte], x for the row of a step."""
     more = {"access": Access.READ_WRITE, "effect": Effect.PERSISTENT} | more
+    source = f"{MANUAL}, {items.replace('@', _place(address, size))}"
     return Register(
-        name=name, address=address, size=size, low=low, high=high, storage=Storage.EEPROM,
-        source=f"{MANUAL}, {source}", **more,
+        name=name, address=address, size=size, low=low, high=high, storage=Storage.EEPROM, source=source,
+        note=note, **more,
     )  # fmt: skip
 
 
-_INPUTS: Final = {0: "none", **{number: f"input {number}" for number in STEP_INPUTS}}
-_OUTPUTS: Final = ("none", "output 1 on", "output 2 on", "output 3 on", "all on")
-_OUTPUTS_OFF: Final = ("output 1 off", "output 2 off", "output 3 off", "all off")
+def _place(address: int, size: int) -> str:
+    return f"{address}..{address + size - 1}" if size > 1 else f"{address}"
 
+
+_INPUTS: Final = {0: "none", **{number: f"input {number}" for number in STEP_INPUTS}}
+_OUTPUTS: Final = ("none", "output 1 on", "output 2 on", "output 3 on", "all on",
+                   "output 1 off", "output 2 off", "output 3 off", "all off")  # fmt: skip
+_OFF: Final = {0: "off"}
+
+# fmt: off
 BASE: Final = (
-    _row(
-        "number", 0, 1, 0, PROJECTS, "item 15 [0][0]", access=Access.READ, effect=Effect.NONE,
-        note="repeats the project that was asked for; 0 after it has been cleared is an assumption",
-    ),
-    _row(
-        "total_steps", 1, 1, 1, STEPS, "item 1; item 15 [0][1]",
-        note="set together with the selection of the project, so selecting one is a write; steps beyond it keep "
-        "their values and are not carried out, an assumption",
-    ),
-    _row(
-        "loop_first", 2, 1, 0, STEPS, "item 11; item 15 [0][2]", choices={0: "off"},
-        note="one range of steps per project is repeated",
-    ),
-    _row(
-        "loop_last", 3, 1, 0, STEPS, "item 11; item 15 [0][3]", choices={0: "off"},
-        note="a range that is not 1 <= first <= last <= total steps is ignored, an assumption",
-    ),
-    _row(
-        "loop_count", 4, 1, 0, ENDLESS - 1, "item 11; item 15 [0][4]", choices={0: "off"},
-        note="how often the range runs in all: its worked example runs 1 2, then 3 to 5 twice, then 6 to 8",
-    ),
-    _row(
-        "project_loop", 5, 1, 0, ENDLESS, "item 12; item 15 [0][5]", choices={ENDLESS: "endless"},
-        note="that 0 and 1 both run it once is an assumption",
-    ),
-    _row(
-        "microsteps", 6, 2, 1, 0xFFFF, "item 2; item 15 [0][6..7]",
-        note="per full step; pulses per turn = 36000 * microsteps / step angle",
-    ),
-    _row(
-        "step_angle", 8, 1, 1, 255, "item 2; item 15 [0][8]", unit="rad", scale=pi / 18000,
-        note="hundredths of a degree, 1.8 degrees are 180; 2.55 degrees at most",
-    ),
-    _row(
-        "turn_distance", 9, 3, 1, 0xFFFFFF, "item 3; item 15 [0][9..11]",
-        note="user units for one turn of the motor: this defines the unit of all distances",
-    ),
-    _row(
-        "stop_mode", 14, 1, 0, 1, "item 21; item 15 [0][14]", choices={0: "slow", 1: "immediate"},
-        note="of one project or of the device: not known; it is in the dump of each project",
-    ),
-    _row(
-        "mode4", 15, 1, 0, 2, "item 25; item 15 [0][15]", protected=True,
-        note="the manual explains neither mode 4 nor its three variants",
-    ),
-    _row(
-        "power_on_home", 16, 1, 0, 1, "item 26; item 15 [0][16]", choices={0: "off", 1: "home at power-on"},
-        protected=True, note="moves the motor at power-on",
-    ),
-)  # fmt: skip
+    _row("number", 0, 1, 0, PROJECTS, "item 15 [0][@]",
+         "repeats the project that was asked for; 0 after it has been cleared is an assumption",
+         access=Access.READ, effect=Effect.NONE),
+    _row("total_steps", 1, 1, 1, STEPS, "item 1; item 15 [0][@]",
+         "set together with the selection of the project, so selecting one is a write; steps beyond it keep their "
+         "values and are not carried out, an assumption"),
+    _row("loop_first", 2, 1, 0, STEPS, "item 11; item 15 [0][@]", "one range of steps per project is repeated",
+         choices=_OFF),
+    _row("loop_last", 3, 1, 0, STEPS, "item 11; item 15 [0][@]",
+         "a range that is not 1 <= first <= last <= total steps is ignored, an assumption", choices=_OFF),
+    _row("loop_count", 4, 1, 0, ENDLESS - 1, "item 11; item 15 [0][@]",
+         "how often the range runs in all: its worked example runs 1 2, then 3 to 5 twice, then 6 to 8", choices=_OFF),
+    _row("project_loop", 5, 1, 0, ENDLESS, "item 12; item 15 [0][@]",
+         "that 0 and 1 both run it once is an assumption", choices={ENDLESS: "endless"}),
+    _row("microsteps", 6, 2, 1, 0xFFFF, "item 2; item 15 [0][@]",
+         "per full step; pulses per turn = 36000 * microsteps / step angle"),
+    _row("step_angle", 8, 1, 1, 255, "item 2; item 15 [0][@]",
+         "hundredths of a degree, 1.8 degrees are 180; 2.55 degrees at most", unit="rad", scale=pi / 18000),
+    _row("turn_distance", 9, 3, 1, 0xFFFFFF, "item 3; item 15 [0][@]",
+         "user units for one turn of the motor: this defines the unit of all distances"),
+    _row("stop_mode", 14, 1, 0, 1, "item 21; item 15 [0][@]",
+         "of one project or of the device: not known; it is in the dump of each project",
+         choices={0: "slow", 1: "immediate"}),
+    _row("mode4", 15, 1, 0, 2, "item 25; item 15 [0][@]",
+         "the manual explains neither mode 4 nor its three variants", protected=True),
+    _row("power_on_home", 16, 1, 0, 1, "item 26; item 15 [0][@]", "moves the motor at power-on",
+         choices={0: "off", 1: "home at power-on"}, protected=True),
+)
 """The rows of the project itself. The manual does not name the bytes 12, 13 and 17 to 19."""
 
 STEP: Final = (
-    _row(
-        "distance", 0, 3, 0, 0xFFFFFF, "item 4; item 15 [x][0..2]",
-        note="user units, without a sign; turns = distance / turn_distance, relative to the present position",
-    ),
-    _row("direction", 3, 1, 0, 1, "item 5; item 15 [x][3]", choices={0: "forward", 1: "reverse"}),
-    _row(
-        "start_frequency", 4, 2, 0, 0xFFFF, "item 5; item 15 [x][4..5]",
-        note="Hz, pulses per second; 0 is taken for 1, an assumption",
-    ),
-    _row(
-        "acceleration", 6, 2, 0, 0xFFFF, "item 6; item 15 [x][6..7]",
-        note="Hz, by how much the frequency grows and falls; the manual does not say per what",
-    ),
-    _row(
-        "speed", 8, 2, 0, 0xFFFF, "item 6; item 15 [x][8..9]", unit="rad/s", scale=2 * pi / 60,
-        note="RPM; frequency = RPM * pulses per turn / 60. Speed of jog, single move and homing is that of step 1 of "
-        "project 1",
-    ),
-    _row(
-        "output", 10, 1, 0, 8, "item 7; item 15 [x][10]", choices=dict(enumerate(_OUTPUTS + _OUTPUTS_OFF)),
-        note="when the motor starts; coded otherwise than in the command that sets an output",
-    ),
-    _row(
-        "delay", 11, 3, 0, 0xFFFFFF, "item 8; item 15 [x][11..13]", unit="s", scale=0.001,
-        note="ms after the motion has ended, 4 h 39 min 37.215 s at most; the example sends 1000 ms, its annotation "
-        "says 2000",
-    ),
-    _row(
-        "start_input", 14, 1, 0, INPUTS, "item 9; item 15 [x][14]", choices=_INPUTS,
-        note="the step waits for it; inputs 3 and 4 start and stop projects",
-    ),
-    _row(
-        "stop_input", 15, 1, 0, INPUTS, "item 10; item 15 [x][15]", choices=_INPUTS,
-        note="ends the motion of this step at once; inputs 3 and 4 start and stop projects",
-    ),
-)  # fmt: skip
+    _row("distance", 0, 3, 0, 0xFFFFFF, "item 4; item 15 [x][@]",
+         "user units, without a sign; turns = distance / turn_distance, relative to the present position"),
+    _row("direction", 3, 1, 0, 1, "item 5; item 15 [x][@]", choices={0: "forward", 1: "reverse"}),
+    _row("start_frequency", 4, 2, 0, 0xFFFF, "item 5; item 15 [x][@]",
+         "Hz, pulses per second; 0 is taken for 1, an assumption"),
+    _row("acceleration", 6, 2, 0, 0xFFFF, "item 6; item 15 [x][@]",
+         "Hz, by how much the frequency grows and falls; the manual does not say per what"),
+    _row("speed", 8, 2, 0, 0xFFFF, "item 6; item 15 [x][@]",
+         "RPM; frequency = RPM * pulses per turn / 60. Speed of jog, single move and homing is that of step 1 of "
+         "project 1", unit="rad/s", scale=2 * pi / 60),
+    _row("output", 10, 1, 0, 8, "item 7; item 15 [x][@]",
+         "when the motor starts; coded otherwise than in the command that sets an output",
+         choices=dict(enumerate(_OUTPUTS))),
+    _row("delay", 11, 3, 0, 0xFFFFFF, "item 8; item 15 [x][@]",
+         "ms after the motion has ended, 4 h 39 min 37.215 s at most; the example sends 1000 ms, its annotation "
+         "says 2000", unit="s", scale=0.001),
+    _row("start_input", 14, 1, 0, INPUTS, "item 9; item 15 [x][@]",
+         "the step waits for it; inputs 3 and 4 start and stop projects", choices=_INPUTS),
+    _row("stop_input", 15, 1, 0, INPUTS, "item 10; item 15 [x][@]",
+         "ends the motion of this step at once; inputs 3 and 4 start and stop projects", choices=_INPUTS),
+)
 """The rows of one step; `address` is the offset in its 20 bytes, of which the manual does not name the last four."""
 
 REQUEST_ONLY: Final = (
     _row("project", 3, 1, 1, PROJECTS, "items 1, 13, 15, 16 and 17a"),
     _row("step", 9, 1, 1, STEPS, "items 4 to 10"),
-    _row(
-        "port", 4, 1, 1, 5, "items 23 and 24",
-        note="inputs 1 to 5; outputs 1 to 3, 4 all three, 5 both LEDs. Its annotations to both examples say port 00",
-    ),
+    _row("port", 4, 1, 1, 5, "items 23 and 24", "inputs 1 to 5; outputs 1 to 3, 4 all three, 5 both LEDs. Its "
+         "annotations to both examples say port 00"),
     _row("level", 5, 1, 0, 1, "item 23", choices={0: "inactive", 1: "active"}),
-)  # fmt: skip
+)
 """Numbers that requests carry and no dump holds; `address` is the offset in the request."""
+# fmt: on
 
 PARAMETERS: Final[Mapping[str, Register]] = {row.name: row for row in (*BASE, *STEP, *REQUEST_ONLY)}
 """Every number of a request or a dump, by name."""

@@ -132,52 +132,32 @@ class Machine:
 
     def start(self, project: Project, at: float, *, by_command: bool = True) -> bool:
         """Start a project. False if it is busy."""
-        if not self._is_free(at):
-            return False
-        self.stop_mode = project.stop_mode  # the stop mode belongs to each project # assumption
-        self.run = Run(project, by_command, self._now)
-        if sequence.last_step(project):
-            self._begin_step()
-        else:
-            self._finish("ended")  # a project without steps ends at once, with a notice # assumption
-        self.advance(at)
-        return True
+        return self._begin(at, partial(self._start, project, by_command))
 
     def jog(self, project: Project, sign: int, at: float) -> bool:
         """Turn until stopped with the speed of step 1 of this project; False if it is busy."""
-        is_free = self._is_free(at)
-        if is_free:
-            self._move_by_hand(Phase.JOG, project, None, sign)
-        elif self.phase is Phase.JOG and self.motion and self.motion.sign != sign:
-            # the opposite jog command stops and reverses # assumption
-            self._stop(partial(self._move_by_hand, Phase.JOG, project, None, sign))
-        else:
+        turn = partial(self._move_by_hand, Phase.JOG, project, None, sign)
+        if self._begin(at, turn):
+            return True
+        if self.phase is not Phase.JOG or self.motion is None or self.motion.sign == sign:
             return False
+        self._stop(turn)  # the opposite jog command stops and reverses # assumption
         self.advance(at)
         return True
 
     def run_once(self, project: Project, at: float) -> bool:
         """Make the move of step 1 of this project, without its inputs, output and pause; False if it is busy."""
-        if not self._is_free(at):
-            return False
         step = project.step(1)
-        self._move_by_hand(Phase.ONCE, project, ramp.pulses_of(project, step), step.sign)
-        self.advance(at)
-        return True
+        pulses = ramp.pulses_of(project, step)
+        return self._begin(at, partial(self._move_by_hand, Phase.ONCE, project, pulses, step.sign))
 
     def home(self, project: Project, at: float) -> bool:
         """Turn in reverse with the speed of step 1 of this project until input 5; False if it is busy.
 
         It ends at once, without a motion, if the input is active.
         """
-        if not self._is_free(at):
-            return False
-        if HOME_INPUT in self.inputs:
-            self._happen("rests")
-        else:
-            self._move_by_hand(Phase.HOMING, project, None, -1)
-        self.advance(at)
-        return True
+        turn = partial(self._move_by_hand, Phase.HOMING, project, None, -1)
+        return self._begin(at, self._end_manual if HOME_INPUT in self.inputs else turn)
 
     def stop_project(self, at: float) -> None:
         """Stop the project."""
@@ -245,9 +225,14 @@ class Machine:
         else:
             self._go(Phase.SLOWING, slow)
 
-    def _is_free(self, at: float) -> bool:
+    def _begin(self, at: float, begin: Callable[[], None]) -> bool:
+        """Begin something, with all of it that takes no time; False if it is busy."""
         self.advance(at)
-        return self.phase is Phase.IDLE  # a busy controller acknowledges and ignores a start # assumption
+        if self.phase is not Phase.IDLE:  # a busy controller acknowledges and ignores a start # assumption
+            return False
+        begin()
+        self.advance(at)
+        return True
 
     def _move_by_hand(self, phase: Phase, project: Project, pulses: int | None, sign: int) -> None:
         self.stop_mode = project.stop_mode
@@ -275,6 +260,14 @@ class Machine:
     def _running(self) -> Run:
         assert self.run is not None, "only a project has steps"
         return self.run
+
+    def _start(self, project: Project, by_command: bool) -> None:
+        self.stop_mode = project.stop_mode  # the stop mode belongs to each project # assumption
+        self.run = Run(project, by_command, self._now)
+        if sequence.last_step(project):
+            self._begin_step()
+        else:
+            self._finish("ended")  # a project without steps ends at once, with a notice # assumption
 
     def _begin_step(self) -> None:
         port = self._running().step.start_input

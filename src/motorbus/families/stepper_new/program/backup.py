@@ -10,7 +10,7 @@ from msgspec import Meta, Struct
 
 from motorbus.errors import RequestError
 from motorbus.families.stepper_new.parameters import PROJECTS, ROW_LENGTH, Order, Project, decode_image
-from motorbus.families.stepper_new.program.file import Program, read_text, read_toml
+from motorbus.families.stepper_new.program.file import Program, read_toml
 from motorbus.families.stepper_new.protocol import DUMP_LENGTH, HEADER, READ_PROJECT, REPLY_LENGTH
 
 KIND: Final = "stepper backup"
@@ -94,11 +94,6 @@ class Backup(Struct, frozen=True, kw_only=True):
         if len(dumps) < len(file.project):
             raise _wrong("a project is in it twice")
         return cls(dumps=dumps, order=file.dump_order)
-
-    @classmethod
-    def load(cls, path: str) -> Backup:
-        """From a file. Raises RequestError if it cannot be read, and as `parse`."""
-        return cls.parse(read_text(path))
 
 
 def _checksum(dump: bytes) -> str:
