@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from copy import copy
 from inspect import signature
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import pytest
 from motorbus.core.family import Identity
 from motorbus.core.request import Effect
 from motorbus.errors import FramingError, MotorbusError, NoReply, OutcomeUnknown, RequestError
-from motorbus.families.stepper_new import FAMILY, AsyncController, Controller, InputChanged
+from motorbus.families.stepper_new import FAMILY, AsyncController, Controller, InputChanged, StepperDriver
 from motorbus.families.stepper_new.parameters import PARAMETERS, allowed
 from motorbus.families.stepper_new.protocol import COMMANDS, MOTOR, encode
 from tests.families.stepper_new.bench import READ_1, STOP_MOTOR, STOP_PROJECT, bench
@@ -213,3 +214,30 @@ def test_outputs_are_remembered_as_sent_and_forgotten_without_an_acknowledgement
         for port, level in impossible:
             with pytest.raises(RequestError):
                 one.device.set_output(port, level)
+
+
+def test_each_bus_has_its_own_state_and_settings() -> None:
+    with bench(dump_order="big") as one, bench() as other:
+        one.device.set_output(1, True)
+        assert one.device.last_commanded[1] is True
+        assert other.device.last_commanded[1] is None
+        assert Controller(one.bus).state is one.device.state
+        assert (
+            one.device.read_raw("step_1_delay")
+            == other.device.read_raw("step_1_delay")
+            == {"step_1_delay": 1000}
+        )
+        assert one.device.dump(1) != other.device.dump(1)
+    for settings in ({"dump_order": "middle"}, {"order": "big"}, {"motor": "x"}):
+        with pytest.raises(RequestError):
+            FAMILY.open(**settings)
+
+
+def test_dry_run_leaves_the_state_of_the_bus() -> None:
+    driver = FAMILY.open(motor=5, dump_order="big")
+    assert isinstance(driver, StepperDriver)
+    copied = copy(driver)
+    copied.state.outputs[1] = True
+    copied.state.may_run = True
+    assert (copied.motor, copied.order) == (5, "big")
+    assert (driver.state.outputs[1], driver.state.may_run) == (None, False)

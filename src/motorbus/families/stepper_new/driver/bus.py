@@ -22,7 +22,7 @@ from motorbus.families.stepper_new.parameters import PROJECTS, checked_order
 MODEL: Final = "stepper controller"
 UNKNOWN: Final = "unknown"  # it reports no version
 DUMP_END: Final = 0.6  # s from a request to the end of its dump, at 9600 baud # assumption
-GAP: Final = 0.1  # s within an old reply # assumption
+GAP: Final = 0.05  # s within an old reply # assumption
 
 _AXIS: Final = AxisDriver(
     move_by=manual.move_by,

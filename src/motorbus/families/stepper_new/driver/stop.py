@@ -25,8 +25,8 @@ class Promise(Enum):
     """What an acknowledged stop means."""
 
     STOP_ACCEPTED = (
-        "stop accepted for project and motor; it decelerates or stops at once by its stop mode, and does not report "
-        "when it rests"
+        "stop accepted for project and motor; it decelerates or stops at once, by its stop mode; standstill was not "
+        "verified"
     )
 
 

@@ -107,12 +107,13 @@ class Controller(PoweredDevice):
         self._collect()
 
     def status(self) -> dict[str, object]:
-        """Its state; position in pulses."""
+        """Its state; position in pulses, load where it is from power-on, whatever was homed since."""
         machine, run = self.machine, self.machine.run
         return {
             "powered": self.plugged,
             "phase": machine.phase.value,
             "position": self.position,
+            "load": self.position + self.offset,
             "frequency": machine.frequency(self.now),
             "homed": machine.is_homed,
             "project": run.project.number if run else None,
