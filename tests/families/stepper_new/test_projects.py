@@ -169,7 +169,9 @@ def test_program_with_errors_needs_an_expert(one: Bench) -> None:
 def test_noise_in_a_read_back_is_no_difference(one: Bench) -> None:
     noise = noisy(1)
     one.line.change = lambda data: (
-        noise(data) if one.line.request[2] == 0x3E and one.simulated.store.working != PICK else data
+        noise(data)
+        if one.line.request[2] == 0x3E and one.simulated.store.working.step(1).delay == 250
+        else data
     )
     assert one.device.write(project=2, step_1_delay=0.25).proof == "saved"
     assert sum(frame.startswith("FF AA 03") for frame in one.sent()) == 1, "nothing was written twice"
@@ -224,6 +226,9 @@ def test_unsaved_edits_are_lost_at_power_off_and_saved_by_save(one: Bench) -> No
         one.device.save(2)
     one.device.write(project=2, save=False, step_1_delay=0.1)
     assert stored(one, 2) == PICK.with_step(1, delay=250)
+    one.device.write(project=1, step_1_delay=0.1)
+    with pytest.raises(RequestError, match="project 2 has no edits"):
+        one.device.save(2)
 
 
 def test_write_is_in_the_journal_only_as_a_question(one: Bench) -> None:
