@@ -11,15 +11,15 @@ from pathlib import Path
 from typing import Final
 
 from motorbus.core.register import Register
-from motorbus.families.stepper_new.parameters import BASE, REQUEST_ONLY, STEP, allowed
-from motorbus.families.stepper_new.program.lint import RULES
-from motorbus.families.stepper_new.protocol import COMMANDS, Command, encode
-from motorbus.families.stepper_new.simulator import OPTIONS
+from motorbus.families.stepper.parameters import BASE, REQUEST_ONLY, STEP, allowed
+from motorbus.families.stepper.program.lint import RULES
+from motorbus.families.stepper.protocol import COMMANDS, Command, encode
+from motorbus.families.stepper.simulator import OPTIONS
 from scripts.pages import assumptions, kept, listed
 
 PAGE: Final = Path(__file__).resolve().parent.parent / "docs" / "reference" / "stepper.md"
-FAMILY: Final = PAGE.parents[2] / "src" / "motorbus" / "families" / "stepper_new"
-TESTS: Final = "tests/protocol/stepper_new/test_protocol.py"
+FAMILY: Final = PAGE.parents[2] / "src" / "motorbus" / "families" / "stepper"
+TESTS: Final = "tests/protocol/stepper/test_protocol.py"
 
 HEAD: Final = """# Stepper controller reference
 

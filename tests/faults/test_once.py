@@ -19,7 +19,7 @@ from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown
 from motorbus.families.feetech import FAMILY, Servo, wire
 from motorbus.families.feetech.driver.exchanges import Block, acknowledged, write_block
 from motorbus.families.kst.driver.requests import write_row
-from motorbus.families.stepper.table import ORDERS
+from motorbus.families.stepper import protocol as stepper
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.safety import Gate
 from tests.families.stepper.rig import Rig as StepperRig
@@ -159,5 +159,5 @@ def test_l18_stepper_says_again_only_what_may_be(name: str) -> None:
     assert not ask(rig, name)
     assert line.lost > 0
     again = line.said.count(line.said[0]) > 1
-    assert again <= ORDERS[name].repeatable
-    assert ORDERS[name].repeatable or isinstance(rig.errors[-1], OutcomeUnknown)
+    assert again <= stepper.COMMANDS[name].repeatable
+    assert stepper.COMMANDS[name].repeatable or isinstance(rig.errors[-1], OutcomeUnknown)

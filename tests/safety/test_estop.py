@@ -21,7 +21,7 @@ from motorbus.errors import MotorbusError
 from motorbus.families.feetech import wire as feetech
 from motorbus.families.feetech.driver.exchanges import read_block
 from motorbus.families.kst.driver.feedback import position
-from motorbus.families.stepper import wire as stepper
+from motorbus.families.stepper import protocol as stepper
 from tests.support.noisy_line import NoisyLine
 from tests.support.world import Bus, Queue
 

@@ -6,7 +6,6 @@ import each other. No module but the commands of a family (`Family.cli`) names i
 
 from __future__ import annotations
 
-import os
 import sys
 from functools import cache
 from importlib import import_module
@@ -20,8 +19,6 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 GROUP = "motorbus.families"
-NEW = "MOTORBUS_NEW_FAMILIES"
-"""Names of families that are loaded from the package NAME_new; for development only."""
 
 
 def names() -> list[str]:
@@ -32,8 +29,7 @@ def names() -> list[str]:
 def load(name: str) -> Family:
     """The family of this name. Raises RequestError when there is none."""
     if name in _inside():
-        new = "_new" if name in os.environ.get(NEW, "").split(",") else ""
-        built_in: Family = import_module(f"{__name__}.{name}{new}").FAMILY
+        built_in: Family = import_module(f"{__name__}.{name}").FAMILY
         return built_in
     for point in _outside(tuple(sys.path)):
         if point.name == name:
@@ -48,9 +44,7 @@ def load(name: str) -> Family:
 
 
 def _inside() -> set[str]:
-    return {
-        module.name for module in iter_modules(__path__) if module.ispkg and not module.name.endswith("_new")
-    }
+    return {module.name for module in iter_modules(__path__) if module.ispkg}
 
 
 @cache

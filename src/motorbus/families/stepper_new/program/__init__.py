@@ -1,1 +1,0 @@
-"""A project as a file with units and names, its checks and its duration, and a backup of all projects."""
