@@ -53,7 +53,7 @@ project = 2
 [motor]
 microsteps = 8
 step_angle = "1.8 deg"
-unit = "pulse"
+turn_distance = 1600
 [[step]]
 move = "1 turns"
 speed = "240 rpm"
