@@ -47,6 +47,7 @@ class Controller(PoweredDevice):
         self.now = 0.0
         self.offset = 0
         self.notices: list[float] = []
+        self.planned: list[tuple[float, int, bool]] = []  # changes of inputs: moment (s), input, active
         self.on_power_off: Callable[[], object] = list  # set by the bus
         self._storing: Storing | None = None
         self._remarks = 0
@@ -131,7 +132,8 @@ class Controller(PoweredDevice):
     def due(self) -> float:
         """The next moment (s) at which something happens by itself; inf if none."""
         stored = inf if self._storing is None else self._storing.end
-        return min(stored, self.machine.until, self._home_crossing())
+        planned = self.planned[0][0] if self.planned else inf
+        return min(stored, planned, self.machine.until, self._home_crossing())
 
     def advance(self, to: float) -> None:
         """Let time pass until this moment (s)."""
@@ -140,6 +142,9 @@ class Controller(PoweredDevice):
             if self._storing is not None and self._storing.end <= moment:
                 self.store.put(self._storing.number, self._storing.project)
                 self._storing = None
+            elif self.planned and self.planned[0][0] <= moment:
+                _, port, active = self.planned.pop(0)
+                self.set_input(port, active)
             elif self._home_crossing() <= moment:
                 self._set_input(HOME_INPUT, HOME_INPUT not in self.machine.inputs, moment)
             self.machine.advance(moment)
