@@ -1,0 +1,262 @@
+"""The models that can be simulated: every known number in each of its maps.
+
+A value that no source gives is an assumption: all of `shipped`, the voltages, and the motors of SMS, SCS and HLS.
+STS motor: memory table V3.6 of the STS3215 (50 rpm without load, 150 mA); its current register ends at about 3.25 A.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+from functools import cached_property
+from math import radians
+from types import MappingProxyType
+from typing import Final
+
+from motorbus.core.plant import Drive
+from motorbus.core.register import RegisterMap
+from motorbus.errors import RequestError
+from motorbus.families.feetech_new.models import MODELS as NUMBERS
+from motorbus.families.feetech_new.models import map_for
+from motorbus.families.feetech_new.registers.codes import BAUD_CODES
+from motorbus.families.feetech_new.registers.hls import HLS
+from motorbus.families.feetech_new.registers.scs import SCS, SCS2
+from motorbus.families.feetech_new.registers.sms import SMBL, SMCL
+from motorbus.families.feetech_new.registers.sts import STS
+from motorbus.families.feetech_new.simulator.memory import Layout
+from motorbus.families.feetech_new.traits import TRAITS, Traits
+
+DEFAULT: Final = "sts3215"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Model:
+    """A model in one of its maps; a value that is not of the model is that of all servos of the map.
+
+    `number`         model number (major, minor); `name` is in lower case
+    `angle`          rad for a count of its position
+    `firmware`       the version that it reports
+    `voltage`        supply, V
+    `drive`          motor; speed in counts/s
+    `shipped`        raw values as shipped of the rows without a published default
+    `stored`         raw values that were stored since
+    `reply_delay`    minimum s between request and reply
+    `reversed_by`    bit of `phase` that reverses position feedback and drive together; None: none
+    `heeds_time`     goal_time counts when the velocity is 0
+    `smaller`        a positive duty turns to smaller angles
+    `switch_128`     128 in torque_enable makes the present position the middle
+    `instruction_0b` 0x0B sets the present position
+    """
+
+    table: RegisterMap
+    firmware: tuple[int, int]
+    voltage: float
+    drive: Drive
+    shipped: dict[str, int]
+    reply_delay: float = 0.0
+    reversed_by: int | None = None
+    heeds_time: bool = False
+    smaller: bool = False
+    switch_128: bool = False
+    instruction_0b: bool = False
+    name: str = ""
+    number: tuple[int, int] = (0, 0)
+    angle: float = 0.0
+    stored: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def traits(self) -> Traits:
+        return TRAITS[self.table.name]
+
+    @property
+    def defaults(self) -> dict[str, int]:
+        """All raw values as shipped that its table does not give."""
+        names = ("firmware_major", "firmware_minor", "model_major", "model_minor")
+        return {**self.shipped, **dict(zip(names, (*self.firmware, *self.number), strict=True))}
+
+    @cached_property
+    def layout(self) -> Layout:
+        """Its registers as shipped."""
+        return Layout(self.table, self.defaults)
+
+    @property
+    def rate(self) -> int:
+        """The rate as shipped, bit/s."""
+        return BAUD_CODES[self.shipped.get("baud_rate", self.table["baud_rate"].default or 0)]
+
+    @property
+    def clears_turns(self) -> bool:
+        """It knows 0x0A: HLS (FTServo_Python), and brushless models (a public STS3215 table: "STBL")."""
+        return self.table.name == "hls" or (self.traits.clear_turns and self.name.endswith("bl"))
+
+
+_STS_DRIVE: Final = Drive(top_speed=3400.0, idle_current=0.15, stall_current=3.25)
+_SCS_DRIVE: Final = Drive(top_speed=2048.0, idle_current=0.1, stall_current=1.0)
+_LEAST_DELAY: Final = 100e-6  # FEETECH page on SMS servos: values of register 7 below 50 act as 50
+
+# fmt: off
+_LIKE_STS: Final = {
+    "min_position_limit": 0, "max_position_limit": 4095, "max_temperature": 70,
+    "unload_mask": 44, "led_mask": 47, "position_p": 32, "position_d": 32, "position_i": 0,
+    "min_start_force": 16, "dead_band_cw": 1, "dead_band_ccw": 1,
+    "protection_current": 500, "overcurrent_time": 200, "max_voltage": 140,
+}
+_LOOPS: Final = {"integral_limit": 0, "velocity_p": 10, "velocity_i": 10}
+_HLS: Final = (
+    _LIKE_STS
+    | _LOOPS
+    | {"second_id": 1, "min_voltage": 40, "phase": 0, "current_p": 50, "current_i": 50}
+)
+_SMCL: Final = _LIKE_STS | {
+    "protective_torque": 20, "overload_time": 200, "overload_torque": 80,
+    "max_torque": 1000, "min_voltage": 90, "phase": 0,
+}
+_SCS2: Final = {
+    "return_delay": 0, "min_position_limit": 20, "max_position_limit": 1003,
+    "max_temperature": 80, "max_voltage": 90, "min_voltage": 45, "max_torque": 1000, "phase": 0,
+    "unload_mask": 36, "led_mask": 37, "position_p": 15, "position_d": 15, "min_start_force": 30,
+    "dead_band_cw": 1, "dead_band_ccw": 1, "hysteresis": 1, "overcurrent_time": 50,
+    "protection_current": 500, "protective_torque": 20, "overload_time": 100,
+    "overload_torque": 80, "baud_rate": 0,
+}
+_LEROBOT: Final = {"max_acceleration": 254}  # what lerobot (configure_motors) writes
+# fmt: on
+
+_KINDS: Final = (
+    Model(
+        table=STS,
+        firmware=(3, 10),
+        voltage=7.4,
+        drive=_STS_DRIVE,
+        shipped=_LEROBOT,
+        reversed_by=7,
+        smaller=True,  # servolab, measured on STS3215
+        switch_128=True,
+        instruction_0b=True,  # dispatcher of firmware 3.10 (kuterd/feetech-fw-util)
+    ),
+    Model(
+        table=SMBL,
+        firmware=(2, 45),
+        voltage=12.0,
+        drive=_STS_DRIVE,
+        shipped=_SMCL | _LOOPS | _LEROBOT | {"phase": 12, "torque_limit": 1000},
+        reply_delay=_LEAST_DELAY,
+        reversed_by=7,
+        switch_128=True,
+    ),
+    Model(
+        table=SMCL,
+        firmware=(1, 10),
+        voltage=12.0,
+        drive=_STS_DRIVE,
+        shipped=_SMCL,
+        reply_delay=_LEAST_DELAY,
+        switch_128=True,
+    ),
+    Model(
+        table=SCS,
+        firmware=(0, 10),
+        voltage=6.0,
+        drive=_SCS_DRIVE,
+        shipped={"baud_rate": 0},  # 1000000 or 500000 by model
+        reversed_by=0,
+        heeds_time=True,
+    ),
+    Model(
+        table=SCS2,
+        firmware=(3, 25),
+        voltage=6.0,
+        drive=_SCS_DRIVE,
+        shipped=_SCS2,
+        reversed_by=0,
+        heeds_time=True,
+    ),
+    Model(
+        table=HLS,
+        firmware=(3, 43),  # met on HLS3955 and HLS3915
+        voltage=12.0,
+        drive=_STS_DRIVE,
+        shipped=_HLS,
+        reversed_by=7,
+        instruction_0b=True,  # FTServo_Python, reOfsCal
+    ),
+)
+
+_MOTORS: Final = {
+    "sts3250": Drive(60 / 0.133, 0.15, 3.25),  # data sheet A/0: 60° in 0.133 s at 12 V
+    "scs15": Drive(330.0, 0.1, 1.5),  # data sheet: 55 rpm at 6 V, 1.5 A at stall
+}
+"""Motors of single models; speed in °/s."""
+_HIGH_VOLTAGE: Final = 24.0  # V, of models with HV in their name
+_HIGH_LIMITS: Final = {"max_voltage": 250, "min_voltage": 180}
+
+
+def _all() -> Mapping[str, Sequence[Model]]:
+    kinds = {kind.table.name: kind for kind in _KINDS}
+    found: dict[str, list[Model]] = {}
+    for number, known in NUMBERS.items():
+        name, angle = known.name.lower(), radians(known.arc) / known.resolution
+        for table in known.maps:
+            one = replace(kinds[table], name=name, number=number, angle=angle)
+            if name in _MOTORS:
+                motor = _MOTORS[name]
+                one = replace(one, drive=replace(motor, top_speed=radians(motor.top_speed) / angle))
+            if "hv" in name:
+                one = replace(one, voltage=_HIGH_VOLTAGE, shipped=one.shipped | _HIGH_LIMITS)
+            found.setdefault(name, []).append(one)
+    return found
+
+
+_BY_NAME: Final = _all()
+MODELS: Final[Mapping[str, Model]] = MappingProxyType({name: known[0] for name, known in _BY_NAME.items()})
+"""All models by name in lower case; of several numbers with one name the first."""
+
+
+def model(name: str, firmware: str = "") -> Model:
+    """The model with this name ("": sts3215) and firmware, as "3.9" ("": one that has its map).
+
+    The firmware selects the map of a model that has several; for others only what it reports changes. Raises
+    RequestError for an unknown name and a firmware that is no version.
+    """
+    known = _BY_NAME.get(name.lower() or DEFAULT)
+    if known is None:
+        near = get_close_matches(name.lower(), MODELS, n=3)
+        raise RequestError(
+            f"there is no simulated FEETECH model {name!r}",
+            expected=f"perhaps {', '.join(near)}" if near else f"one of {len(MODELS)}, as {DEFAULT}",
+            advice="docs/reference/feetech-registers.md lists them",
+        )
+    if not firmware:
+        return known[0]
+    major, minor = _version(firmware)
+    table = map_for(major, minor, known[0].table["goal_position"].order)
+    chosen = next((one for one in known if one.table.name == table), known[0])
+    return replace(chosen, firmware=(major, minor))
+
+
+def models(names: str, firmwares: str, count: int) -> list[Model]:
+    """The models of so many servos; names and firmwares are joined by "+" or ",", one for all or one for each.
+
+    Raises RequestError as `model`, and for another number of names or firmwares.
+    """
+    pairs = zip(_spread("model", names, count), _spread("firmware", firmwares, count), strict=True)
+    known: dict[tuple[str, str], Model] = {}
+    return [known.setdefault(pair, model(*pair)) for pair in pairs]
+
+
+def _spread(what: str, joined: str, count: int) -> list[str]:
+    words = joined.replace(",", "+").split("+")
+    if len(words) not in (1, count):
+        raise RequestError(
+            f"{len(words)} {what}s for {count} ids: {joined}",
+            expected=f"one {what} for all, or one for each id, joined by +",
+        )
+    return words * (count // len(words))
+
+
+def _version(text: str) -> tuple[int, int]:
+    major, _, minor = text.partition(".")
+    if not (major.isdecimal() and minor.isdecimal() and int(major) < 256 and int(minor) < 256):
+        raise RequestError(f"option firmware: {text!r} is not a version", expected="as 3.9")
+    return int(major), int(minor)

@@ -1,0 +1,156 @@
+"""The movement of one motor: what its registers order, as far as torque, load and obstacles allow.
+
+All places are counts of the encoder, without end in both directions. At full duty a motor either turns at its top speed
+or gives its stall torque, and linearly in between; so a torque limit and a load are speed limits too. A movement is
+worked out when it begins and is a function of time from then on.
+"""
+
+from __future__ import annotations
+
+from math import copysign, inf, sqrt
+from typing import Final, NamedTuple
+
+from motorbus.core.plant import Drive, Motion, Phase, move, rest, run
+from motorbus.families.feetech_new.traits import Mode
+
+FEEBLE: Final = 0.01
+"""A share of the stall torque below this does not overcome the friction of the gear. # assumption"""
+FULL_ACCELERATION: Final = 25_400.0
+"""Counts/s² where the register is 0 or missing: what its greatest value gives. # assumption"""
+
+
+class Order(NamedTuple):
+    """What is asked of a motor.
+
+    `mode`          None: unknown, it rests # assumption
+    `torque`        share of the stall torque that it may use, 0 to 1
+    `load`          share that the outside takes; positive pushes to smaller counts
+    `blocked`       range that the shaft cannot leave; None: free
+    `place`         goal of the modes position and step
+    `speed`         counts/s of the way there; 0: standstill, inf: as fast as possible
+    `time`          s of the way there if `speed` is 0; 0: not used
+    `velocity`      counts/s of velocity mode, signed
+    `share`         duty of PWM mode or current of current mode, as a share, signed
+    `acceleration`  counts/s²
+    """
+
+    mode: Mode | None
+    torque: float
+    load: float
+    blocked: tuple[float, float] | None
+    place: float
+    speed: float
+    time: float
+    velocity: float
+    share: float
+    acceleration: float
+
+
+class Course(NamedTuple):
+    """A movement, what it costs, and the share of the torque that presses in vain at its end (None: none does)."""
+
+    motion: Motion
+    load: float = 0.0
+    push: float | None = None
+
+    def torque(self, at: float) -> float:
+        """Share of the stall torque that the motor gives."""
+        return self.load if self.push is None or self.motion.moving(at) else self.push
+
+    def duty(self, at: float, drive: Drive) -> float:
+        """Share of the supply; the register calls it load."""
+        return drive.duty(self.motion.velocity(at), self.torque(at))
+
+    def current(self, at: float, drive: Drive) -> float:
+        """Supply current, A."""
+        return drive.current(self.motion.velocity(at), self.torque(at))
+
+
+def limp(motion: Motion, at: float) -> Course:
+    """At rest: the friction of the gear holds it, whatever the load. # assumption"""
+    return Course(rest(at, motion.position(at)))
+
+
+def follow(order: Order, motion: Motion, at: float, drive: Drive) -> Course:
+    """The course that an order starts from the present state of this movement."""
+    if order.torque < FEEBLE or order.mode is None:
+        return limp(motion, at)
+    load = max(-order.torque, min(order.torque, order.load))
+    way = _way(order, motion, at)
+    strength = order.torque
+    if order.mode in (Mode.PWM, Mode.CURRENT):
+        strength = min(strength, abs(order.share))
+    spare = strength - load * way
+    if way and spare < FEEBLE:
+        return Course(rest(at, motion.position(at)), load, way * strength)
+    planned = _plan(order, motion, at, drive, way, spare)
+    if order.blocked is not None:
+        stopped, side = _stopped(planned, *order.blocked)
+        if side:
+            return Course(stopped, load, side * strength)
+    return Course(planned, load)
+
+
+def _way(order: Order, motion: Motion, at: float) -> float:
+    """The direction in which it has to work: 1, -1, or 0 to hold or brake."""
+    goal = order.share
+    if order.mode is Mode.VELOCITY:
+        goal = order.velocity
+    elif order.mode in (Mode.POSITION, Mode.STEP):
+        goal = order.place - motion.position(at)
+    return copysign(1.0, goal) if goal else 0.0
+
+
+def _plan(order: Order, motion: Motion, at: float, drive: Drive, way: float, spare: float) -> Motion:
+    """The movement without obstacles; `spare` is the share of the torque that the load leaves."""
+    position, velocity, _ = motion.state(at)
+    fastest, acceleration = min(1.0, spare) * drive.top_speed, order.acceleration
+    if order.mode in (Mode.POSITION, Mode.STEP):
+        speed = min(order.speed, fastest)
+        if not speed and order.time:
+            speed = min(fastest, _speed_for(abs(order.place - position), order.time, acceleration))
+        return move(at, position, order.place, velocity=velocity, speed=speed, acceleration=acceleration)
+    speed = min(abs(order.velocity), fastest)
+    if order.mode is Mode.PWM:  # a torque limit does not limit the duty # assumption
+        speed, acceleration = drive.top_speed * (abs(order.share) - order.load * way), FULL_ACCELERATION
+    elif order.mode is Mode.CURRENT:
+        speed, acceleration = drive.top_speed, FULL_ACCELERATION * (spare if way else 1.0)
+    goal = way * min(speed, drive.top_speed)
+    return run(at, position, goal, velocity=velocity, acceleration=acceleration)
+
+
+def _speed_for(way: float, time: float, acceleration: float) -> float:
+    """The speed of a trapezoid from rest to rest in this time; inf if none is fast enough."""
+    spare = time * time - 4 * way / acceleration
+    return acceleration * (time - sqrt(spare)) / 2 if spare > 0 else inf
+
+
+def _stopped(motion: Motion, low: float, high: float) -> tuple[Motion, float]:
+    """The movement ended where it leaves this range, and the side (-1, 1); 0 if it never does.
+
+    A goal inside the range is reached: an overshoot on the way is not stopped.
+    """
+    if not motion.cruise and low <= motion.goal <= high:
+        return motion, 0.0
+    phases: list[Phase] = []
+    for phase in (*motion.phases, Phase(inf, motion.goal, motion.cruise, 0.0)):
+        time, side, bound = min(
+            (_time_to(low, phase, -1.0), -1.0, low), (_time_to(high, phase, 1.0), 1.0, high)
+        )
+        if time < phase.duration:
+            end = phase.position if not time else bound
+            phases += [phase._replace(duration=time)] if time else []
+            return Motion(motion.start, tuple(phases), end), side
+        phases.append(phase)
+    return motion, 0.0
+
+
+def _time_to(bound: float, phase: Phase, side: float) -> float:
+    """Time (s) at which this phase crosses the bound outwards; inf if it never does."""
+    distance = side * (bound - phase.position)
+    velocity, acceleration = side * phase.velocity, side * phase.acceleration
+    if distance <= 0:
+        return 0.0 if (velocity or acceleration) > 0 else inf
+    square = velocity**2 + 2 * acceleration * distance
+    speed = velocity + sqrt(square) if square >= 0 else 0.0
+    return 2 * distance / speed if speed > 0 else inf
