@@ -245,7 +245,7 @@ def _name(address: int, table: RegisterMap) -> str:
     before = table.at(address - 1)
     if before and before.size == 2:
         return f"second byte of {before.name}"
-    return f"not in the {table.name.upper()} map"
+    return "not in the map"
 
 
 def _value(address: int, data: bytes, table: RegisterMap) -> str:

@@ -114,25 +114,31 @@ def frame(id: int, code: int, parameters: bytes = b"") -> bytes:
 
 def instruction(id: int, code: int, parameters: bytes = b"") -> bytes:
     """An instruction packet that obeys `RULES`."""
+    if not suits(code, parameters) or not _reaches(code, id):
+        raise _refusal(id, code, len(parameters))
+    return frame(id, code, parameters)
+
+
+def _reaches(code: int, id: int) -> bool:
+    rule = RULES[code]
+    return rule.all if id == BROADCAST else rule.one and 0 <= id <= MAX_ID
+
+
+def _refusal(id: int, code: int, count: int) -> RequestError:
     name = instruction_name(code)
-    rule = RULES.get(code)
-    if rule is None or not (rule.one or rule.all):
-        raise RequestError(f"{name} is never sent", cause="it may leave the servo without its program")
+    rule = RULES.get(code, Rule(0, 0))
+    if not (rule.one or rule.all):
+        return RequestError(f"{name} is never sent", cause="it may leave the servo without its program")
     if not 0 <= id <= BROADCAST:
-        raise RequestError(f"id {id} is impossible", expected=f"0 to {MAX_ID}", node=id)
-    if not suits(code, parameters):
-        raise RequestError(
-            f"{name} with {len(parameters)} parameter bytes is impossible",
-            expected=f"{rule.fewest} to {rule.most} bytes",
-        )
+        return RequestError(f"id {id} is impossible", expected=f"0 to {MAX_ID}", node=id)
     if id == BROADCAST and not rule.all:
-        raise RequestError(
-            f"{name} cannot be sent to all servos (id {BROADCAST})",
-            expected=f"the id of one servo, 0 to {MAX_ID}",
+        return RequestError(
+            f"{name} cannot be sent to all servos (id {BROADCAST})", expected=f"0 to {MAX_ID}"
         )
     if id != BROADCAST and not rule.one:
-        raise RequestError(f"{name} cannot be sent to one servo", expected=f"id {BROADCAST}", node=id)
-    return frame(id, code, parameters)
+        return RequestError(f"{name} cannot be sent to one servo", expected=f"id {BROADCAST}", node=id)
+    allowed = f"{rule.fewest} to {rule.most} bytes"
+    return RequestError(f"{name} with {count} parameter bytes is impossible", expected=allowed)
 
 
 def ping(id: int) -> bytes:

@@ -12,6 +12,8 @@ from motorbus.families.feetech_new.registers.scs import SCS, SCS2
 from motorbus.families.feetech_new.registers.sms import SMBL, SMCL
 from motorbus.families.feetech_new.registers.sts import STS
 
+__all__ = ["HLS", "SCS", "SCS2", "SMBL", "SMCL", "STS", "TABLES"]
+
 TABLES: Final[Mapping[str, RegisterMap]] = MappingProxyType(
     {table.name: table for table in (STS, SMBL, SMCL, SCS, SCS2, HLS)}
 )
