@@ -1,0 +1,280 @@
+"""Give the present pose another position: calibrate, zero, multi-turn counting.
+
+HLS have an instruction for it (0x0B); of the others the homing offset register is written, as LeRobot does. Either way
+both readings must fit: the position is what was asked for, and the offset changed by as much as the position did. The
+old offset is added back first, and the shortest distance around the turn is taken (lerobot#3370, lerobot#1296). Source:
+STS3215 memory table V3.6; FEETECH SDK, hls.py (reOfsCal); feetech-cli, servolab: the offset acts in position mode only.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+from motorbus.core.register import Register, RegisterMap, is_number, shown
+from motorbus.core.request import Effect, Priority
+from motorbus.core.steps import Exclusive
+from motorbus.errors import DeviceError, MotorbusError, RequestError, VerificationFailed
+from motorbus.families.feetech_new import protocol
+from motorbus.families.feetech_new.driver.eeprom import Unlocked, store
+from motorbus.families.feetech_new.driver.goals import check_mode
+from motorbus.families.feetech_new.driver.identity import check_alone, learn, read_anew
+from motorbus.families.feetech_new.driver.modes import limits_block, raw_limits
+from motorbus.families.feetech_new.driver.node import Node
+from motorbus.families.feetech_new.driver.requests import (
+    DOUBTS,
+    PRESENT,
+    STORE,
+    Block,
+    acknowledged,
+    confirmed,
+    read_block,
+    verified,
+)
+from motorbus.families.feetech_new.registers import TABLES
+from motorbus.families.feetech_new.traits import TRAITS, TURNS_BIT, Mode
+
+SLACK: Final = 0.03  # rad by which a limp shaft may turn between two readings
+
+
+class Pose(NamedTuple):
+    """Raw position as the servo tells it, and the raw homing offset in it."""
+
+    position: int
+    offset: int
+
+
+class Calibration(NamedTuple):
+    """What a calibration did; angles in rad, offsets as raw counts too.
+
+    `before` and `after` are what the same pose reads; `note` says what differs from the request, "" for nothing.
+    """
+
+    before: float
+    after: float
+    old_offset: float
+    new_offset: float
+    raw_old_offset: int
+    raw_new_offset: int
+    note: str
+
+
+class Zero(NamedTuple):
+    """Position, homing offset and limits in rad, the offset in counts too."""
+
+    position: float
+    offset: float
+    raw_offset: int
+    limits: tuple[float, float] | None
+
+
+async def zero(node: Node) -> Zero:
+    """Where this servo has its zero; reads only. Raises RequestError where its map has no homing offset."""
+    table = await read_anew(node)
+    row = _offset_row(node, table)
+    pose = await _read_pose(node, row)
+    position = float(node.value(table["present_position"], pose.position))
+    return Zero(position, float(row.to_value(pose.offset)), pose.offset, node.limits)
+
+
+async def calibrate(node: Node, to: float | None = None) -> Calibration:
+    """Make the present pose read `to` rad (None: the middle of the turn), for good; the servo goes limp and stays so.
+
+    Hold the shaft still. The limits keep their values and mean other poses afterwards. Raises RequestError, with
+    nothing changed, without a homing offset, in another mode, with counted turns, another resolution, or an impossible
+    angle; DeviceError if it does not obey; VerificationFailed if a reading does not fit.
+    """
+    if to is not None and not is_number(to):
+        raise RequestError(f"{shown(to)} is no position", advice="nothing was sent", node=node.node)
+    table = await read_anew(node)
+    row, position = _offset_row(node, table), table["present_position"]
+    check_mode(node, Mode.POSITION)
+    settings = node.settings
+    assert settings is not None
+    if "angular_resolution" in table and (await _read_byte(node, table["angular_resolution"])) != 1:
+        raise RequestError(
+            f"node {node.node} has another angular resolution than 1, where its offset has no known unit",
+            advice="write(angular_resolution=1), calibrate, and set it again; nothing was sent",
+            node=node.node,
+        )
+    goal = settings.turn // 2 if to is None else node.raw(position, to)
+    if not 0 <= goal < settings.turn:
+        most = float(node.value(position, settings.turn - 1))
+        raise RequestError(
+            f"node {node.node}: {to} rad is not within one turn",
+            expected=f"0 to {most:.4f} rad",
+            node=node.node,
+        )
+    _plan(node, row, await _read_pose(node, row), goal)
+    before, planned, found = await Exclusive(_calibrate(node, table, row, goal))
+    note = ""
+    if planned.position != goal:
+        note = f"this pose reads {planned.position - goal:+} count beside, for the offset register ends there"
+    return Calibration(
+        before=float(node.value(position, before.position)),
+        after=float(node.value(position, found.position)),
+        old_offset=float(row.to_value(before.offset)),
+        new_offset=float(row.to_value(found.offset)),
+        raw_old_offset=before.offset,
+        raw_new_offset=found.offset,
+        note=note,
+    )
+
+
+async def _calibrate(node: Node, table: RegisterMap, row: Register, goal: int) -> tuple[Pose, Pose, Pose]:
+    async with Unlocked(node, table) as unlocked:
+        before = await _read_pose(node, row)  # it may have moved when it went limp
+        planned = _plan(node, row, before, goal)
+        await unlocked.check_open()
+        doubt = None
+        block = Block(row.address, row.encode(planned.offset), Effect.PERSISTENT)
+        unlocked.before.append(block._replace(data=row.encode(before.offset)))
+        if node.traits.calibrates == "offset":
+            await confirmed(node, block, timeout=STORE)
+            await verified(node, block, timeout=STORE)
+        else:
+            doubt = await _instruct(node, table["present_position"].encode(goal))
+        found = await _read_pose(node, row)
+        if found != planned:
+            _judge(node, table, before, planned, found, doubt)
+        await unlocked.check_open()
+    return before, planned, found
+
+
+async def _instruct(node: Node, goal: bytes) -> MotorbusError | None:
+    """Send 0x0B; gives the doubt whether it was received. Twice has the effect of once."""
+    request = acknowledged(
+        node,
+        protocol.calibrate(node.node, goal),
+        Block(0, b"", Effect.PERSISTENT),
+        priority=Priority.CONFIGURATION,
+        timeout=STORE,
+    )
+    try:
+        await request
+    except DOUBTS as error:
+        return error
+    return None
+
+
+def _plan(node: Node, row: Register, pose: Pose, goal: int) -> Pose:
+    """What this pose will read, and its offset. Raises RequestError if that does not fit."""
+    assert node.settings is not None
+    turn = node.settings.turn
+    if not 0 <= pose.position < turn:
+        raise RequestError(
+            f"node {node.node} tells the raw position {pose.position}, not within one turn of {turn} counts",
+            cause="it counts turns (bit 4 of its phase register)",
+            advice="clear_turns() or a power cycle; set_multi_turn(False) for good; nothing was changed",
+            node=node.node,
+        )
+    encoder = (pose.position + pose.offset) % turn
+    offset = encoder - goal
+    if math.isclose(row.scale * turn, math.tau):  # the arc of an SCS has ends
+        offset = _shortest(offset, turn)
+    fits = min(max(offset, row.low), row.high)
+    if abs(offset - fits) > 1:
+        raise RequestError(
+            f"node {node.node}: this pose needs a homing offset of {offset} counts",
+            expected=f"{row.low} to {row.high}",
+            advice="turn the shaft nearer, or mount the horn another way; nothing was changed",
+            node=node.node,
+        )
+    return Pose((encoder - fits) % turn, fits)
+
+
+def _shortest(distance: int, turn: int) -> int:
+    return (distance + turn // 2) % turn - turn // 2
+
+
+def _judge(
+    node: Node, table: RegisterMap, before: Pose, planned: Pose, found: Pose, doubt: MotorbusError | None
+) -> None:
+    """Raise unless the readings fit, but for a shaft that moved a little."""
+    assert node.settings is not None
+    turn, slack = node.settings.turn, round(SLACK / table["present_position"].scale)
+    beside = _shortest(found.position - planned.position, turn)
+    moved = _shortest(found.position + found.offset - before.position - before.offset, turn)
+    if abs(beside) <= slack and abs(moved) <= slack:
+        return
+    ignored = found.offset == before.offset
+    kind = DeviceError if ignored else VerificationFailed
+    what = "did not change its homing offset" if ignored else "does not read as it must after the calibration"
+    raise kind(
+        f"node {node.node} {what}",
+        received=f"position {found.position}, offset {found.offset} (raw)",
+        expected=f"position {planned.position}, offset {planned.offset}",
+        cause="its firmware ignores this order, or its shaft was turned meanwhile",
+        advice="hold the shaft still and calibrate again",
+        node=node.node,
+    ) from doubt
+
+
+def _offset_row(node: Node, table: RegisterMap) -> Register:
+    if "homing_offset" in table:
+        return table["homing_offset"]
+    raise RequestError(
+        f"node {node.node}: servos of the map {table.name} have no homing offset",
+        advice="keep the zero in the machine file; nothing was sent",
+        node=node.node,
+    )
+
+
+async def _read_pose(node: Node, row: Register) -> Pose:
+    """Offset and position. Raises DeviceError for an offset outside the range of its register."""
+    data = await read_block(node, row.address, row.size, bytes, timeout=STORE)
+    offset = row.decode(data)
+    if row.encode(max(row.low, min(offset, row.high))) != data and offset:
+        raise DeviceError(
+            f"node {node.node}: its homing offset reads {data.hex(' ')}, which its register cannot mean",
+            expected=f"{row.low} to {row.high}, the sign at bit {row.sign_bit}",
+            advice="factory_restore() sets it to 0; nothing was changed",
+            node=node.node,
+            register=row.name,
+        )
+    assert node.table is not None
+    position = node.table["present_position"]
+    return Pose(await read_block(node, PRESENT, position.size, position.decode, timeout=STORE), offset)
+
+
+async def _read_byte(node: Node, row: Register) -> int:
+    return await read_block(node, row.address, row.size, row.decode)
+
+
+# -- many turns ------------------------------------------------------------------------------------------------
+
+
+async def set_multi_turn(node: Node, on: bool, limits: tuple[float, float] | None = None) -> None:
+    """Count goals and position over many turns, for good, or within one; the servo goes limp and stays so.
+
+    On: both position limits become 0, and bit 4 of its own phase register is set. Off: the bit is cleared and `limits`
+    (rad) hold again. It forgets its turns at power-off: home it after every power-up. Raises RequestError for maps of
+    one turn (SMCL, SCS), in another mode, for impossible limits, and off without limits. Source: FEETECH notes on
+    special bytes; STS3215 memory table V3.6; lerobot#3373.
+    """
+    table = await read_anew(node)
+    if not node.traits.many_turns:
+        raise RequestError(
+            f"node {node.node}: servos of the map {table.name} count within one turn",
+            expected=f"one of the maps {', '.join(name for name in TABLES if TRAITS[name].many_turns)}",
+            advice="nothing was sent",
+            node=node.node,
+        )
+    check_mode(node, Mode.POSITION)
+    assert node.settings is not None
+    wished = limits if limits is not None or node.settings.many_turns else node.limits
+    if (on and limits is not None) or (not on and wished is None):
+        raise RequestError(
+            f"node {node.node}: many turns have no limits, one turn needs limits=(low, high) in rad",
+            advice="nothing was sent",
+            node=node.node,
+        )
+    image = await check_alone(node)  # the other bits of its phase belong to this servo
+    learn(node, image)
+    row = table["phase"]
+    byte = image[row.address]
+    phase = Block(row.address, bytes((byte | TURNS_BIT if on else byte & ~TURNS_BIT,)))
+    bounds = limits_block(node, table, (0, 0) if on or wished is None else raw_limits(node, table, wished))
+    # Never limits of 0 without the bit: then no position would tell the turn.
+    await store(node, table, [phase, bounds] if on else [bounds, phase])
+    await read_anew(node)

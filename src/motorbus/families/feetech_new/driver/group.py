@@ -1,0 +1,519 @@
+"""Several servos in one packet: SYNC READ with partial results, SYNC WRITE, REG WRITE with one ACTION.
+
+A silent servo costs its own value only. Servos of maps without SYNC READ, and those that answer READ and not SYNC READ,
+are read one by one. Replies of one request take at most 4 ms, for a stop waits until they have passed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from struct import Struct
+from typing import Any, Final, NamedTuple, TypeVar
+
+from motorbus.core.family import Positions
+from motorbus.core.register import Register, RegisterMap, Value, is_number
+from motorbus.core.request import (
+    ExactDecoder,
+    Expected,
+    Priority,
+    Request,
+    Response,
+    SetpointGroup,
+    SetpointWrite,
+)
+from motorbus.core.setpoint import Setpoint, torque_off
+from motorbus.core.steps import Emit, Exclusive, SetBitrate, catch, with_cleanup
+from motorbus.errors import MotorbusError, RequestError
+from motorbus.families.feetech_new import protocol
+from motorbus.families.feetech_new.driver.access import (
+    action_all,
+    check_names,
+    decode_span,
+    hand_over,
+    ram_block,
+    rows_of,
+    spans,
+)
+from motorbus.families.feetech_new.driver.goals import goal_row, position_goal
+from motorbus.families.feetech_new.driver.identity import learn, unknown_map
+from motorbus.families.feetech_new.driver.motion import LIMP, disable_torque
+from motorbus.families.feetech_new.driver.node import IMAGE, Node, as_nodes
+from motorbus.families.feetech_new.driver.requests import (
+    DATA,
+    PRESENT,
+    Block,
+    read_block,
+    reports_position,
+    unanswered,
+    unchanged,
+)
+
+T = TypeVar("T")
+One = TypeVar("One", bound=int | Node)
+
+AIR: Final = 0.004  # s of replies of one request
+BITS: Final = 10  # of a byte on the wire
+MOST_IDS: Final = 251
+
+
+class GroupResult(NamedTuple):
+    """Values by id and name in API units, errors by id, alarms by id, arrival of the last reply (s, -inf for none)."""
+
+    values: dict[int, dict[str, Value]]
+    errors: dict[int, MotorbusError]
+    alarms: dict[int, tuple[str, ...]]
+    at: float
+
+
+class ReadsAlone(NamedTuple):
+    """An event: this servo answers READ and not SYNC READ, so it is read by itself from now on."""
+
+    node: int
+
+
+# -- read ------------------------------------------------------------------------------------------------------
+
+
+async def sync_read(names: Sequence[str], ids: Iterable[int | Node]) -> GroupResult:
+    """These registers of all these servos, by few SYNC READs; maps may be mixed.
+
+    Errors of single servos are in the result. Raises RequestError for an unknown name.
+    """
+    check_names(names)
+    nodes = as_nodes(ids)
+    errors = await prepare_all(nodes)
+    raws: dict[int, dict[str, int]] = {node.node: {} for node in nodes if node.node not in errors}
+    groups: dict[tuple[str, str], list[Node]] = {}
+    for node in nodes:
+        if node.node in raws:
+            groups.setdefault((_table(node).name, _table(node)["present_position"].order), []).append(node)
+    for group in groups.values():
+        for span in spans(rows_of(_table(group[0]), names)):
+            here = [node for node in group if node.node not in errors]
+            for part in await divided(here, span.size):
+                for id, data in (await collect(part, span.address, span.size, errors)).items():
+                    raws[id] |= decode_span(span, data)
+    answered = [node for node in nodes if node.node not in errors]
+
+    def values(node: Node) -> dict[str, Value]:
+        rows = rows_of(_table(node), names)
+        return {row.name: node.value(row, raws[node.node][row.name]) for row in rows}
+
+    return GroupResult(
+        {node.node: values(node) for node in answered},
+        errors,
+        {node.node: node.alarm for node in answered},
+        max((node.at for node in answered), default=float("-inf")),
+    )
+
+
+async def prepare_all(ids: Iterable[int | Node]) -> dict[int, MotorbusError]:
+    """Identify those of these servos that are unknown; the errors by id."""
+    nodes = [node for node in as_nodes(ids) if node.table is None or node.settings is None]
+    errors: dict[int, MotorbusError] = {}
+    for part in await divided(nodes, IMAGE):
+        images = await collect(part, 0, IMAGE, errors)
+        for node in part:
+            if node.node in images:
+                learn(node, images[node.node])
+    return errors
+
+
+async def divided(nodes: Sequence[Node], count: int) -> list[Sequence[Node]]:
+    """Divide nodes so that the replies of each part, with `count` bytes each, take at most `AIR` s at this rate."""
+    each = (protocol.OVERHEAD + count) * BITS / await SetBitrate(0)
+    most = int(min(max(AIR / each, 1), MOST_IDS))
+    return [nodes[start : start + most] for start in range(0, len(nodes), most)]
+
+
+async def collect(
+    nodes: Sequence[Node], address: int, count: int, errors: dict[int, MotorbusError]
+) -> dict[int, bytes]:
+    """One block of each: by SYNC READ, then by READ of those that it did not return; errors of the rest by id."""
+    able = [node for node in nodes if node.traits.sync_read and not node.reads_alone]
+    found = await _sync_blocks(able, address, count) if able else {}
+    for node in nodes:
+        if node.node in found:
+            continue
+        data = await catch(read_block(node, address, count, bytes))
+        if isinstance(data, MotorbusError):
+            errors[node.node] = data
+            continue
+        found[node.node] = data
+        if node in able and not await _sync_blocks([node], address, count):
+            node.reads_alone = True
+            await Emit(ReadsAlone(node.node))
+    return found
+
+
+async def _sync_blocks(nodes: Sequence[Node], address: int, count: int) -> dict[int, bytes]:
+    def decode(answer: Response) -> dict[int, bytes]:
+        return {id: data[:count] for id, data in _heard(nodes, answer)}
+
+    found = await catch(sync_request(nodes, address, count, decode))
+    return {} if isinstance(found, MotorbusError) else found
+
+
+def sync_request(
+    nodes: Sequence[Node],
+    address: int,
+    count: int,
+    decode: Callable[[Response], T],
+    decode_exact: ExactDecoder[T] | None = None,
+) -> Request[T]:
+    """SYNC READ one block of each of these, in this order."""
+    ids = [node.node for node in nodes]
+    return Request(
+        protocol.sync_read(address, count, ids),
+        tuple(Expected(id, id, protocol.OVERHEAD + count) for id in ids),
+        decode,
+        repeatable=True,
+        reports_position=reports_position({node.node: node for node in nodes}, address, count),
+        decode_exact=decode_exact,
+    )
+
+
+def _heard(nodes: Sequence[Node], answer: Response) -> Iterator[tuple[int, bytes]]:
+    """Id and data of each reply."""
+    by_id = {node.node: node for node in nodes}
+    for reply in answer.replies:
+        frame = reply.data
+        by_id[frame[2]].heard(frame[4], answer.at)
+        yield frame[2], frame[DATA:-1]
+
+
+def positions_request(nodes: Sequence[Node]) -> Request[Positions]:
+    """The present positions (rad) of identified servos with SYNC READ, in one request that may be kept."""
+    rows = {node.node: known_row(node, "present_position") for node in nodes}
+    by_id = {node.node: node for node in nodes}
+
+    def decode(answer: Response) -> Positions:
+        values = {}
+        for id, data in _heard(nodes, answer):
+            row = rows[id]
+            values[id] = float(by_id[id].value(row, row.decode(data[: row.size])))
+        return Positions(values, answer.missing, answer.at)
+
+    exact = exact_positions(nodes, list(rows.values()))
+    return sync_request(nodes, PRESENT, 2, decode, exact)
+
+
+def exact_positions(nodes: Sequence[Node], rows: Sequence[Register]) -> ExactDecoder[Positions] | None:
+    """The fast decoder of `positions_request`; None for mixed byte orders, and modes that leave the offset in."""
+    if len({row.order for row in rows}) > 1 or any(
+        node.settings is None or node.settings.shift for node in nodes
+    ):
+        return None
+    order = "<" if rows[0].order == "little" else ">"
+    unpack = Struct(order + "5xHx" * len(nodes)).unpack
+    made = [(node, node.settings) for node in nodes]
+    scales = [(node.node, float(node.value(row, 1))) for node, row in zip(nodes, rows, strict=True)]
+
+    def take(data: bytes, at: float) -> Positions | None:
+        values = {}
+        for (id, scale), raw in zip(scales, unpack(data), strict=True):
+            if raw >= 0x8000:  # negative
+                return None
+            values[id] = raw * scale
+        for node, settings in made:
+            if node.settings is not settings:
+                return None
+            node.at, node.alarm = at, ()
+        return Positions(values, (), at)
+
+    return exact_decoder([node.node for node in nodes], 2, take)
+
+
+def exact_decoder(ids: Sequence[int], count: int, take: ExactDecoder[T]) -> ExactDecoder[T]:
+    """Decode a SYNC READ if its bytes are all replies, in order, with valid checksums and no alarm."""
+    size = protocol.OVERHEAD + count
+    heads = [protocol.HEADER + bytes((id, count + 2, 0)) for id in ids]
+    total, starts = size * len(ids), range(0, size * len(ids), size)
+
+    def decode(data: Any, at: float) -> T | None:
+        if len(data) != total:
+            return None
+        for start, head in zip(starts, heads, strict=True):
+            if data[start : start + DATA] != head or sum(data[start + 2 : start + size]) & 0xFF != 0xFF:
+                return None
+        return take(data, at)
+
+    return decode
+
+
+def _table(node: Node) -> RegisterMap:
+    assert node.table is not None
+    return node.table
+
+
+def known_row(node: Node, name: str) -> Register:
+    """A row of an identified servo. Raises RequestError if it is not, DeviceError for an unknown map."""
+    if node.table is None or node.settings is None:
+        raise RequestError(
+            f"node {node.node} is not identified: its limits and units are unknown",
+            advice="identify() each servo before the loop, or run prepare_all(); nothing was sent",
+            node=node.node,
+        )
+    if not node.table[name].unit:
+        raise unknown_map(node, f"cannot tell its {name.replace('_', ' ')} in a unit")
+    return goal_row(node, name)
+
+
+# -- write -----------------------------------------------------------------------------------------------------
+
+
+async def sync_write(values: Mapping[One, Mapping[str, Value]]) -> None:
+    """Write the same adjoining RAM registers of many servos: `{id or servo: {name: value}}`, in API units.
+
+    No servo acknowledges it. One packet carries up to 83 servos with two bytes each; more packets are not simultaneous.
+    Nothing is written if a servo is silent or unknown, or a value cannot be written.
+    """
+    await send_all(sync_writes(*await _prepared(values, "SYNC WRITE")))
+
+
+async def _prepared(values: Mapping[One, Mapping[str, Value]], what: str) -> tuple[list[Node], list[Block]]:
+    """The servos, identified, and the block of each."""
+    for orders in values.values():
+        check_names(orders)
+    nodes = as_nodes(values)
+    errors = await prepare_all(nodes)
+    if errors:
+        raise next(iter(errors.values()))
+    if what == "SYNC WRITE" and len({frozenset(orders) for orders in values.values()}) > 1:
+        raise RequestError(
+            "SYNC WRITE carries the same registers for every servo", advice="write() them one by one"
+        )
+    return nodes, [ram_block(node, orders, what) for node, orders in zip(nodes, values.values(), strict=True)]
+
+
+def sync_writes(nodes: Sequence[Node], blocks: Sequence[Block]) -> list[Request[None]]:
+    """These blocks in few SYNC WRITEs. Each is judged by the goals of the later ones too."""
+    places: dict[tuple[int, int], list[tuple[Node, Block]]] = {}
+    for node, block in zip(nodes, blocks, strict=True):
+        places.setdefault((block.address, len(block.data)), []).append((node, block))
+    parts = []
+    for (_, size), group in places.items():
+        most = protocol.sync_write_capacity(size)
+        parts += [group[start : start + most] for start in range(0, len(group), most)]
+    requests = []
+    for number, part in enumerate(parts):
+        left = [one for later in parts[number:] for one in later]
+        requests.append(
+            unanswered(
+                protocol.sync_write(part[0][1].address, [(node.node, block.data) for node, block in part]),
+                max(block.effect for _, block in left),
+                tuple(goal for _, block in left for goal in block.goals),
+                unless=unchanged([node for node, _ in left]),
+            )
+        )
+    return requests
+
+
+async def send_all(requests: Sequence[Request[None]]) -> None:
+    """Send these one after the other; an error of a later one says how many have left."""
+    for sent, request in enumerate(requests):
+        try:
+            await request
+        except MotorbusError as error:
+            if sent:
+                error.add_note(f"{sent} of {len(requests)} packets had left before this one")
+            raise
+
+
+class GoalWriter:
+    """Makes SYNC WRITEs of goal positions of identified servos for a loop; see `__call__`.
+
+    Raises RequestError unless all are in position mode, of maps with one byte order, and fit one packet.
+    """
+
+    def __init__(self, nodes: Sequence[Node]) -> None:
+        rows = [known_row(node, "goal_position") for node in nodes]
+        for node in nodes:
+            position_goal(node, 0.0)
+        if len(nodes) > protocol.sync_write_capacity(2):
+            raise RequestError(
+                f"one packet cannot carry the goals of {len(nodes)} servos", advice="divide them"
+            )
+        self._made: Final = [(node, node.settings) for node in nodes]
+        self._nodes: Final = nodes
+        self._rows: Final = rows
+        self._cells: Final = [_cell(node, row) for node, row in zip(nodes, rows, strict=True)]
+        self._head: Final = bytes((protocol.BROADCAST, 4 + 3 * len(nodes), 0x83, rows[0].address, 2))
+        self._group: Final = SetpointGroup([node.node for node in nodes], self._setpoints, unchanged(nodes))
+
+    def holds(self) -> bool:
+        """Whether the settings of all servos are those that it was made by."""
+        return all(node.settings is settings for node, settings in self._made)
+
+    def __call__(self, goals: Sequence[float]) -> Request[None]:
+        """The packet with these goals (rad), one for each servo; the gate judges the limits.
+
+        Raises RequestError for another number of goals, LimitExceeded for what no register holds.
+        """
+        if len(goals) != len(self._cells):
+            raise RequestError(f"{len(goals)} goals for {len(self._cells)} servos", advice="nothing was sent")
+        body, raws = bytearray(self._head), []
+        for goal, (id, scale, low, high, big) in zip(goals, self._cells, strict=True):
+            raw = round(goal / scale) if is_number(goal) else -1
+            if not low <= raw <= high:
+                return self._checked(goals)
+            body += bytes((id, raw >> 8, raw & 0xFF) if big else (id, raw & 0xFF, raw >> 8))
+            raws.append(raw)
+        wire = protocol.HEADER + body + bytes((protocol.checksum(bytes(body)),))
+        return SetpointWrite(bytes(wire), self._group, raws)
+
+    def _setpoints(self, raws: Sequence[int]) -> tuple[Setpoint, ...]:
+        return tuple(
+            Setpoint(node.node, "position", node.value(row, raw), *(node.limits or (None, None)))
+            for node, row, raw in zip(self._nodes, self._rows, raws, strict=True)
+        )
+
+    def _checked(self, goals: Sequence[float]) -> Request[None]:
+        """The packet with a negative goal, or one outside the limits, which the gate judges."""
+        blocks = []
+        for node, row, goal in zip(self._nodes, self._rows, goals, strict=True):
+            raw, order = position_goal(node, goal)
+            blocks.append(Block(row.address, row.encode(raw), row.effect, (order,)))
+        (request,) = sync_writes(self._nodes, blocks)
+        return request
+
+
+def _cell(node: Node, row: Register) -> tuple[int, float, int, int, bool]:
+    """Id, unit (rad), lowest and highest raw goal within the limits whose code is the number itself, byte order."""
+    scale, (low, high) = float(node.value(row, 1)), node.limits or (0.0, 0.0)
+    least, most = max(0, row.low, round(low / scale)), min(row.high, round(high / scale))
+    least += node.value(row, least) < low
+    most -= node.value(row, most) > high
+    return node.node, scale, least, most, row.order == "big"
+
+
+class ServoGroup:
+    """Identified servos of one bus for a loop; its requests may be kept and run again.
+
+    Raises RequestError for a servo that is not identified, or has no SYNC READ: `sync_read` reads those one by one.
+    """
+
+    def __init__(self, servos: Sequence[Node]) -> None:
+        self.servos: Final = as_nodes(servos)
+        for node in self.servos:
+            known_row(node, "present_position")
+            if not node.traits.sync_read or node.reads_alone:
+                raise RequestError(
+                    f"node {node.node} has no SYNC READ", advice="use sync_read()", node=node.node
+                )
+
+    @property
+    def positions(self) -> Request[Positions]:
+        """The present positions (rad)."""
+        return positions_request(self.servos)
+
+    def read(self, *names: str) -> Request[dict[int, dict[str, Value]]]:
+        """These registers of all servos that answer, by id and name; they must lie alike in the maps of all."""
+        check_names(names)
+        found = {tuple(spans(rows_of(_table(node), names))) for node in self.servos}
+        (first, *others) = sorted({(span.address, span.size) for group in found for span in group})
+        if others:
+            raise RequestError(
+                f"{', '.join(names)} are not in one place in these servos", advice="read fewer registers"
+            )
+        address, size = first
+        rows = {node.node: rows_of(_table(node), names) for node in self.servos}
+        by_id = {node.node: node for node in self.servos}
+
+        def decode(answer: Response) -> dict[int, dict[str, Value]]:
+            values = {}
+            for id, data in _heard(self.servos, answer):
+                pairs = [
+                    (row, row.decode(data[row.address - address : row.address - address + row.size]))
+                    for row in rows[id]
+                ]
+                values[id] = {row.name: by_id[id].value(row, raw) for row, raw in pairs}
+            return values
+
+        return sync_request(self.servos, address, size, decode)
+
+    def write(self, *names: str) -> Callable[[Sequence[Any]], Request[None]]:
+        """A function of one value for each servo, or one sequence of values in the order of the names."""
+        if names == ("goal_position",):
+            return GoalWriter(self.servos)
+
+        def make(values: Sequence[Any]) -> Request[None]:
+            if len(values) != len(self.servos):
+                raise RequestError(f"{len(values)} values for {len(self.servos)} servos")
+            rows = [(value,) if len(names) == 1 else value for value in values]
+            blocks = [
+                ram_block(node, dict(zip(names, row, strict=True)), "SYNC WRITE")
+                for node, row in zip(self.servos, rows, strict=True)
+            ]
+            (request,) = sync_writes(self.servos, blocks)
+            return request
+
+        return make
+
+
+# -- torque, REG WRITE -----------------------------------------------------------------------------------------
+
+
+def disable_torque_everyone() -> Request[None]:
+    """Torque off for every servo on the line, in one broadcast without replies."""
+    wire = protocol.write(protocol.BROADCAST, LIMP.address, LIMP.data)
+    return unanswered(wire, LIMP.effect, priority=Priority.STOP)
+
+
+def limp_requests(ids: Sequence[int], most: int) -> list[Request[None]]:
+    """Torque off for these servos by SYNC WRITE, at most so many in one packet."""
+    parts = [ids[start : start + most] for start in range(0, len(ids), most)]
+    return [
+        unanswered(
+            protocol.sync_write(LIMP.address, [(id, LIMP.data) for id in part]),
+            LIMP.effect,
+            tuple(map(torque_off, part)),
+            priority=Priority.STOP,
+        )
+        for part in parts
+    ]
+
+
+async def disable_torque_all(ids: Iterable[int | Node]) -> dict[int, MotorbusError]:
+    """Torque off for all of these: by SYNC WRITE, then one by one until acknowledged; the errors by id.
+
+    Every servo is visited, also after an interruption, which is raised then.
+    """
+    waiting = as_nodes(ids)
+    errors: dict[int, MotorbusError] = {}
+
+    async def at_once() -> None:
+        for request in limp_requests([node.node for node in waiting], protocol.sync_write_capacity(1)):
+            await catch(request)
+
+    async def one_by_one() -> None:
+        while waiting:
+            failure = await catch(disable_torque(waiting[0]))
+            if failure is not None:
+                errors[waiting[0].node] = failure
+            del waiting[0]
+
+    await with_cleanup(at_once(), one_by_one)
+    return errors
+
+
+async def reg_write_all(values: Mapping[One, Mapping[str, Value]]) -> None:
+    """REG WRITE to each of these, `{id or servo: {name: value}}` in API units, then ACTION for all.
+
+    ACTION is not sent unless all have acknowledged; a note says which hold a REG WRITE then.
+    """
+    nodes, blocks = await _prepared(values, "REG WRITE")
+
+    async def hand_over_all() -> None:
+        for number, (node, block) in enumerate(zip(nodes, blocks, strict=True)):
+            try:
+                await hand_over(node, block)
+            except MotorbusError as error:
+                held = ", ".join(str(one.node) for one in nodes[: number + 1])
+                error.add_note(f"servos {held} may hold a REG WRITE, which the next ACTION would carry out")
+                raise
+        await action_all(nodes)
+        for node in nodes:
+            node.pending = None
+
+    await Exclusive(hand_over_all())

@@ -1,0 +1,297 @@
+"""Operating modes, and orders in other modes than position: velocity, duty, current, step.
+
+The mode is an EEPROM setting that takes effect at once, so it is changed while the servo is limp, and what the new mode
+follows is set to 0 before torque comes on. SCS have no such register: both limits 0 make a motor of them. Source:
+STS3215 memory table V3.6; FEETECH SDK, SCSCL.h and hls.py; feetech-cli and servolab, measured on STS3215.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import remainder
+
+from motorbus.core.family import State
+from motorbus.core.register import RegisterMap, is_number, shown
+from motorbus.core.request import Effect
+from motorbus.core.setpoint import Setpoint
+from motorbus.core.steps import Sleep, with_cleanup
+from motorbus.errors import LimitExceeded, RequestError
+from motorbus.families.feetech_new.driver import feedback
+from motorbus.families.feetech_new.driver.eeprom import store
+from motorbus.families.feetech_new.driver.goals import (
+    DUTY,
+    ON,
+    check_bounds,
+    check_current,
+    check_mode,
+    goal_row,
+    known_mode,
+    no_duty,
+    ramp_bytes,
+    rest_block,
+    step_block,
+    with_bound,
+)
+from motorbus.families.feetech_new.driver.identity import read_anew, writable
+from motorbus.families.feetech_new.driver.motion import (
+    COUNTS,
+    TOLERANCE,
+    Motion,
+    count_of,
+    disable_torque,
+    move_all,
+    ordered,
+    read_bound,
+    stop,
+)
+from motorbus.families.feetech_new.driver.node import Node
+from motorbus.families.feetech_new.driver.requests import TORQUE_ENABLE, Block, confirmed
+from motorbus.families.feetech_new.traits import Mode
+
+
+async def mode(node: Node) -> Mode:
+    """Its mode, read now. Raises DeviceError for an unknown map, RequestError for an unknown mode."""
+    await read_anew(node)
+    return known_mode(node)
+
+
+async def set_mode(node: Node, mode: Mode | str, *, limits: tuple[float, float] | None = None) -> None:
+    """Put the servo into a mode for good; it is limp afterwards, and `enable_torque` begins at rest.
+
+    On SCS PWM mode is both limits 0, and position mode needs `limits` (rad), unless this object set them to 0. An HLS
+    that leaves current mode gets its protection current as bound. Raises RequestError for a mode or limits that its map
+    lacks, and errors of `store`.
+    """
+    wanted = _checked_mode(mode)
+    table = await read_anew(node)
+    if wanted not in node.traits.has:
+        raise RequestError(
+            f"node {node.node} has no {wanted.value} mode",
+            expected=" or ".join(one.value for one in node.traits.has),
+            advice="nothing was sent",
+            node=node.node,
+        )
+    if wanted is Mode.PWM and not node.traits.duty:
+        raise no_duty(node)
+    by_code = "operating_mode" in table
+    blocks = [_by_code(node, table, wanted, limits) if by_code else _by_limits(node, table, wanted, limits)]
+    if node.traits.current and wanted is not Mode.CURRENT and node.known_mode in (Mode.CURRENT, None):
+        row, protection = table[node.traits.current], node.settings.protection_current if node.settings else 0
+        blocks.append(
+            Block(row.address, row.encode(protection))
+        )  # else its last current bounds the next mode
+    if not await store(node, table, blocks):
+        await disable_torque(node)
+    await read_anew(node)
+    if wanted in (Mode.VELOCITY, Mode.PWM, Mode.CURRENT):
+        await ordered(node, rest_block(node))
+
+
+def _checked_mode(mode: Mode | str) -> Mode:
+    try:
+        return Mode(mode)
+    except ValueError:
+        raise RequestError(f"{mode!r} is no mode", expected=", ".join(one.value for one in Mode)) from None
+
+
+def _by_code(node: Node, table: RegisterMap, wanted: Mode, limits: tuple[float, float] | None) -> Block:
+    if limits is not None:
+        raise RequestError(
+            f"node {node.node} has an operating mode, which limits do not change",
+            advice="leave limits out; nothing was sent",
+            node=node.node,
+        )
+    code = node.traits.code(wanted)
+    assert code is not None
+    row = table["operating_mode"]
+    return Block(row.address, row.encode(code))
+
+
+def _by_limits(node: Node, table: RegisterMap, wanted: Mode, limits: tuple[float, float] | None) -> Block:
+    """Both limits 0 for a motor; else limits, which only the caller or this object knows."""
+    if wanted is Mode.PWM:
+        node.former_limits = node.limits or node.former_limits
+        return limits_block(node, table, (0, 0))
+    wished = limits or node.limits or node.former_limits
+    if wished is None:
+        raise RequestError(
+            f"node {node.node} needs limits for position mode",
+            expected="limits=(low, high) in rad that what it moves can bear",
+            advice="nothing was sent",
+            node=node.node,
+        )
+    return limits_block(node, table, raw_limits(node, table, wished))
+
+
+def raw_limits(node: Node, table: RegisterMap, limits: tuple[float, float]) -> tuple[int, int]:
+    """Both position limits, raw. Raises RequestError for impossible ones."""
+    low, high = table["min_position_limit"], table["max_position_limit"]
+    raws = node.raw(low, limits[0]), node.raw(high, limits[1])
+    if not (low.low <= raws[0] <= low.high and raws[1] <= high.high and raws[0] < raws[1]):
+        least, most = float(node.value(low, low.low)), float(node.value(high, high.high))
+        raise RequestError(
+            f"node {node.node}: limits {limits[0]} to {limits[1]} rad are impossible",
+            expected=f"{least:.4g} to {most:.4g} rad, the lower one first",
+            advice="nothing was sent",
+            node=node.node,
+        )
+    return raws
+
+
+def limits_block(node: Node, table: RegisterMap, raws: Sequence[int]) -> Block:
+    """The block of both position limits."""
+    low, high = table["min_position_limit"], table["max_position_limit"]
+    return Block(low.address, low.encode(raws[0]) + high.encode(raws[1]))
+
+
+# -- orders ----------------------------------------------------------------------------------------------------
+
+
+async def set_velocity(
+    node: Node, velocity: float, *, acceleration: float | None = None, current: float | None = None
+) -> None:
+    """Turn at `velocity` rad/s, whose sign is the direction; 0 stands still. In velocity mode.
+
+    `acceleration` (rad/s²) and, on HLS, the bound of the current (A) stay as they are when left out. Raises
+    RequestError in another mode and for what no register takes (SMCL: no negative velocity).
+    """
+    _check_number(node, velocity, "velocity in rad/s")
+    check_bounds(node, acceleration, current)
+    await writable(node)
+    check_mode(node, Mode.VELOCITY)
+    check_current(node, current)
+    await read_bound(node, current)
+    row = goal_row(node, "goal_velocity")
+    raw = node.raw(row, velocity)
+    low, high = (float(node.value(row, bound)) for bound in (row.low, row.high))
+    goal = Setpoint(node.node, "velocity", float(node.value(row, raw)), low, high)
+    block = Block(row.address, row.encode(raw), row.effect, (goal,))
+    if current is not None or not node.bound:
+        block = with_bound(node, block, current)
+    if acceleration is not None:
+        ramp = ramp_bytes(node, acceleration)
+        await confirmed(node, Block(goal_row(node, "goal_position").address - len(ramp), ramp))
+    await ordered(node, block)
+
+
+async def set_duty(node: Node, duty: float) -> None:
+    """Drive the bridge with this duty, -1 to 1, open loop. In PWM mode.
+
+    A positive duty turned an STS3215 towards smaller angles (servolab). Raises RequestError in another mode and on HLS,
+    whose duty register is unknown; LimitExceeded for another number.
+    """
+    _check_number(node, duty, "duty")
+    if not -1 <= duty <= 1:
+        raise LimitExceeded(f"node {node.node}: {duty} is no duty", expected="-1 to 1", node=node.node)
+    await writable(node)
+    if not node.traits.duty:
+        raise no_duty(node)
+    check_mode(node, Mode.PWM)
+    row = goal_row(node, node.traits.duty)
+    raw = round(duty / DUTY)
+    goal = Setpoint(node.node, "load", raw * DUTY, -1.0, 1.0)
+    await ordered(node, Block(row.address, row.encode(raw), row.effect, (goal,)))
+
+
+async def set_current(node: Node, current: float) -> None:
+    """Push with this phase current (A), whose sign is the direction. In current mode of HLS.
+
+    Raises RequestError in another mode and on other maps, LimitExceeded for more than its register takes.
+    """
+    _check_number(node, current, "current in A")
+    await writable(node)
+    check_mode(node, Mode.CURRENT)
+    row = goal_row(node, node.traits.current)
+    raw = node.raw(row, current)
+    low, high = float(row.to_value(row.low)), float(row.to_value(row.high))
+    if not row.low <= raw <= row.high:
+        raise LimitExceeded(
+            f"node {node.node}: {current} A is no goal current",
+            expected=f"{low:.4g} to {high:.4g} A",
+            node=node.node,
+        )
+    goal = Setpoint(node.node, "current", float(row.to_value(raw)), low, high)
+    await ordered(node, Block(row.address, row.encode(raw), row.effect, (goal,)))
+
+
+async def jog(node: Node, velocity: float, seconds: float) -> None:
+    """Turn at `velocity` rad/s for so many seconds, then decelerate. In velocity mode."""
+
+    async def turn() -> None:
+        await set_velocity(node, velocity)
+        await Sleep(seconds)
+
+    await with_cleanup(turn(), lambda: stop(node))
+
+
+@dataclass
+class _Step(Motion):
+    """A move by an angle, followed over the end of a turn."""
+
+    by: float = 0.0
+    here: dict[int, float] = field(default_factory=dict)
+
+    async def check(self, device: Node, to: float) -> Setpoint:
+        self.tolerance = max(TOLERANCE, COUNTS * count_of(device))
+        start = await feedback.position(device)
+        block = step_block(device, to, self.velocity, self.acceleration)
+        self.here[device.node] = start
+        self.by = to
+        return Setpoint(device.node, "position", start + block.goals[0].value)
+
+    async def send(self, device: Node, goal: Setpoint) -> None:
+        await send_step(device, step_block(device, self.by, self.velocity, self.acceleration))
+        await Sleep(0.02)  # a goal whole turns away looks like this place until it moves
+
+    async def sample(self, device: Node) -> State:
+        state = await feedback.telemetry(device)
+        settings, last = device.settings, self.here[device.node]
+        assert state.position is not None
+        here = state.position
+        if settings is not None and not settings.tells_turns:
+            here = last + remainder(here - last, settings.turn * count_of(device))
+        self.here[device.node] = here
+        return state._replace(position=here)
+
+
+async def step(
+    node: Node,
+    by: float,
+    *,
+    velocity: float | None = None,
+    acceleration: float | None = None,
+    wait: bool = True,
+    tolerance: float | None = None,
+    timeout: float | None = None,
+) -> None:
+    """Go `by` rad from here, over the end of a turn too. In step mode of STS and SMBL.
+
+    Torque goes on. Never sent twice: OutcomeUnknown if it was not acknowledged. An interrupt of the wait does not stop
+    it, for no goal of step mode holds: disable_torque() does. Bounds, tolerance and errors as in `move`.
+    """
+    check_bounds(node, velocity, acceleration)
+    if not is_number(by):
+        raise LimitExceeded(f"node {node.node}: {shown(by)} is no angle", node=node.node)
+    await writable(node)
+    check_mode(node, Mode.STEP)
+    if wait:
+        logic = _Step(velocity, acceleration)
+        await move_all(logic, {node: by}, tolerance=tolerance, timeout=timeout)
+    else:
+        await send_step(node, step_block(node, by, velocity, acceleration))
+
+
+async def send_step(node: Node, block: Block) -> None:
+    """Send a step; before it torque on, which moves nothing in step mode, where a goal does not switch it on."""
+    if not node.traits.goal_switches_on:
+        await confirmed(node, Block(TORQUE_ENABLE, ON, Effect.TORQUE))
+    await confirmed(node, block)
+
+
+def _check_number(node: Node, value: float, what: str) -> None:
+    """Raise RequestError for no number, LimitExceeded for one that is not finite."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise RequestError(f"{shown(value)} is no {what}", advice="nothing was sent", node=node.node)
+    if not is_number(value):
+        raise LimitExceeded(f"node {node.node}: {shown(value)} is no {what}", node=node.node)

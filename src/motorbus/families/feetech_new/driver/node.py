@@ -1,0 +1,216 @@
+"""What the driver knows of one servo, and what its settings mean for its values. No I/O."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from math import degrees, inf
+from typing import Any, Final, NamedTuple
+
+from motorbus.core.family import Identity
+from motorbus.core.register import Register, RegisterMap, Value, is_number, shown
+from motorbus.core.request import Request
+from motorbus.core.setpoint import Setpoint
+from motorbus.errors import RequestError
+from motorbus.families.feetech_new.protocol import BROADCAST, MAX_ID
+from motorbus.families.feetech_new.registers.codes import alarms
+from motorbus.families.feetech_new.traits import NO_TRAITS, TRAITS, Mode, Traits
+
+IMAGE: Final = 40  # bytes of the EEPROM area, registers 0 to 39, which one READ returns
+MANY_TURNS: Final = 30719
+"""Counts to either side when both limits are 0 (7.5 turns). Source: STS3215 memory table V3.6."""
+
+_POSITIONS: Final = (
+    "present_position",
+    "goal_position",
+    "goal_position_echo",
+    "min_position_limit",
+    "max_position_limit",
+)
+_VELOCITIES: Final = ("present_velocity", "goal_velocity")
+
+
+class Settings(NamedTuple):
+    """What the EEPROM of a servo says about how to command it.
+
+    `limits`      lowest and highest position (rad); None where unknown, or both 0 in a map without many turns
+    `mode`        None for an unknown map or a number that no source explains; `mode_code` is that number
+    `offset`      homing offset (counts)
+    `many_turns`  goals count over many turns: both limits are 0
+    `tells_turns` the present position counts over many turns; else it lies within one
+    `shift`       counts to subtract from a present position: a servo applies its offset in position mode only
+    `factors`     by row name, a factor of the unit of the row
+    `protection_current`  raw; the goal torque of an HLS at power-up
+    `answers_writes`      status return level
+    `zero_is_maximum`     a goal velocity of 0 means the maximum; else standstill
+    `tells_current`       its bridge measures the current
+    """
+
+    limits: tuple[float, float] | None = None
+    mode: Mode | None = None
+    mode_code: int | None = None
+    offset: int = 0
+    turn: int = 4096  # counts of a single-turn position
+    arc: float = 360.0  # degrees of these counts
+    many_turns: bool = False
+    tells_turns: bool = False
+    shift: int = 0
+    factors: Mapping[str, float] = {}
+    protection_current: int = 0
+    answers_writes: bool = True
+    zero_is_maximum: bool = True
+    tells_current: bool = True
+
+    def without_offset(self, raw: int) -> int:
+        """A present position (counts) without the homing offset, within a turn where it is told within one."""
+        if self.tells_turns or not 0 <= raw < self.turn:
+            return raw - self.shift
+        return (raw - self.shift) % self.turn
+
+
+class Pending(NamedTuple):
+    """A REG WRITE that waits for ACTION: its goals, and what was so when it left."""
+
+    goals: tuple[Setpoint, ...]
+    settings: Settings | None
+    epoch: int
+    stops: int
+
+
+class Node:
+    """One servo by its id, 0 to 253, and what is known of it; driver functions fill it.
+
+    `arc`: degrees of all counts of an SCS servo, where they are not those of its model.
+    """
+
+    def __init__(self, node: int, *, arc: float | None = None) -> None:
+        self.node: Final = checked_id(node)
+        self.arc: Final = arc
+        self.identity: Identity | None = None
+        self.table: RegisterMap | None = None
+        self.settings: Settings | None = None  # None: not read, or maybe changed since
+        self.alarm: tuple[str, ...] = ()  # alarm bits of the last reply
+        self.at = -inf  # arrival of the last reply (s, link clock)
+        self.epoch = 0  # counts stops, torque-offs and changes of the settings
+        self.pending: Pending | None = None
+        self.last_move: object = None
+        self.bound: int | None = None  # raw goal torque of an HLS, as last read or written
+        self.former_limits: tuple[float, float] | None = None  # of an SCS that was made a motor
+        self.reads_alone = False  # it answers READ and not SYNC READ
+        self.kept: Final[dict[str, tuple[Settings, Request[Any]]]] = {}  # requests, with their settings
+        self._last: Settings | None = None
+
+    @property
+    def limits(self) -> tuple[float, float] | None:
+        """Lowest and highest position (rad); None where unknown."""
+        return self.settings.limits if self.settings else None
+
+    @property
+    def known_mode(self) -> Mode | None:
+        """Its operating mode; None where unknown."""
+        return self.settings.mode if self.settings else None
+
+    @property
+    def traits(self) -> Traits:
+        """The roles of the registers of its map; none for an unknown map."""
+        return TRAITS.get(self.identity.table, NO_TRAITS) if self.identity else NO_TRAITS
+
+    @property
+    def is_writable(self) -> bool:
+        """Its register map is known."""
+        return self.identity is not None and bool(self.identity.table)
+
+    def heard(self, error: int, at: float) -> None:
+        """A reply with this error byte arrived. An alarm never makes a reply a failure."""
+        self.alarm = alarms(error, self.table.name if self.table else "sts") if error else ()
+        self.at = at
+
+    def learn_settings(self, settings: Settings) -> None:
+        """Its settings were read. Equal ones stay the same object, so what was made by them still holds."""
+        if settings == self._last:
+            settings = self._last
+        else:
+            self.epoch += 1
+        self.settings = self._last = settings
+
+    def forget_settings(self) -> None:
+        """Its settings may have changed: they are read before they are used again."""
+        self.settings = None
+        self.bound = None
+
+    def value(self, row: Register, raw: int) -> Value:
+        """Raw value -> value in the unit of the row, by the last known settings of this servo."""
+        settings = self.settings or self._last
+        if settings is None or row.name not in settings.factors:
+            return row.to_value(raw)
+        if settings.shift and row.name == "present_position":
+            raw = settings.without_offset(raw)
+        return row.to_value(raw) * settings.factors[row.name]
+
+    def raw(self, row: Register, value: Value) -> int:
+        """Value in the unit of the row -> raw value. Raises RequestError if it is not a finite number."""
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise RequestError(
+                f"{row.name}: {shown(value)} is not a number", advice="nothing was sent", node=self.node
+            )
+        factor = self.settings.factors.get(row.name, 1) if self.settings else 1
+        return row.to_raw(value / factor if factor != 1 and is_number(value) else value)
+
+
+def settings_of(table: RegisterMap, image: bytes, arc: float | None = None) -> Settings:
+    """The settings in registers 0 to 39, by the map of the servo. `arc`: see `Node`."""
+
+    def raw(name: str, other: int = 0) -> int:
+        if name not in table:
+            return other
+        row = table[name]
+        return row.decode(image[row.address : row.address + row.size])
+
+    phase, traits = raw("phase"), TRAITS[table.name]
+    raw_limits = raw("min_position_limit"), raw("max_position_limit")
+    many_turns = traits.many_turns and raw_limits == (0, 0)
+    code = raw("operating_mode") if "operating_mode" in table else None
+    mode = traits.mode_of(code, raw_limits)
+    offset, count = raw("homing_offset"), table["goal_position"].scale
+    of_rows = round(degrees(count * traits.turn), 6)
+    stretch = 1.0 if arc is None or arc == of_rows else arc / of_rows
+    angle = stretch * max(1, raw("angular_resolution", 1))
+    low, high = (-MANY_TURNS, MANY_TURNS) if many_turns else raw_limits
+    velocity = stretch * traits.velocity_scale(phase)
+    return Settings(
+        limits=(low * count * angle, high * count * angle) if low or high else None,
+        mode=mode,
+        mode_code=code,
+        offset=offset,
+        turn=traits.turn,
+        arc=of_rows * stretch,
+        many_turns=many_turns,
+        tells_turns=traits.tells_turns(phase),
+        shift=0 if mode in (Mode.POSITION, None) else offset,
+        factors={**dict.fromkeys(_POSITIONS, angle), **dict.fromkeys(_VELOCITIES, velocity)},
+        protection_current=raw("protection_current") if traits.current else 0,
+        answers_writes=raw("status_return_level") != 0,
+        zero_is_maximum=traits.zero_is_maximum(phase),
+        tells_current=traits.tells_current(phase),
+    )
+
+
+def checked_id(node: int) -> int:
+    """The id of one servo. Raises RequestError for anything else, also for 254 (all servos)."""
+    if isinstance(node, int) and not isinstance(node, bool) and 0 <= node <= MAX_ID:
+        return node
+    raise RequestError(
+        f"{shown(node)} is not the id of a servo", expected=f"0 to {MAX_ID}; {BROADCAST} addresses all servos"
+    )
+
+
+def as_nodes(ids: Iterable[int | Node]) -> list[Node]:
+    """Each as a node. Raises RequestError for none, and for an id that is named twice."""
+    try:
+        nodes = [one if isinstance(one, Node) else Node(one) for one in ids]
+    except TypeError:
+        raise RequestError(f"{shown(ids)} is not a list of servos", advice="nothing was sent") from None
+    if len({node.node for node in nodes}) == len(nodes) > 0:
+        return nodes
+    raise RequestError(
+        "an id is named twice" if nodes else "no servo is named", advice="name each servo once"
+    )
