@@ -9,19 +9,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple, TypeAlias
 
 from motorbus.core.access import readable_rows, writable_values
-from motorbus.core.register import Register, RegisterMap, Storage, Value, changed, is_number, shown
+from motorbus.core.register import Register, RegisterMap, Storage, Value, changed
 from motorbus.core.request import Effect, Request, Stops
 from motorbus.core.setpoint import Deferred
-from motorbus.errors import MotorbusError, OutcomeUnknown, RequestError
+from motorbus.errors import MotorbusError, OutcomeUnknown
 from motorbus.families.feetech_new import protocol
-from motorbus.families.feetech_new.driver import eeprom
-from motorbus.families.feetech_new.driver.goals import (
-    check_mode,
-    goal_row,
-    known_mode,
-    no_duty,
-    setpoints,
-)
+from motorbus.families.feetech_new.driver import eeprom, goals
 from motorbus.families.feetech_new.driver.identity import check_map, known, writable
 from motorbus.families.feetech_new.driver.motion import disable_torque
 from motorbus.families.feetech_new.driver.node import Node, Pending
@@ -106,14 +99,11 @@ async def write(node: Node, /, *, force: bool = False, **values: Value) -> None:
     stored = [one for one in raws if one[0].storage is Storage.EEPROM]
     limp = [one for one in raws if _needs_limp(one[0])]
     live = [one for one in raws if one not in stored and one not in limp]
-    goals = [row.name for row, _ in live if row.effect is Effect.MOTION]
-    if goals and (stored or limp):
+    moving = [row.name for row, _ in live if row.effect is Effect.MOTION]
+    if moving and (stored or limp):
         others = ", ".join(row.name for row, _ in (*stored, *limp))
-        raise RequestError(
-            f"node {node.node}: {', '.join(goals)} cannot be written with {others}, for which the servo goes limp",
-            advice=f"write {others} first, then enable_torque() and the goals; nothing was sent",
-            node=node.node,
-        )
+        what = f"goes limp for {others}, so it cannot take {', '.join(moving)} as well"
+        raise node.refusal(what, f"write {others} first, then enable_torque() and the goals")
     if stored:
         keep_torque = not limp and not REDEFINES_GOALS & values.keys()
         blocks = [block._replace(goals=()) for block in blocks_of(node, stored)]
@@ -145,37 +135,32 @@ def check_values(node: Node, table: RegisterMap, values: Mapping[str, Value]) ->
     """These rows with their raw values. Raises RequestError for what cannot be written by name."""
 
     def to_raw(row: Register, value: Value) -> int:
-        row = goal_row(node, row.name)
+        row = node.row(row.name)
         raw = node.raw(row, value)
         _check_value(node, row, raw)
         return raw
 
     raws = writable_values(BY_NAME[table.name], values, to_raw, node=node.node, methods=METHODS)
-    return [(goal_row(node, row.name), raw) for row, raw in raws]
+    return [(node.row(row.name), raw) for row, raw in raws]
 
 
 def _check_value(node: Node, row: Register, raw: int) -> None:
     """Raise RequestError for a value that only another method can write safely."""
     mode = node.known_mode
     if row.name == "lock" and raw == 0:
-        _refuse(
-            node, row, "an open lock would make every later write permanent", "write() opens it by itself"
-        )
+        what = "would keep every later write for good with an open lock"
+        raise node.refusal(what, "write() opens it by itself")
     if row.name == "torque_enable" and raw != 0 and not row.choices.get(raw, "").startswith("off"):
-        _refuse(node, row, "torque on by a plain write can jump to an old goal", "use enable_torque()")
+        raise node.refusal("could jump to an old goal by a plain torque on", "use enable_torque()")
     if row.name == node.traits.current and raw == 0 and mode in (Mode.POSITION, Mode.VELOCITY):
-        _refuse(node, row, "0 bounds its current to 0 A in this mode", "use disable_torque() to make it limp")
+        raise node.refusal(f"would never move with {row.name} 0 in this mode", "use disable_torque()")
     if row.effect is Effect.MOTION and row.name.startswith("goal_"):
-        if known_mode(node) is Mode.PWM and not node.traits.duty:
-            raise no_duty(node)
+        if goals.checked_mode(node) is Mode.PWM and not node.traits.duty:
+            raise goals.no_duty(node)
         if row.name == "goal_position" and mode is not Mode.STEP:
-            check_mode(node, Mode.POSITION)
+            goals.check_mode(node, Mode.POSITION)
         if row.name == node.traits.current:
             node.bound = None
-
-
-def _refuse(node: Node, row: Register, why: str, advice: str) -> None:
-    raise RequestError(f"{row.name}: {why}", advice=f"{advice}; nothing was sent", node=node.node)
 
 
 # -- rows and blocks -------------------------------------------------------------------------------------------
@@ -236,7 +221,7 @@ def _block(node: Node, group: Raws) -> Block:
         group[0][0].address,
         b"".join(row.encode(raw) for row, raw in group),
         max(row.effect for row, _ in group),
-        tuple(goal for row, raw in group for goal in setpoints(node, row, raw)),
+        tuple(goal for row, raw in group for goal in goals.setpoints(node, row, raw)),
         repeatable=not is_step,
     )
 
@@ -249,12 +234,8 @@ def ram_block(node: Node, values: Mapping[str, Value], what: str) -> Block:
     found = list(blocks_of(node, raws))
     if len(found) == 1 and all(row.storage is Storage.RAM and not _needs_limp(row) for row, _ in raws):
         return found[0]
-    raise RequestError(
-        f"{what} carries adjoining RAM registers only, not {', '.join(values) or 'none'}",
-        expected="such as goal_position, goal_time, goal_velocity",
-        advice="write() the others; nothing was sent",
-        node=node.node,
-    )
+    names = ", ".join(values) or "none"
+    raise node.refusal(f"takes adjoining RAM registers by {what}, not {names}", "write() the others")
 
 
 # -- REG WRITE and ACTION --------------------------------------------------------------------------------------
@@ -341,17 +322,13 @@ def _stale(nodes: Sequence[Node], stops: Stops) -> MotorbusError | None:
         if pending.settings is not node.settings:
             return outdated(node)
         if pending.epoch != node.epoch or stops(node.node) > pending.stops:
-            return RequestError(
-                f"node {node.node} was stopped or let go after its REG WRITE, which ACTION would carry out",
-                advice="reg_write() it again, which replaces what waits; nothing was sent",
-                node=node.node,
-            )
+            return node.refusal("was stopped or let go after its REG WRITE", "reg_write() it again")
     return None
 
 
 async def _check_waiting(node: Node, waits: bool, request: Request[None]) -> None:
     """See by its register whether a REG WRITE waits in a servo that acknowledges nothing."""
-    row = goal_row(node, "reg_write_pending")
+    row = node.row("reg_write_pending")
     if await read_block(node, row.address, 1, lambda data: data != b"\0") is not waits:
         raise OutcomeUnknown(
             f"node {node.node} holds {'no' if waits else 'still a'} REG WRITE",
@@ -360,10 +337,3 @@ async def _check_waiting(node: Node, waits: bool, request: Request[None]) -> Non
             advice="read the goal registers before sending it again",
             node=node.node,
         )
-
-
-def checked_number(node: Node, value: object, unit: str) -> float:
-    """Raise RequestError unless this is a finite number."""
-    if is_number(value):
-        return float(value)
-    raise RequestError(f"{shown(value)} is no number of {unit}", advice="nothing was sent", node=node.node)

@@ -22,7 +22,7 @@ from motorbus.families.feetech_new.driver import feedback, identity, modes, moti
 from motorbus.families.feetech_new.driver.goals import hold_block, rest_block
 from motorbus.families.feetech_new.driver.group import disable_torque_everyone, limp_requests
 from motorbus.families.feetech_new.driver.motion import LIMP, Promise
-from motorbus.families.feetech_new.driver.node import IMAGE, Node, checked_id
+from motorbus.families.feetech_new.driver.node import IMAGE, BusFacts, Node, checked_id
 from motorbus.families.feetech_new.driver.requests import DATA, PRESENT, TORQUE_ENABLE, Block
 from motorbus.families.feetech_new.driver.scan import scan
 from motorbus.families.feetech_new.registers import TABLES
@@ -75,6 +75,7 @@ class FeetechDriver(HalfDuplexSerial):
 
     `estop_hold`  ids that an emergency stop holds, as 1+4 or 1-3
     `arc`         degrees of all counts of SCS servos, where they are not those of the model, as 3:180+4:180
+    `map`         register map by which bytes of unknown servos are explained; "" for none
     """
 
     delays = DELAYS
@@ -85,10 +86,11 @@ class FeetechDriver(HalfDuplexSerial):
     longest_gap = RETURN_DELAY + 2 * ADAPTER + SCHEDULING
     ids = range(protocol.MAX_ID + 1)
 
-    def __init__(self, family: Family, estop_hold: object = "", arc: object = "") -> None:
+    def __init__(self, family: Family, estop_hold: object = "", arc: object = "", map: str = "") -> None:
         super().__init__(family)
         self.hold: Final = parse_ids(estop_hold or "")
-        self.arcs: Final = parse_arcs(arc or "")
+        self.facts: Final = BusFacts(parse_arcs(arc or ""))
+        self.map: Final = map
 
     def echo_test(self) -> Request[Any]:
         return read_id(1, 1, TimeoutClass.SCAN)
@@ -116,10 +118,10 @@ class FeetechDriver(HalfDuplexSerial):
         return Stop(requests, f"{Promise.TORQUE_OFF_ACCEPTED.value}; held: {Promise.HOLD_ACCEPTED.value}")
 
     def identify(self, node: int) -> Runnable[Identity]:
-        return identity.identify(Node(node, arc=self.arcs.get(node)))
+        return identity.identify(Node(node, self.facts))
 
     def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Procedure[list[Found]]:
-        return scan(ids, rates, arcs=self.arcs)
+        return scan(ids, rates, self.facts)
 
     def axis(self, identity: Identity) -> AxisDriver:
         """By the register map, whatever the model; a servo in another mode than position has an axis of that kind."""
@@ -143,7 +145,7 @@ class FeetechDriver(HalfDuplexSerial):
     def decode(self, data: bytes) -> list[Explanation]:
         from motorbus.families.feetech_new.decode import decode
 
-        return decode(data)
+        return decode(data, self.facts.maps, self.map)
 
 
 @cache

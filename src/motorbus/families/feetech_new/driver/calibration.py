@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 from motorbus.core.register import Register, RegisterMap, is_number, shown
 from motorbus.core.request import Effect, Priority
 from motorbus.core.steps import Exclusive
-from motorbus.errors import DeviceError, MotorbusError, RequestError, VerificationFailed
+from motorbus.errors import DeviceError, MotorbusError, VerificationFailed
 from motorbus.families.feetech_new import protocol
 from motorbus.families.feetech_new.driver.eeprom import Unlocked, store
 from motorbus.families.feetech_new.driver.goals import check_mode
@@ -85,39 +85,30 @@ async def calibrate(node: Node, to: float | None = None) -> Calibration:
     angle; DeviceError if it does not obey; VerificationFailed if a reading does not fit.
     """
     if to is not None and not is_number(to):
-        raise RequestError(f"{shown(to)} is no position", advice="nothing was sent", node=node.node)
+        raise node.refusal(f"cannot be at {shown(to)}", expected="a number of rad")
     table = await read_anew(node)
-    row, position = _offset_row(node, table), table["present_position"]
+    offset, position = _offset_row(node, table), table["present_position"]
     check_mode(node, Mode.POSITION)
     settings = node.settings
     assert settings is not None
-    if "angular_resolution" in table and (await _read_byte(node, table["angular_resolution"])) != 1:
-        raise RequestError(
-            f"node {node.node} has another angular resolution than 1, where its offset has no known unit",
-            advice="write(angular_resolution=1), calibrate, and set it again; nothing was sent",
-            node=node.node,
-        )
+    if "angular_resolution" in table and settings.factors[position.name] != 1:
+        fix = "write(angular_resolution=1), calibrate, and set it again"
+        raise node.refusal("has another angular resolution than 1, where its offset has no known unit", fix)
     goal = settings.turn // 2 if to is None else node.raw(position, to)
     if not 0 <= goal < settings.turn:
         most = float(node.value(position, settings.turn - 1))
-        raise RequestError(
-            f"node {node.node}: {to} rad is not within one turn",
-            expected=f"0 to {most:.4f} rad",
-            node=node.node,
-        )
-    _plan(node, row, await _read_pose(node, row), goal)
-    before, planned, found = await Exclusive(_calibrate(node, table, row, goal))
-    note = ""
-    if planned.position != goal:
-        note = f"this pose reads {planned.position - goal:+} count beside, for the offset register ends there"
+        raise node.refusal(f"cannot be at {to} rad within one turn", expected=f"0 to {most:.4f} rad")
+    _plan(node, offset, await _read_pose(node, offset), goal)
+    before, planned, found = await Exclusive(_calibrate(node, table, offset, goal))
+    beside = planned.position - goal
     return Calibration(
         before=float(node.value(position, before.position)),
         after=float(node.value(position, found.position)),
-        old_offset=float(row.to_value(before.offset)),
-        new_offset=float(row.to_value(found.offset)),
+        old_offset=float(offset.to_value(before.offset)),
+        new_offset=float(offset.to_value(found.offset)),
         raw_old_offset=before.offset,
         raw_new_offset=found.offset,
-        note=note,
+        note=f"this pose reads {beside:+} count beside: the offset register ends there" if beside else "",
     )
 
 
@@ -162,11 +153,9 @@ def _plan(node: Node, row: Register, pose: Pose, goal: int) -> Pose:
     assert node.settings is not None
     turn = node.settings.turn
     if not 0 <= pose.position < turn:
-        raise RequestError(
-            f"node {node.node} tells the raw position {pose.position}, not within one turn of {turn} counts",
-            cause="it counts turns (bit 4 of its phase register)",
-            advice="clear_turns() or a power cycle; set_multi_turn(False) for good; nothing was changed",
-            node=node.node,
+        raise node.refusal(
+            f"tells the raw position {pose.position}, not within one turn of {turn} counts: it counts turns",
+            "clear_turns() or a power cycle; set_multi_turn(False) for good",
         )
     encoder = (pose.position + pose.offset) % turn
     offset = encoder - goal
@@ -174,12 +163,9 @@ def _plan(node: Node, row: Register, pose: Pose, goal: int) -> Pose:
         offset = _shortest(offset, turn)
     fits = min(max(offset, row.low), row.high)
     if abs(offset - fits) > 1:
-        raise RequestError(
-            f"node {node.node}: this pose needs a homing offset of {offset} counts",
-            expected=f"{row.low} to {row.high}",
-            advice="turn the shaft nearer, or mount the horn another way; nothing was changed",
-            node=node.node,
-        )
+        what = f"needs a homing offset of {offset} counts for this pose"
+        fix = "turn the shaft nearer, or mount the horn another way"
+        raise node.refusal(what, fix, expected=f"{row.low} to {row.high}")
     return Pose((encoder - fits) % turn, fits)
 
 
@@ -213,11 +199,8 @@ def _judge(
 def _offset_row(node: Node, table: RegisterMap) -> Register:
     if "homing_offset" in table:
         return table["homing_offset"]
-    raise RequestError(
-        f"node {node.node}: servos of the map {table.name} have no homing offset",
-        advice="keep the zero in the machine file; nothing was sent",
-        node=node.node,
-    )
+    what = f"has the map {table.name}, which has no homing offset"
+    raise node.refusal(what, "keep the zero in the machine file")
 
 
 async def _read_pose(node: Node, row: Register) -> Pose:
@@ -237,10 +220,6 @@ async def _read_pose(node: Node, row: Register) -> Pose:
     return Pose(await read_block(node, PRESENT, position.size, position.decode, timeout=STORE), offset)
 
 
-async def _read_byte(node: Node, row: Register) -> int:
-    return await read_block(node, row.address, row.size, row.decode)
-
-
 # -- many turns ------------------------------------------------------------------------------------------------
 
 
@@ -254,21 +233,13 @@ async def set_multi_turn(node: Node, on: bool, limits: tuple[float, float] | Non
     """
     table = await read_anew(node)
     if not node.traits.many_turns:
-        raise RequestError(
-            f"node {node.node}: servos of the map {table.name} count within one turn",
-            expected=f"one of the maps {', '.join(name for name in TABLES if TRAITS[name].many_turns)}",
-            advice="nothing was sent",
-            node=node.node,
-        )
+        maps = ", ".join(name for name in TABLES if TRAITS[name].many_turns)
+        raise node.refusal(f"has the map {table.name}, which counts within one turn", expected=maps)
     check_mode(node, Mode.POSITION)
     assert node.settings is not None
     wished = limits if limits is not None or node.settings.many_turns else node.limits
     if (on and limits is not None) or (not on and wished is None):
-        raise RequestError(
-            f"node {node.node}: many turns have no limits, one turn needs limits=(low, high) in rad",
-            advice="nothing was sent",
-            node=node.node,
-        )
+        raise node.refusal("has no limits over many turns, and needs limits=(low, high) in rad within one")
     image = await check_alone(node)  # the other bits of its phase belong to this servo
     learn(node, image)
     row = table["phase"]

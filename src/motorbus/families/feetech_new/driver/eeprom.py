@@ -32,7 +32,11 @@ class TorqueAfterWrite(NamedTuple):
 
 
 class Unlocked(Guard):
-    """The EEPROM lock is open and torque off inside the block; then the lock is closed and read back."""
+    """The EEPROM lock is open and torque off inside the block; then the lock is closed and read back.
+
+    After an error the registers get their former values, also behind a lock that closed by itself: they would read as
+    written until power-off.
+    """
 
     def __init__(self, node: Node, table: RegisterMap) -> None:
         self.node = node
@@ -46,9 +50,9 @@ class Unlocked(Guard):
 
     async def leave(self, error: BaseException | None) -> None:
         self.node.forget_settings()
-        if error is not None and self.before and await catch(self.check_open()) is not None:
-            # It restarted, maybe with torque on: its registers hold for now what they do not keep.
-            await catch(disable_torque(self.node))
+        if error is not None and self.before:
+            if await catch(self.check_open()) is not None:  # it restarted, maybe with torque on
+                await catch(disable_torque(self.node))
             for block in reversed(self.before):
                 await catch(confirmed(self.node, block, timeout=STORE))
         for attempt in range(ATTEMPTS):

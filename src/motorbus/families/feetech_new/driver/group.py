@@ -34,7 +34,7 @@ from motorbus.families.feetech_new.driver.access import (
     rows_of,
     spans,
 )
-from motorbus.families.feetech_new.driver.goals import goal_row, position_goal
+from motorbus.families.feetech_new.driver.goals import position_goal
 from motorbus.families.feetech_new.driver.identity import learn, unknown_map
 from motorbus.families.feetech_new.driver.motion import LIMP, disable_torque
 from motorbus.families.feetech_new.driver.node import IMAGE, Node, as_nodes
@@ -131,7 +131,7 @@ async def collect(
 ) -> dict[int, bytes]:
     """One block of each: by SYNC READ, then by READ of those that it did not return; errors of the rest by id."""
     able = [node for node in nodes if node.traits.sync_read and not node.reads_alone]
-    found = await _sync_blocks(able, address, count) if able else {}
+    found = await _sync_blocks(able, address, count) if len(able) > 1 else {}
     for node in nodes:
         if node.node in found:
             continue
@@ -140,7 +140,7 @@ async def collect(
             errors[node.node] = data
             continue
         found[node.node] = data
-        if node in able and not await _sync_blocks([node], address, count):
+        if node in able and node.table is not None and not await _sync_blocks([node], address, count):
             node.reads_alone = True
             await Emit(ReadsAlone(node.node))
     return found
@@ -256,7 +256,7 @@ def known_row(node: Node, name: str) -> Register:
         )
     if not node.table[name].unit:
         raise unknown_map(node, f"cannot tell its {name.replace('_', ' ')} in a unit")
-    return goal_row(node, name)
+    return node.row(name)
 
 
 # -- write -----------------------------------------------------------------------------------------------------

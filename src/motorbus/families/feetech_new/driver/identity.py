@@ -112,11 +112,12 @@ def learn(node: Node, image: bytes) -> Identity:
     chosen = choose((image[0], image[1]), (image[3], image[4]), image[2])
     if chosen.table:
         node.table = TABLES[chosen.table]
-        arc = node.arc if node.arc is not None else chosen.model and chosen.model.arc
+        arc = node.facts.arcs.get(node.node, chosen.model.arc if chosen.model else None)
         settings = settings_of(node.table, image, arc)
     else:
         node.table = common_table(chosen.order)
         settings = Settings(answers_writes=image[STS["status_return_level"].address] != 0)
+    node.facts.maps[node.node] = chosen.table
     node.identity = _identity(node, chosen, image, settings)
     node.learn_settings(settings)
     return node.identity
@@ -133,7 +134,7 @@ def _identity(node: Node, chosen: Choice, image: bytes, settings: Settings) -> I
     if chosen.table:
         details["mode"] = settings.mode.value if settings.mode else f"unknown ({settings.mode_code})"
         details["arc"] = settings.arc
-        if chosen.model is not None and chosen.model.arc_doubt and node.arc is None:
+        if chosen.model is not None and chosen.model.arc_doubt and node.node not in node.facts.arcs:
             details["arc_doubt"] = chosen.model.arc_doubt
     name = chosen.model.name if chosen.model else f"unknown model {major}.{minor}"
     return Identity(node.node, name, f"{image[0]}.{image[1]}", chosen.table, details)

@@ -14,7 +14,6 @@ from motorbus.errors import (
     MotorbusError,
     NoReply,
     OutcomeUnknown,
-    RequestError,
     VerificationFailed,
     WireError,
 )
@@ -89,7 +88,7 @@ async def _restore(node: Node, shipped: tuple[int, ...]) -> Found:
                 node=node.node,
             ) from doubt
         await SetBitrate(place[1])
-        return Found(*place, await identify(Node(place[0], arc=node.arc)))
+        return Found(*place, await identify(Node(place[0], node.facts)))
 
 
 async def _answers(id: int, rate: int) -> bool:
@@ -112,12 +111,7 @@ async def clear_turns(node: Node) -> float:
     """
     table = await read_anew(node)
     if not node.traits.clear_turns:
-        raise RequestError(
-            f"node {node.node}: servos of the map {table.name} count no turns",
-            expected="a servo of the maps sts, smbl or hls",
-            advice="nothing was sent",
-            node=node.node,
-        )
+        raise node.refusal(f"has the map {table.name}, which counts no turns", expected="sts, smbl or hls")
     return await Exclusive(_clear_turns(node))
 
 
@@ -165,9 +159,7 @@ async def recover_overload(node: Node, *, rest: float = 1.0) -> Recovery:
     (open-edge-platform/physical-ai-studio#955). Source: STS3215 memory table V3.6, registers 34 to 36.
     """
     if not (is_number(rest) and 0 <= rest <= LONGEST):
-        raise RequestError(
-            f"{shown(rest)} is no time to rest", expected=f"0 to {LONGEST:.0f} s", node=node.node
-        )
+        raise node.refusal(f"cannot rest for {shown(rest)}", expected=f"0 to {LONGEST:.0f} s")
     await writable(node)
     tripped = await _tripped(node)
     if tripped:

@@ -17,22 +17,8 @@ from motorbus.core.request import Effect
 from motorbus.core.setpoint import Setpoint
 from motorbus.core.steps import Sleep, with_cleanup
 from motorbus.errors import LimitExceeded, RequestError
-from motorbus.families.feetech_new.driver import feedback
+from motorbus.families.feetech_new.driver import feedback, goals
 from motorbus.families.feetech_new.driver.eeprom import store
-from motorbus.families.feetech_new.driver.goals import (
-    DUTY,
-    ON,
-    check_bounds,
-    check_current,
-    check_mode,
-    goal_row,
-    known_mode,
-    no_duty,
-    ramp_bytes,
-    rest_block,
-    step_block,
-    with_bound,
-)
 from motorbus.families.feetech_new.driver.identity import read_anew, writable
 from motorbus.families.feetech_new.driver.motion import (
     COUNTS,
@@ -46,14 +32,14 @@ from motorbus.families.feetech_new.driver.motion import (
     stop,
 )
 from motorbus.families.feetech_new.driver.node import Node
-from motorbus.families.feetech_new.driver.requests import TORQUE_ENABLE, Block, confirmed
+from motorbus.families.feetech_new.driver.requests import ON, TORQUE_ENABLE, Block, confirmed
 from motorbus.families.feetech_new.traits import Mode
 
 
 async def mode(node: Node) -> Mode:
     """Its mode, read now. Raises DeviceError for an unknown map, RequestError for an unknown mode."""
     await read_anew(node)
-    return known_mode(node)
+    return goals.checked_mode(node)
 
 
 async def set_mode(node: Node, mode: Mode | str, *, limits: tuple[float, float] | None = None) -> None:
@@ -66,14 +52,10 @@ async def set_mode(node: Node, mode: Mode | str, *, limits: tuple[float, float] 
     wanted = _checked_mode(mode)
     table = await read_anew(node)
     if wanted not in node.traits.has:
-        raise RequestError(
-            f"node {node.node} has no {wanted.value} mode",
-            expected=" or ".join(one.value for one in node.traits.has),
-            advice="nothing was sent",
-            node=node.node,
-        )
+        has = " or ".join(one.value for one in node.traits.has)
+        raise node.refusal(f"has no {wanted.value} mode", expected=has)
     if wanted is Mode.PWM and not node.traits.duty:
-        raise no_duty(node)
+        raise goals.no_duty(node)
     by_code = "operating_mode" in table
     blocks = [_by_code(node, table, wanted, limits) if by_code else _by_limits(node, table, wanted, limits)]
     if node.traits.current and wanted is not Mode.CURRENT and node.known_mode in (Mode.CURRENT, None):
@@ -85,7 +67,7 @@ async def set_mode(node: Node, mode: Mode | str, *, limits: tuple[float, float] 
         await disable_torque(node)
     await read_anew(node)
     if wanted in (Mode.VELOCITY, Mode.PWM, Mode.CURRENT):
-        await ordered(node, rest_block(node))
+        await ordered(node, goals.rest_block(node))
 
 
 def _checked_mode(mode: Mode | str) -> Mode:
@@ -97,11 +79,7 @@ def _checked_mode(mode: Mode | str) -> Mode:
 
 def _by_code(node: Node, table: RegisterMap, wanted: Mode, limits: tuple[float, float] | None) -> Block:
     if limits is not None:
-        raise RequestError(
-            f"node {node.node} has an operating mode, which limits do not change",
-            advice="leave limits out; nothing was sent",
-            node=node.node,
-        )
+        raise node.refusal("has an operating mode, which limits do not change", "leave limits out")
     code = node.traits.code(wanted)
     assert code is not None
     row = table["operating_mode"]
@@ -115,12 +93,7 @@ def _by_limits(node: Node, table: RegisterMap, wanted: Mode, limits: tuple[float
         return limits_block(node, table, (0, 0))
     wished = limits or node.limits or node.former_limits
     if wished is None:
-        raise RequestError(
-            f"node {node.node} needs limits for position mode",
-            expected="limits=(low, high) in rad that what it moves can bear",
-            advice="nothing was sent",
-            node=node.node,
-        )
+        raise node.refusal("needs limits for position mode", "give limits=(low, high) in rad")
     return limits_block(node, table, raw_limits(node, table, wished))
 
 
@@ -130,12 +103,8 @@ def raw_limits(node: Node, table: RegisterMap, limits: tuple[float, float]) -> t
     raws = node.raw(low, limits[0]), node.raw(high, limits[1])
     if not (low.low <= raws[0] <= low.high and raws[1] <= high.high and raws[0] < raws[1]):
         least, most = float(node.value(low, low.low)), float(node.value(high, high.high))
-        raise RequestError(
-            f"node {node.node}: limits {limits[0]} to {limits[1]} rad are impossible",
-            expected=f"{least:.4g} to {most:.4g} rad, the lower one first",
-            advice="nothing was sent",
-            node=node.node,
-        )
+        span = f"{least:.4g} to {most:.4g} rad, the lower one first"
+        raise node.refusal(f"cannot have the limits {limits[0]} to {limits[1]} rad", expected=span)
     return raws
 
 
@@ -157,21 +126,20 @@ async def set_velocity(
     RequestError in another mode and for what no register takes (SMCL: no negative velocity).
     """
     _check_number(node, velocity, "velocity in rad/s")
-    check_bounds(node, acceleration, current)
     await writable(node)
-    check_mode(node, Mode.VELOCITY)
-    check_current(node, current)
+    goals.check_mode(node, Mode.VELOCITY)
+    goals.bound_bytes(node, current) if current is not None else None
     await read_bound(node, current)
-    row = goal_row(node, "goal_velocity")
+    row = node.row("goal_velocity")
     raw = node.raw(row, velocity)
     low, high = (float(node.value(row, bound)) for bound in (row.low, row.high))
     goal = Setpoint(node.node, "velocity", float(node.value(row, raw)), low, high)
     block = Block(row.address, row.encode(raw), row.effect, (goal,))
     if current is not None or not node.bound:
-        block = with_bound(node, block, current)
+        block = goals.with_bound(node, block, current)
     if acceleration is not None:
-        ramp = ramp_bytes(node, acceleration)
-        await confirmed(node, Block(goal_row(node, "goal_position").address - len(ramp), ramp))
+        ramp = goals.ramp_bytes(node, acceleration)
+        await confirmed(node, Block(node.row("goal_position").address - len(ramp), ramp))
     await ordered(node, block)
 
 
@@ -186,11 +154,11 @@ async def set_duty(node: Node, duty: float) -> None:
         raise LimitExceeded(f"node {node.node}: {duty} is no duty", expected="-1 to 1", node=node.node)
     await writable(node)
     if not node.traits.duty:
-        raise no_duty(node)
-    check_mode(node, Mode.PWM)
-    row = goal_row(node, node.traits.duty)
-    raw = round(duty / DUTY)
-    goal = Setpoint(node.node, "load", raw * DUTY, -1.0, 1.0)
+        raise goals.no_duty(node)
+    goals.check_mode(node, Mode.PWM)
+    row = node.row(node.traits.duty)
+    raw = round(duty / goals.DUTY)
+    goal = Setpoint(node.node, "load", raw * goals.DUTY, -1.0, 1.0)
     await ordered(node, Block(row.address, row.encode(raw), row.effect, (goal,)))
 
 
@@ -201,8 +169,8 @@ async def set_current(node: Node, current: float) -> None:
     """
     _check_number(node, current, "current in A")
     await writable(node)
-    check_mode(node, Mode.CURRENT)
-    row = goal_row(node, node.traits.current)
+    goals.check_mode(node, Mode.CURRENT)
+    row = node.row(node.traits.current)
     raw = node.raw(row, current)
     low, high = float(row.to_value(row.low)), float(row.to_value(row.high))
     if not row.low <= raw <= row.high:
@@ -234,14 +202,14 @@ class _Step(Motion):
 
     async def check(self, device: Node, to: float) -> Setpoint:
         self.tolerance = max(TOLERANCE, COUNTS * count_of(device))
+        block = goals.step_block(device, to, self.velocity, self.acceleration)
         start = await feedback.position(device)
-        block = step_block(device, to, self.velocity, self.acceleration)
         self.here[device.node] = start
         self.by = to
         return Setpoint(device.node, "position", start + block.goals[0].value)
 
     async def send(self, device: Node, goal: Setpoint) -> None:
-        await send_step(device, step_block(device, self.by, self.velocity, self.acceleration))
+        await send_step(device, goals.step_block(device, self.by, self.velocity, self.acceleration))
         await Sleep(0.02)  # a goal whole turns away looks like this place until it moves
 
     async def sample(self, device: Node) -> State:
@@ -270,16 +238,15 @@ async def step(
     Torque goes on. Never sent twice: OutcomeUnknown if it was not acknowledged. An interrupt of the wait does not stop
     it, for no goal of step mode holds: disable_torque() does. Bounds, tolerance and errors as in `move`.
     """
-    check_bounds(node, velocity, acceleration)
     if not is_number(by):
         raise LimitExceeded(f"node {node.node}: {shown(by)} is no angle", node=node.node)
     await writable(node)
-    check_mode(node, Mode.STEP)
+    goals.check_mode(node, Mode.STEP)
     if wait:
         logic = _Step(velocity, acceleration)
         await move_all(logic, {node: by}, tolerance=tolerance, timeout=timeout)
     else:
-        await send_step(node, step_block(node, by, velocity, acceleration))
+        await send_step(node, goals.step_block(node, by, velocity, acceleration))
 
 
 async def send_step(node: Node, block: Block) -> None:

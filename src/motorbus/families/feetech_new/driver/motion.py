@@ -28,28 +28,12 @@ from motorbus.errors import (
     Stalled,
     VerificationFailed,
 )
-from motorbus.families.feetech_new.driver import diagnosis, feedback
-from motorbus.families.feetech_new.driver.goals import (
-    ON,
-    burst,
-    check_bounds,
-    check_current,
-    goal_row,
-    hold_block,
-    known_mode,
-    motion_block,
-    no_limits,
-    raw_bound,
-    raw_speed,
-    rest_block,
-    shown_mode,
-    with_bound,
-    with_torque,
-)
+from motorbus.families.feetech_new.driver import diagnosis, feedback, goals
 from motorbus.families.feetech_new.driver.identity import known, read_anew, writable
 from motorbus.families.feetech_new.driver.node import MANY_TURNS, Node, Settings
 from motorbus.families.feetech_new.driver.requests import (
     DOUBTS,
+    ON,
     PRESENT,
     TORQUE_ENABLE,
     Block,
@@ -134,25 +118,21 @@ async def enable_torque(node: Node, *, jump: float = 0.0) -> None:
 async def torque_on_unless(node: Node, unless: Precondition | None, *, jump: float = 0.0) -> None:
     """`enable_torque`, with a reason not to send the packet that switches torque on."""
     if not (is_number(jump) and jump >= 0):
-        raise RequestError(
-            f"node {node.node}: {shown(jump)} is no jump",
-            expected="a number of rad from 0 on",
-            node=node.node,
-        )
+        raise node.refusal(f"cannot jump by {shown(jump)}", expected="a number of rad from 0 on")
     await read_anew(node)
-    mode = known_mode(node)
+    mode = goals.checked_mode(node)
     if mode is Mode.STEP:  # torque alone moves nothing there
         block = Block(TORQUE_ENABLE, ON, Effect.TORQUE, (torque_on(node.node),))
     elif mode is Mode.POSITION:
         block = await _hold_with_torque(node, jump)
     else:
-        block = rest_block(node)
+        block = goals.rest_block(node)
         if mode is Mode.VELOCITY:
             settings = node.settings
             await read_bound(node)
             _check_same(node, settings)
-            block = with_bound(node, block)
-        block = with_torque(block, await _read_commands(node))
+            block = goals.with_bound(node, block)
+        block = goals.with_torque(block, await _read_commands(node))
     await ordered(node, block._replace(unless=unless))
     if mode is Mode.POSITION:
         await _check_turn(node, block, jump)
@@ -164,32 +144,29 @@ async def _hold_with_torque(node: Node, jump: float) -> Block:
 
     A goal velocity of 0 that means standstill becomes the maximum, or goals alone would move nothing.
     """
-    if node.limits is None:
-        raise no_limits(node)
-    settings = node.settings
+    limits, settings = goals.checked_limits(node), node.settings
     await read_bound(node)
     found = await _read_commands(node)
     raw = await _read_position(node, settings)
     _check_turn_is_known(node, raw, jump)
     there = _within_limits(node, raw, jump)
-    block = hold_block(node, there)
+    block = goals.hold_block(node, there)
     if there != raw:  # it moves, so the gate judges it as any other goal
-        block = block._replace(
-            goals=(block.goals[0]._replace(low=node.limits[0], high=node.limits[1], stays=None),)
-        )
-    speed = goal_row(node, "goal_velocity")
+        block = block._replace(goals=(block.goals[0]._replace(low=limits[0], high=limits[1], stays=None),))
+    speed = node.row("goal_velocity")
     at = speed.address - TORQUE_ENABLE
     stands = node.settings is not None and not node.settings.zero_is_maximum
     if stands and speed.decode(found[at : at + speed.size]) == 0:
-        return with_torque(block._replace(data=block.data + burst(node, raw_speed(node, None))), found)
-    return with_torque(with_bound(node, block), found)
+        return goals.with_torque(
+            block._replace(data=block.data + goals.behind_goal(node, goals.raw_speed(node, None))), found
+        )
+    return goals.with_torque(goals.with_bound(node, block), found)
 
 
 def _within_limits(node: Node, raw: int, jump: float) -> int:
-    row = goal_row(node, "goal_position")
+    row = node.row("goal_position")
     here = node.value(row, raw)
-    assert node.limits is not None
-    low, high = node.limits
+    low, high = goals.checked_limits(node)
     there = min(max(here, low), high)
     if abs(here - there) <= jump + row.scale / 2:
         return node.raw(row, there)
@@ -205,16 +182,12 @@ def _check_turn_is_known(node: Node, raw: int, jump: float = 0.0) -> None:
     """Raise RequestError if goals count over many turns and this position within one: "here" may be turns away."""
     settings = node.settings
     assert settings is not None
-    assert node.limits is not None
     if settings.tells_turns or not settings.many_turns or not 0 <= raw < settings.turn:
         return
-    if jump < node.limits[1]:
-        raise RequestError(
-            f"node {node.node} counts its goals over many turns and its position within one: a goal 'here' may be "
-            "turns away",
-            cause="bit 4 of its phase register is clear",
-            advice="set_multi_turn(True), or move() to a goal you know, or disable_torque(); nothing was sent",
-            node=node.node,
+    if jump < goals.checked_limits(node)[1]:
+        raise node.refusal(
+            "counts its goals over many turns and its position within one, so 'here' may be turns away",
+            "set_multi_turn(True), or move() to a goal you know, or disable_torque()",
         )
 
 
@@ -226,7 +199,7 @@ async def _check_turn(node: Node, block: Block, jump: float = 0.0) -> None:
     settings = node.settings
     if settings is None or not settings.tells_turns:
         return
-    far = abs(float(node.value(goal_row(node, "goal_position"), settings.turn // 2))) + jump
+    far = abs(float(node.value(node.row("goal_position"), settings.turn // 2))) + jump
     goal = block.goals[0].value
     if abs(await feedback.position(node) - goal) > far:
         await disable_torque(node)
@@ -258,7 +231,7 @@ async def check_torque(node: Node) -> None:
 
 async def ordered(node: Node, block: Block) -> None:
     """Write an order and be sure of it; a bound of the current in it is known from then on."""
-    row = goal_row(node, node.traits.current) if node.traits.current else None
+    row = node.row(node.traits.current) if node.traits.current else None
     at = -1 if row is None else row.address - block.address
     has_bound = 0 <= at < len(block.data)
     if has_bound:
@@ -271,7 +244,7 @@ async def ordered(node: Node, block: Block) -> None:
 async def read_bound(node: Node, current: float | None = None) -> None:
     """Read the goal torque of an HLS unless it is known or `current` sets it."""
     if node.traits.current and node.bound is None and current is None:
-        row = goal_row(node, node.traits.current)
+        row = node.row(node.traits.current)
         node.bound = await read_block(node, row.address, row.size, row.decode)
 
 
@@ -281,7 +254,7 @@ async def _read_commands(node: Node) -> bytes:
 
 async def _read_position(node: Node, settings: Settings | None) -> int:
     """Raw present position. Raises RequestError if another task has changed these settings."""
-    row = goal_row(node, "present_position")
+    row = node.row("present_position")
     raw = await read_block(node, PRESENT, row.size, row.decode)
     _check_same(node, settings)
     return raw
@@ -314,15 +287,11 @@ async def stop(node: Node) -> Promise:
 
 
 async def _stop(node: Node) -> Promise:
-    mode = known_mode(node)
+    mode = goals.checked_mode(node)
     if mode is Mode.STEP:
-        raise RequestError(
-            f"node {node.node} is in step mode, where no goal means 'stay'",
-            advice="use disable_torque(); nothing was sent",
-            node=node.node,
-        )
+        raise node.refusal("is in step mode, where no goal means 'stay'", "use disable_torque()")
     if mode is not Mode.POSITION:
-        await ordered(node, rest_block(node))
+        await ordered(node, goals.rest_block(node))
         return _AT_REST[mode]
     here = await catch(_hold_here(node))
     inside = isinstance(here, Block) and not _is_outside(node, here)
@@ -336,17 +305,16 @@ async def _stop(node: Node) -> Promise:
 
 
 async def _hold_here(node: Node) -> Block:
-    if node.limits is None:
-        raise no_limits(node)
+    goals.checked_limits(node)
     raw = await _read_position(node, node.settings)
     _check_turn_is_known(node, raw)
-    return hold_block(node, raw)
+    return goals.hold_block(node, raw)
 
 
 def _is_outside(node: Node, block: Block) -> bool:
-    assert node.limits is not None
-    here, slack = block.goals[0].value, goal_row(node, "goal_position").scale / 2
-    return not node.limits[0] - slack <= here <= node.limits[1] + slack
+    low, high = goals.checked_limits(node)
+    here, slack = block.goals[0].value, node.row("goal_position").scale / 2
+    return not low - slack <= here <= high + slack
 
 
 async def _stop_move(node: Node) -> Promise | None:
@@ -369,17 +337,16 @@ class Motion(core_move.MoveLogic[Node]):
     velocity: float | None = None
     acceleration: float | None = None
     current: float | None = None
-    goals: dict[int, float] = field(default_factory=dict)
+    ends: dict[int, float] = field(default_factory=dict)
 
     async def check(self, device: Node, to: float) -> Setpoint:
-        check_bounds(device, self.velocity, self.acceleration, self.current)
         if not is_number(to):
             raise LimitExceeded(f"node {device.node}: {shown(to)} is no position", node=device.node)
         await writable(device)
         await read_bound(device, self.current)
         goal = self._block(device, to).goals[0]
         self.tolerance = max(TOLERANCE, COUNTS * count_of(device))
-        self.goals[device.node] = goal.value
+        self.ends[device.node] = goal.value
         return goal
 
     async def send(self, device: Node, goal: Setpoint) -> None:
@@ -391,7 +358,7 @@ class Motion(core_move.MoveLogic[Node]):
 
     async def sample(self, device: Node) -> State:
         state = await feedback.telemetry(device)
-        turn, goal = self._turn(device), self.goals[device.node]
+        turn, goal = self._turn(device), self.ends[device.node]
         if turn and state.position is not None:
             return state._replace(position=goal + remainder(state.position - goal, turn))
         return state
@@ -408,7 +375,7 @@ class Motion(core_move.MoveLogic[Node]):
         return 1.0 + 2.0 * (distance / speed + ramps)
 
     def _block(self, node: Node, to: float) -> Block:
-        return motion_block(node, to, self.velocity, self.acceleration, self.current)
+        return goals.motion_block(node, to, self.velocity, self.acceleration, self.current)
 
     def _turn(self, node: Node) -> float:
         """rad after which a position begins anew, where goals do not; else 0."""
@@ -420,7 +387,7 @@ class Motion(core_move.MoveLogic[Node]):
 
 def count_of(node: Node) -> float:
     """One count of its goal position (rad)."""
-    return abs(float(node.value(goal_row(node, "goal_position"), 1)))
+    return abs(float(node.value(node.row("goal_position"), 1)))
 
 
 async def move(
@@ -447,7 +414,7 @@ async def move(
 
 async def move_all(
     logic: core_move.MoveLogic[Node],
-    goals: Mapping[Node, float],
+    to: Mapping[Node, float],
     *,
     wait: bool = True,
     tolerance: float | None = None,
@@ -455,9 +422,9 @@ async def move_all(
 ) -> None:
     """`core.move.move`; a stalled servo is asked for the reason."""
     try:
-        await core_move.move(logic, goals, wait=wait, tolerance=tolerance, timeout=timeout)
+        await core_move.move(logic, to, wait=wait, tolerance=tolerance, timeout=timeout)
     except Stalled as error:
-        node = next(one for one in goals if one.node == error.node)
+        node = next(one for one in to if one.node == error.node)
         reasons = await catch(diagnosis.why_not_moving(node))
         if not isinstance(reasons, MotorbusError) and reasons:
             error.cause = "; ".join(reasons)
@@ -475,14 +442,10 @@ async def cap_torque(node: Node, fraction: float) -> None:
     another number or a servo whose limit is in EEPROM, LimitExceeded for a released one outside its position limits.
     """
     if not (is_number(fraction) and 0 <= fraction <= 1):
-        raise RequestError(f"{shown(fraction)} is no torque limit", expected="0 to 1", node=node.node)
+        raise node.refusal(f"cannot limit its torque to {shown(fraction)}", expected="0 to 1")
     table = await writable(node)
     if not node.traits.limit:
-        raise RequestError(
-            f"node {node.node} keeps its torque limit in EEPROM",
-            advice="write(max_torque=…) sets it for good; nothing was sent",
-            node=node.node,
-        )
+        raise node.refusal("keeps its torque limit in EEPROM", "write(max_torque=…) sets it for good")
     row = table[node.traits.limit]
     if fraction and not await read_block(node, row.address, row.size, row.decode):
         await _calm(node)
@@ -496,8 +459,8 @@ async def _calm(node: Node) -> None:
     await read_anew(node)
     if node.known_mode is Mode.STEP or await is_limp(node):
         return
-    if known_mode(node) is not Mode.POSITION:
-        await ordered(node, rest_block(node))
+    if goals.checked_mode(node) is not Mode.POSITION:
+        await ordered(node, goals.rest_block(node))
         return
     block = await _hold_here(node)
     if _is_outside(node, block):
@@ -515,25 +478,19 @@ async def cap_current(node: Node, current: float) -> None:
     Raises RequestError for another servo, or in a mode where the register is no bound.
     """
     await read_anew(node)
-    check_current(node, current)
+    data = goals.bound_bytes(node, current)
     if node.known_mode not in (Mode.POSITION, Mode.VELOCITY):
-        raise RequestError(
-            f"node {node.node} is in operating mode {shown_mode(node)}, where its goal torque bounds nothing",
-            advice="set_mode('position') first; nothing was sent",
-            node=node.node,
-        )
-    row = goal_row(node, node.traits.current)
-    raw = raw_bound(node, current)
-    goal = Setpoint(node.node, "cap", float(node.value(row, raw)), 0.0, float(node.value(row, row.high)))
-    await ordered(node, Block(row.address, row.encode(raw), row.effect, (goal,)))
+        what = f"is in operating mode {goals.shown_mode(node)}, where its goal torque bounds nothing"
+        raise node.refusal(what, "set_mode('position')")
+    row = node.row(node.traits.current)
+    value, most = float(node.value(row, row.decode(data))), float(node.value(row, row.high))
+    await ordered(node, Block(row.address, data, row.effect, (Setpoint(node.node, "cap", value, 0.0, most),)))
 
 
 async def limits(node: Node) -> tuple[float, float]:
     """Lowest and highest position (rad); read if unknown. Raises RequestError where 0 and 0 have no known meaning."""
     await writable(node)
-    if node.limits is None:
-        raise no_limits(node)
-    return node.limits
+    return goals.checked_limits(node)
 
 
 async def travel(node: Node) -> tuple[float, float] | None:

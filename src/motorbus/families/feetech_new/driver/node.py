@@ -76,15 +76,20 @@ class Pending(NamedTuple):
     stops: int
 
 
+class BusFacts:
+    """What is known of the servos of one bus, by id: `arcs` are settings (degrees), `maps` the maps that were met."""
+
+    def __init__(self, arcs: Mapping[int, float] | None = None) -> None:
+        self.arcs: Final = arcs or {}
+        self.maps: Final[dict[int, str]] = {}
+
+
 class Node:
-    """One servo by its id, 0 to 253, and what is known of it; driver functions fill it.
+    """One servo by its id, 0 to 253, and what is known of it; driver functions fill it."""
 
-    `arc`: degrees of all counts of an SCS servo, where they are not those of its model.
-    """
-
-    def __init__(self, node: int, *, arc: float | None = None) -> None:
+    def __init__(self, node: int, facts: BusFacts | None = None) -> None:
         self.node: Final = checked_id(node)
-        self.arc: Final = arc
+        self.facts: Final = facts or BusFacts()
         self.identity: Identity | None = None
         self.table: RegisterMap | None = None
         self.settings: Settings | None = None  # None: not read, or maybe changed since
@@ -136,6 +141,17 @@ class Node:
         """Its settings may have changed: they are read before they are used again."""
         self.settings = None
         self.bound = None
+
+    def row(self, name: str) -> Register:
+        """A register of an identified servo, as its present mode codes it."""
+        assert self.table is not None
+        if self.known_mode is Mode.PWM and name == self.traits.duty:
+            return self.traits.duty_row(self.table)
+        return self.table[name]
+
+    def refusal(self, what: str, fix: str = "", *, expected: str = "") -> RequestError:
+        """The error for an impossible request to this servo: `node 3 WHAT`."""
+        return RequestError(f"node {self.node} {what}", expected=expected, advice=fix, node=self.node)
 
     def value(self, row: Register, raw: int) -> Value:
         """Raw value -> value in the unit of the row, by the last known settings of this servo."""

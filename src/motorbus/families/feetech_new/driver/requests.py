@@ -38,6 +38,7 @@ T = TypeVar("T")
 
 PRESENT: Final = 56  # where feedback begins in every map: the present position
 TORQUE_ENABLE: Final = 40  # in every map
+ON: Final = b"\1"  # of the torque switch; any other value is limp
 STORE: Final = TimeoutClass.STORE
 ACKNOWLEDGED: Final = protocol.OVERHEAD  # bytes of a reply without parameters
 DATA: Final = 5  # offset of the parameters in a reply
@@ -200,12 +201,8 @@ def unchanged(nodes: Iterable[Node], further: Precondition | None = None) -> Pre
 
 def outdated(node: Node) -> RequestError:
     """The error for an order that was made by other settings than the servo has now."""
-    return RequestError(
-        f"the settings of node {node.node} were written since this order was made",
-        cause="its mode, its limits or its zero may be another, so the order may mean something else",
-        advice="give the order again; in a loop, begin another; nothing was sent",
-        node=node.node,
-    )
+    what = "has other settings than when this order was made, which may mean something else now"
+    return node.refusal(what, "give the order again; in a loop, begin another")
 
 
 async def confirmed(

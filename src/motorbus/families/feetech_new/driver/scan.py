@@ -6,7 +6,7 @@ the READ. A servo at another rate is silent.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -17,7 +17,7 @@ from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate, Sleep, ca
 from motorbus.errors import LinkError, MotorbusError, NoReply, UnexpectedReply, WireError
 from motorbus.families.feetech_new import protocol
 from motorbus.families.feetech_new.driver.identity import ScanWarning, check_alone, identify, ping_request
-from motorbus.families.feetech_new.driver.node import Node, as_nodes
+from motorbus.families.feetech_new.driver.node import BusFacts, Node, as_nodes
 from motorbus.families.feetech_new.driver.requests import read_block
 
 DRAIN: Final = 0.02  # s of quiet at a new rate: a servo may answer what it has buffered (feetech-cli)
@@ -26,14 +26,14 @@ ID: Final = 5  # register
 
 
 async def scan(
-    ids: Sequence[int] = (), rates: Sequence[int] = (), *, arcs: Mapping[int, float] = {}
+    ids: Sequence[int] = (), rates: Sequence[int] = (), facts: BusFacts | None = None
 ) -> list[Found]:
     """All servos that answer, with their identity; () means all ids, or the present rate, which is restored.
 
     Reports `Found` when one answers, `Progress`, a `ScanWarning` where two servos seem to share an id, and `Skipped`
     for a rate that the adapter lacks. Writes nothing. Raises UnexpectedReply if all bytes are garbled.
     """
-    nodes = [Node(node.node, arc=arcs.get(node.node)) for node in as_nodes(ids or range(protocol.MAX_ID + 1))]
+    nodes = [Node(node.node, facts) for node in as_nodes(ids or range(protocol.MAX_ID + 1))]
     if not rates:
         return await _scan_rate(nodes, await SetBitrate(0), broadcast=not ids)
 
@@ -50,7 +50,7 @@ async def scan(
 
 
 async def _scan_rate(nodes: Sequence[Node], rate: int, *, broadcast: bool) -> list[Found]:
-    present = await _broadcast_ping() if broadcast else set()
+    present = await broadcast_ping() if broadcast else set()
     for id in sorted(present):
         await Emit(Found(id, rate, None))
     garbled: set[int] = set()
@@ -84,7 +84,9 @@ def _read_id(node: Node) -> Request[bytes]:
     return replace(request, reply_within=TimeoutClass.SCAN)
 
 
-async def _broadcast_ping() -> set[int]:
+async def broadcast_ping() -> set[int]:
+    """The ids that answer a broadcast PING; replies may collide."""
+
     def decode(answer: Response) -> set[int]:
         return {reply.data[2] for reply in answer.replies}
 

@@ -14,7 +14,7 @@ from motorbus.families.feetech_new.driver import (
     modes,
     motion,
 )
-from motorbus.families.feetech_new.driver.node import Node
+from motorbus.families.feetech_new.driver.node import BusFacts, Node
 
 
 class ServoMethods(Node):
@@ -26,6 +26,7 @@ class ServoMethods(Node):
     _family = "feetech"
     ping = device_method(identity.ping)
     identify = device_method(identity.identify)
+    prepare = device_method(identity.identify)
     read = device_method(access.read)
     read_raw = device_method(access.read_raw)
     write = device_method(access.write)
@@ -65,22 +66,22 @@ class ServoMethods(Node):
 
 
 class Servo(ServoMethods, BlockingDevice):
-    """One servo on a blocking bus: `Servo(bus, 3).position()`. `arc`: see `Node`."""
+    """One servo on a blocking bus: `Servo(bus, 3).position()`."""
 
-    def __init__(self, bus: BlockingRunner, node: int, *, arc: float | None = None) -> None:
-        ServoMethods.__init__(self, node, arc=_arc(bus, node) if arc is None else arc)
+    def __init__(self, bus: BlockingRunner, node: int) -> None:
+        ServoMethods.__init__(self, node, facts_of(bus))
         BlockingDevice.__init__(self, bus)
 
 
 class AsyncServo(ServoMethods, AsyncDevice):
     """One servo on an async bus: `await AsyncServo(bus, 3).position()`."""
 
-    def __init__(self, bus: AsyncRunner, node: int, *, arc: float | None = None) -> None:
-        ServoMethods.__init__(self, node, arc=_arc(bus, node) if arc is None else arc)
+    def __init__(self, bus: AsyncRunner, node: int) -> None:
+        ServoMethods.__init__(self, node, facts_of(bus))
         AsyncDevice.__init__(self, bus)
 
 
-def _arc(bus: object, node: int) -> float | None:
-    """The arc of this servo in the settings of its bus."""
-    arcs: dict[int, float] = getattr(getattr(bus, "driver", None), "arcs", {})
-    return arcs.get(node)
+def facts_of(bus: object) -> BusFacts | None:
+    """What is known of the servos of this open bus."""
+    facts: BusFacts | None = getattr(getattr(bus, "driver", None), "facts", None)
+    return facts

@@ -17,7 +17,7 @@ from motorbus.core.stream import read_positions
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech_new.driver import feedback
 from motorbus.families.feetech_new.driver.access import blocks_of
-from motorbus.families.feetech_new.driver.goals import goal_row, position_goal, speed_at_least
+from motorbus.families.feetech_new.driver.goals import position_goal, speed_at_least
 from motorbus.families.feetech_new.driver.group import (
     GoalWriter,
     collect,
@@ -49,6 +49,7 @@ async def open_stream(servos: Sequence[Node], *, rate: int) -> ServoStream:
     await collect(nodes, PRESENT, 2, errors)
     raise_first(list(errors.values()))
     able = [node for node in nodes if node.traits.sync_read and not node.reads_alone]
+    able = able if len(able) > 1 else []
     positions = [positions_request(part) for part in await divided(able, 2)]
     for node in nodes:
         if node not in able:
@@ -109,8 +110,8 @@ async def _start(node: Node, speed: float | None) -> None:
     position_goal(node, 0.0)  # in another mode a velocity would be an order to turn
     await enable_torque(node)
     position_goal(node, 0.0)
-    raws = [(goal_row(node, "goal_velocity"), speed_at_least(node, speed))]
-    raws += [(goal_row(node, name), 0) for name in (node.traits.acceleration, node.traits.time) if name]
+    raws = [(node.row("goal_velocity"), speed_at_least(node, speed))]
+    raws += [(node.row(name), 0) for name in (node.traits.acceleration, node.traits.time) if name]
     for block in blocks_of(node, raws):
         await confirmed(node, block)
 
