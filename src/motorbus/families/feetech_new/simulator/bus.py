@@ -46,7 +46,7 @@ class Reply(NamedTuple):
 class FeetechBus:
     """A `core.family.Simulator` of FEETECH servos; `now` is the latest time (s).
 
-    `servos` are those of the ids as given, then second ones.
+    `servos` are those of the ids as given, then second ones; `usual_rate` is the first rate of the first one (bit/s).
     """
 
     def __init__(
@@ -70,6 +70,7 @@ class FeetechBus:
             self._add(id, model, at)
         if not self.servos:
             raise RequestError("a simulated bus needs at least one servo", advice="give ids, such as 1-6")
+        self.usual_rate = self.servos[0].baud_rate
 
     def _add(self, id: int, model: Model, position: int | None = None) -> Servo:
         if not 0 <= id <= MAX_ID:
@@ -95,12 +96,7 @@ class FeetechBus:
     @property
     def nodes(self) -> Mapping[int, Servo]:
         """The servos by their present id; the first of two with one id."""
-        return {servo.id: servo for servo in reversed(self.servos)}
-
-    @property
-    def usual_rate(self) -> int:
-        """The rate of the first servo, bit/s."""
-        return self.servos[0].baud_rate or 0
+        return {servo.id: self._with_id(servo.id)[0] for servo in self.servos}
 
     def duplicate(self, id: int) -> None:
         """Add a servo as shipped with this id and the rate of the first one. Raises RequestError when there is none."""

@@ -23,7 +23,7 @@ from motorbus.families.feetech_new.simulator.motor import (
     follow,
     limp,
 )
-from motorbus.families.feetech_new.simulator.protection import HEAT, OVERLOAD, VOLTAGE, Overload
+from motorbus.families.feetech_new.simulator.protection import HEAT, VOLTAGE, Overload
 from motorbus.families.feetech_new.simulator.quirks import Quirks
 from motorbus.families.feetech_new.traits import Mode
 
@@ -70,7 +70,7 @@ class Servo(PoweredDevice):
         self.model = model
         self.quirks = quirks
         self.memory = Memory(model.layout, now, quirks.store_time, quirks.torn)
-        self.overload = Overload(self.memory)
+        self.overload = Overload(self.memory, model.drive)
         self.pending: tuple[int, bytes] | None = None
         self.lacks: set[int] = set()
         self.lives = self.jitter = self.zero = self._alarm = 0
@@ -270,7 +270,7 @@ class Servo(PoweredDevice):
     def error(self) -> int:
         """The error byte of its status packets: alarms only."""
         memory = self.memory
-        bits = self._alarm | (OVERLOAD if self.overload.tripped else 0)
+        bits = self._alarm | (self.overload.bit if self.overload.tripped else 0)
         if not memory["min_voltage"] <= round(self._voltage * 10) <= memory["max_voltage"]:
             bits |= VOLTAGE
         return bits | (HEAT if self._temperature > memory["max_temperature"] else 0)
@@ -287,10 +287,10 @@ class Servo(PoweredDevice):
         share = memory[traits.limit or "max_torque"] / 1000
         if traits.current and self.mode in (Mode.POSITION, Mode.VELOCITY):
             share = min(share, abs(self._current))
-        releasing = self.error & memory["unload_mask"]
-        if releasing & OVERLOAD and self.overload.tripped and not self._alarm & OVERLOAD:
+        releasing, bit = self.error & memory["unload_mask"], self.overload.bit
+        if releasing & bit and not self._alarm & bit:
             share = min(share, self.overload.torque)
-            releasing &= ~OVERLOAD
+            releasing &= ~bit
         return 0.0 if releasing else min(share, 1.0)
 
     @property
