@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Final
 
 from motorbus.core.request import Data, Event, Noise, Reply
+
+LONGEST: Final = 4096  # bytes of a frame
 
 
 class FrameParser:
     """Splits a stream into frames and noise; every byte is in exactly one of them, in order.
 
     `headers`  the bytes with which a frame begins, one of several
-    `length`   bytes of a whole frame by its first bytes; None: more bytes are needed; 0: it is no frame. At most 4096
+    `length`   bytes of a whole frame (at most `LONGEST`) by its first bytes; None: more are needed; 0: it is no frame
     `is_valid` whether the checksum of a whole frame is correct
     """
 
@@ -23,6 +26,7 @@ class FrameParser:
         is_valid: Callable[[bytes], bool],
     ) -> None:
         self._headers: Final = headers
+        self._first_byte: Final = re.compile(b"|".join(re.escape(header[:1]) for header in headers))
         self._length: Final = length
         self._is_valid: Final = is_valid
         self._buffer = b""
@@ -40,11 +44,10 @@ class FrameParser:
         found: list[tuple[bytes, str]] = []
         buffer, start, noise, fault = self._buffer + data, 0, 0, "framing"
         while start < len(buffer):
-            rest = buffer[start:]
             size: int | None = 0
-            if rest.startswith(self._headers):
-                size = self._length(rest)
-            elif any(header.startswith(rest) for header in self._headers):
+            if buffer.startswith(self._headers, start):
+                size = self._length(buffer[start : start + LONGEST])
+            elif any(header.startswith(buffer[start : start + len(header)]) for header in self._headers):
                 size = None
             if (size is None or size > len(buffer) - start) and not end:
                 break
@@ -57,7 +60,8 @@ class FrameParser:
                 fault = "framing"
             else:
                 fault = "checksum" if frame else fault
-                start += 1
+                next_start = self._first_byte.search(buffer, start + 1)
+                start = next_start.start() if next_start else len(buffer)
         if noise < start:
             found.append((buffer[noise:start], fault))
         self._buffer = buffer[start:]
