@@ -29,6 +29,7 @@ JITTER: Final = 20  # bits by which a second servo with an id may be late # assu
 SLACK: Final = 0.05  # of a byte; replies that are less apart start together
 FRAME_GAP: Final = 0.005  # s; after a longer pause an incomplete packet is dropped # assumption
 USUAL_RATE: Final = 1_000_000  # bit/s, of a host that has not set one
+WRITES: Final = (Instruction.WRITE, Instruction.REG_WRITE, Instruction.SYNC_WRITE)
 ALWAYS: Final = (Instruction.PING, Instruction.READ)  # answered at every status return level
 _NEXT: Final = attrgetter("overload.next")
 
@@ -49,13 +50,7 @@ class FeetechBus:
     `servos` are those of the ids as given, then second ones; `usual_rate` is the first rate of the first one (bit/s).
     """
 
-    def __init__(
-        self,
-        ids: Iterable[int],
-        models: Sequence[Model],
-        quirks: Quirks,
-        position: int | Mapping[int, int] | None = None,
-    ) -> None:
+    def __init__(self, ids: Iterable[int], models: Iterable[Model], quirks: Quirks) -> None:
         self.quirks = quirks
         self.now = 0.0
         self.rate: int | None = None
@@ -66,37 +61,25 @@ class FeetechBus:
         self._order = count()
         self._random = Random(0)
         for id, model in zip(ids, models, strict=True):
-            at = position.get(id) if isinstance(position, Mapping) else position
-            self._add(id, model, at)
+            self._add(id, model)
         if not self.servos:
             raise RequestError("a simulated bus needs at least one servo", advice="give ids, such as 1-6")
         self.usual_rate = self.servos[0].baud_rate
 
-    def _add(self, id: int, model: Model, position: int | None = None) -> Servo:
+    def _add(self, id: int, model: Model) -> Servo:
         if not 0 <= id <= MAX_ID:
             raise RequestError(f"id {id} is not possible", expected=f"0 to {MAX_ID}")
-        servo = Servo(id, model, self.quirks, lambda: self.now, self._forget_ids, position)
+        servo = Servo(id, model, self.quirks, lambda: self.now)
         self.servos = (*self.servos, servo)
-        self._forget_ids()
         return servo
-
-    def _forget_ids(self) -> None:
-        self._by_id: dict[int, list[Servo]] = {}
-        self._by_second_id: dict[int, list[Servo]] = {}
-
-    def _with_id(self, id: int) -> list[Servo]:
-        """The servos with this id."""
-        if not self._by_id:  # an id has changed
-            for servo in self.servos:
-                self._by_id.setdefault(servo.id, []).append(servo)
-                if servo.second_id not in (None, servo.id):
-                    self._by_second_id.setdefault(servo.second_id, []).append(servo)
-        return self._by_id.get(id, [])
 
     @property
     def nodes(self) -> Mapping[int, Servo]:
         """The servos by their present id; the first of two with one id."""
-        return {servo.id: self._with_id(servo.id)[0] for servo in self.servos}
+        found: dict[int, Servo] = {}
+        for servo in self.servos:
+            found.setdefault(servo.id, servo)
+        return found
 
     def duplicate(self, id: int) -> None:
         """Add a servo as shipped with this id and the rate of the first one. Raises RequestError when there is none."""
@@ -169,11 +152,13 @@ class FeetechBus:
                 self._speak(answers)
 
     def _receivers(self, id: int, code: int, at: float) -> list[Servo]:
-        """The servos that take this instruction; an HLS takes writes to its second id (HLS memory table)."""
-        servos: Sequence[Servo] = self.servos if id == BROADCAST else self._with_id(id)
-        if code in (Instruction.WRITE, Instruction.REG_WRITE, Instruction.SYNC_WRITE):
-            servos = [*servos, *self._by_second_id.get(id, ())]
-        return [servo for servo in servos if servo.hears(self.rate, at)]
+        """The servos that take this instruction to this id."""
+        servos = [servo for servo in self.servos if servo.hears(self.rate, at)]
+        if id == BROADCAST:
+            return servos
+        if code in WRITES:
+            return [servo for servo in servos if servo.obeys(id)]
+        return [servo for servo in servos if servo.id == id]
 
     def _answer(self, servo: Servo, packet: protocol.Packet, at: float) -> Reply | None:
         """Let a servo carry out an instruction; returns its reply."""

@@ -9,10 +9,13 @@ from __future__ import annotations
 from typing import Final
 
 from motorbus.families.feetech_new.protocol import MAX_PARAMETERS, Instruction, suits
+from motorbus.families.feetech_new.simulator.models import Model
 from motorbus.families.feetech_new.simulator.servo import Servo
 
 BOOTLOADER_TIME: Final = 0.8  # s (kuterd/feetech-fw-util)
 RESTORE_TIME: Final = 0.5  # s; servolab waits at most 1 s # assumption
+CALIBRATING: Final = ("hls", "sts")
+"""Maps with 0x0B: FTServo_Python, reOfsCal; dispatcher of STS3215 firmware 3.10 (kuterd/feetech-fw-util)."""
 
 
 def carry_out(servo: Servo, code: int, parameters: bytes, at: float) -> bytes | None:
@@ -45,10 +48,10 @@ def carry_out(servo: Servo, code: int, parameters: bytes, at: float) -> bytes | 
         case Instruction.BOOTLOADER:  # no reply; the motor is limp meanwhile # assumption
             servo.restart()
             servo.deaf_until = at + BOOTLOADER_TIME
-        case Instruction.CLEAR_TURNS if servo.model.clears_turns:
+        case Instruction.CLEAR_TURNS if _clears_turns(servo.model):
             servo.clear_turns()
             return b""
-        case Instruction.CALIBRATE if servo.model.instruction_0b:
+        case Instruction.CALIBRATE if servo.model.table.name in CALIBRATING:
             middle = servo.model.traits.turn // 2
             servo.calibrate(int.from_bytes(parameters, "little") if parameters else middle)
             return b""
@@ -61,3 +64,8 @@ def _restore(servo: Servo, at: float) -> bytes:
     servo.restart()
     servo.deaf_until = at + RESTORE_TIME
     return b""
+
+
+def _clears_turns(model: Model) -> bool:
+    """0x0A: HLS (FTServo_Python, hls/reset.py), and brushless models (a public STS3215 table: "STBL")."""
+    return model.table.name == "hls" or (model.traits.clear_turns and model.name.endswith("bl"))

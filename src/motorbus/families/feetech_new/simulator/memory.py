@@ -13,14 +13,11 @@ from collections.abc import Callable, Iterable, Mapping
 from math import inf
 from typing import Final, NamedTuple
 
-from motorbus.core.register import Coding, Register, RegisterMap, Storage
+from motorbus.core.register import Register, RegisterMap, Storage
 
 SIZE: Final = 256
 ERASED: Final = 0xFF
-_EMPTY: Final = SIZE  # one more byte, always 0: the high byte of a row of one byte
-_KEPT: Final = (
-    "max_acceleration",
-)  # lerobot writes this row of the maker; kept until power-off # assumption
+_KEPT: Final = "max_acceleration"  # lerobot writes this row of the maker; kept until power-off # assumption
 
 
 class Cell(NamedTuple):
@@ -31,29 +28,16 @@ class Cell(NamedTuple):
     value: int
 
 
-class Place(NamedTuple):
-    """The bytes of a row: places of the low and the high one, mask of the magnitude, sign bit."""
-
-    low: int
-    high: int
-    magnitude: int
-    sign: int
-
-
 class Layout:
     """The rows of a map by address, and the values as shipped; servos of one model share it."""
 
     def __init__(self, table: RegisterMap, defaults: Mapping[str, int]) -> None:
         self.table = table
+        self.shipped = bytearray(SIZE)
         self.rows: list[Register | None] = [None] * SIZE
-        self.places = {row.name: _place(row) for row in table.values()}
-        self.shipped = bytearray(SIZE + 1)
-        self.keeps = [False] * SIZE
         for row in table.values():
-            span = slice(row.address, row.address + row.size)
-            self.rows[span] = [row] * row.size
-            self.keeps[span] = [row.storage is not Storage.RAM] * row.size
-            put(self.shipped, self.places[row.name], defaults.get(row.name, row.default or 0))
+            self.rows[span(row)] = [row] * row.size
+            self.shipped[span(row)] = code(row, defaults.get(row.name, row.default or 0))
 
     def touched(self, address: int, count: int) -> list[Register]:
         """The rows with at least one of these bytes, in order."""
@@ -61,37 +45,37 @@ class Layout:
 
 
 class Memory:
-    """The registers of one servo by name, as raw values.
-
-    `stored`  the EEPROM cells; `wear` counts the stores of each
-    `waiting` cells still to be stored, in order; `time` is the s of a write; `torn` is in `Quirks`
-    """
+    """The registers of one servo by name, as raw values; `live` are the bytes."""
 
     def __init__(
         self, layout: Layout, now: Callable[[], float], time: float = 0.0, torn: str = "erased"
     ) -> None:
+        """`time` is the s of a write to the EEPROM, `torn` as in `Quirks`."""
         self.layout = layout
         self.live = bytearray(layout.shipped)
-        self._wear: Counter[int] = Counter()
-        self.time = time
-        self.torn = torn
         self._now = now
+        self._time = time
+        self._torn = torn
         self._cells = bytearray(layout.shipped)
+        self._wear: Counter[int] = Counter()
         self._waiting: list[Cell] = []
         self._begun = -inf
 
     def __getitem__(self, name: str) -> int:
-        low, high, magnitude, sign = self.layout.places[name]
-        code = self.live[low] | self.live[high] << 8
-        return -(code & magnitude) if code & sign else code & magnitude
+        return self.decode(self.layout.table[name])
+
+    def decode(self, row: Register) -> int:
+        """The live value of a row."""
+        return row.decode(bytes(self.live[span(row)]))
 
     def __setitem__(self, name: str, raw: int) -> None:
         """Set a live value as the servo itself does, cut to what its row can express; no lock, no rights."""
-        put(self.live, self.layout.places[name], raw)
+        row = self.layout.table[name]
+        self.live[span(row)] = code(row, raw)
 
     def read(self, address: int, count: int) -> bytes:
         """Live bytes; zeros where no row is."""
-        return bytes(self.live[address : min(address + count, SIZE)]).ljust(count, b"\0")
+        return bytes(self.live[address : address + count]).ljust(count, b"\0")
 
     def write(self, address: int, data: bytes, *, locked: bool, strict: bool = False) -> set[str]:
         """Write the bytes that a host can write; returns the names of their rows.
@@ -101,60 +85,63 @@ class Memory:
         names: set[str] = set()
         cells: list[int] = []
         for row in self.layout.touched(address, len(data)):
-            if not row.writable and row.name not in _KEPT:
+            if not row.writable and row.name != _KEPT:
                 continue
-            old = self.live[row.address : row.address + row.size]
+            old = self.live[span(row)]
             places = range(max(row.address, address), min(row.address + row.size, address + len(data)))
             for place in places:
                 self.live[place] = data[place - address]
             if strict and not row.low <= self[row.name] <= row.high:
-                self.live[row.address : row.address + row.size] = old
+                self.live[span(row)] = old
                 continue
             names.add(row.name)
             if row.storage is Storage.EEPROM and not locked:
                 cells += places
-        self.store(cells)
+        self.store(cells, self._time)
         return names
 
     # -- EEPROM --------------------------------------------------------------------------------------------------
 
-    def store(self, addresses: Iterable[int], time: float | None = None) -> None:
+    def store(self, addresses: Iterable[int], time: float) -> None:
         """Store the live values of these cells after those that wait, in `time` s altogether."""
         cells = list(addresses)
         begin = max(self._now(), self.busy_until)
-        if cells and not self.waiting:
+        if cells and not self._waiting:
             self._begun = begin
-        step = (self.time if time is None else time) / max(1, len(cells))
-        self._waiting += [
-            Cell(begin + number * step, address, self.live[address])
-            for number, address in enumerate(cells, start=1)
-        ]
+        for number, address in enumerate(cells, start=1):
+            self._waiting.append(Cell(begin + number * time / len(cells), address, self.live[address]))
 
-    @property
-    def waiting(self) -> list[Cell]:
-        self._settle()
-        return list(self._waiting)
-
-    @property
-    def wear(self) -> Counter[int]:
-        self._settle()
-        return self._wear
+    def store_row(self, name: str) -> None:
+        """Store the live value of a row."""
+        row = self.layout.table[name]
+        self.store(range(row.address, row.address + row.size), self._time)
 
     @property
     def stored(self) -> bytearray:
+        """The EEPROM cells."""
         self._settle()
         return self._cells
 
     @property
+    def wear(self) -> Counter[int]:
+        """How often each cell was stored."""
+        self._settle()
+        return self._wear
+
+    @property
+    def waiting(self) -> list[Cell]:
+        """Cells still to be stored, in order."""
+        self._settle()
+        return self._waiting
+
+    @property
     def busy_until(self) -> float:
         """The moment (s) of the last store; -inf when none waits."""
-        waiting = self.waiting if self._waiting else ()
-        return waiting[-1].moment if waiting else -inf
+        return self.waiting[-1].moment if self.waiting else -inf
 
     def midway(self) -> float:
         """The moment (s) at which the cell in work is half stored; inf without one."""
-        waiting = self.waiting
-        return (self._begun + waiting[0].moment) / 2 if waiting else inf
+        return (self._begun + self.waiting[0].moment) / 2 if self.waiting else inf
 
     def _settle(self) -> None:
         while self._waiting and self._waiting[0].moment <= self._now():
@@ -166,49 +153,42 @@ class Memory:
 
     def power_off(self) -> None:
         """The supply goes: the cell in work is torn, those behind it are lost."""
-        waiting = self.waiting
-        self._waiting.clear()
-        if waiting and self._begun < self._now():
-            _, address, value = waiting[0]
+        if self.waiting and self._begun < self._now():
+            _, address, value = self._waiting[0]
             self._wear[address] += 1
-            if self.torn != "old":
-                self._cells[address] = ERASED if self.torn == "erased" else value
+            if self._torn != "old":
+                self._cells[address] = ERASED if self._torn == "erased" else value
+        self._waiting.clear()
 
     def restart(self) -> None:
-        """Load the live values: EEPROM rows as stored or waiting, others as shipped."""
+        """Load the live values: RAM as shipped, other rows as stored or waiting."""
         cells = bytearray(self.stored)
         for cell in self._waiting:
             cells[cell.address] = cell.value
         self.live = bytearray(self.layout.shipped)
-        for address, keeps in enumerate(self.layout.keeps):
-            if keeps:
-                self.live[address] = cells[address]
+        for row in self.layout.table.values():
+            if row.storage is not Storage.RAM:
+                self.live[span(row)] = cells[span(row)]
 
     def restore_factory(self, keep: Iterable[str], time: float) -> None:
         """All rows but these as shipped; the EEPROM needs `time` s for it."""
         cells: list[int] = []
         for row in self.layout.table.values():
-            span = range(row.address, row.address + row.size)
             if row.name not in keep and row.storage is not Storage.FACTORY:
-                self.live[span.start : span.stop] = self.layout.shipped[span.start : span.stop]
-                cells += span if row.storage is Storage.EEPROM and row.writable else ()
+                self.live[span(row)] = self.layout.shipped[span(row)]
+                if row.storage is Storage.EEPROM and row.writable:
+                    cells += range(row.address, row.address + row.size)
         self.store(cells, time)
 
 
-def put(image: bytearray, place: Place, raw: int) -> None:
-    """Put a raw value into an image; a value that its row cannot express is cut."""
-    if raw < 0 and not place.sign:
-        raw = 0
-    code = min(abs(raw), place.magnitude) | (place.sign if raw < 0 else 0)
-    image[place.low] = code & 0xFF
-    if place.high != _EMPTY:
-        image[place.high] = code >> 8
+def span(row: Register) -> slice:
+    """The bytes of a row."""
+    return slice(row.address, row.address + row.size)
 
 
-def _place(row: Register) -> Place:
-    low, high = row.address, row.address + 1 if row.size == 2 else _EMPTY
-    if row.order != "little" and row.size == 2:
-        low, high = high, low
-    if row.coding is Coding.SIGN_MAGNITUDE and row.sign_bit is not None:
-        return Place(low, high, (1 << row.sign_bit) - 1, 1 << row.sign_bit)
-    return Place(low, high, 0xFFFF if row.size == 2 else 0xFF, 0)
+def code(row: Register, raw: int) -> bytes:
+    """A raw value as bytes, cut to what the row can express, in range or not."""
+    largest = (1 << (row.sign_bit or 8 * row.size)) - 1
+    raw = max(-largest if row.sign_bit else 0, min(raw, largest))
+    number = raw if raw >= 0 else -raw | 1 << (row.sign_bit or 0)
+    return number.to_bytes(row.size, "little" if row.order == "little" else "big")

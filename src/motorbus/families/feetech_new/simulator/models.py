@@ -12,14 +12,14 @@ from difflib import get_close_matches
 from functools import cached_property
 from math import radians
 from types import MappingProxyType
-from typing import Final
+from typing import Final, NamedTuple
 
 from motorbus.core.plant import Drive
 from motorbus.core.register import RegisterMap
 from motorbus.errors import RequestError
 from motorbus.families.feetech_new.models import MODELS as NUMBERS
 from motorbus.families.feetech_new.models import map_for
-from motorbus.families.feetech_new.registers.codes import BAUD_CODES
+from motorbus.families.feetech_new.registers.codes import BAUD_CODES, BAUD_CODES_OF
 from motorbus.families.feetech_new.registers.hls import HLS
 from motorbus.families.feetech_new.registers.scs import SCS, SCS2
 from motorbus.families.feetech_new.registers.sms import SMBL, SMCL
@@ -30,23 +30,10 @@ from motorbus.families.feetech_new.traits import TRAITS, Traits
 DEFAULT: Final = "sts3215"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Model:
-    """A model in one of its maps; a value that is not of the model is that of all servos of the map.
+class Kind(NamedTuple):
+    """What all servos of one map have in common: firmware that they report, supply (V), motor (counts/s, A).
 
-    `number`         model number (major, minor); `name` is in lower case
-    `angle`          rad for a count of its position
-    `firmware`       the version that it reports
-    `voltage`        supply, V
-    `drive`          motor; speed in counts/s
-    `shipped`        raw values as shipped of the rows without a published default
-    `stored`         raw values that were stored since
-    `reply_delay`    minimum s between request and reply
-    `reversed_by`    bit of `phase` that reverses position feedback and drive together; None: none
-    `heeds_time`     goal_time counts when the velocity is 0
-    `smaller`        a positive duty turns to smaller angles
-    `switch_128`     128 in torque_enable makes the present position the middle
-    `instruction_0b` 0x0B sets the present position
+    `shipped` are the raw values of the rows without a published default.
     """
 
     table: RegisterMap
@@ -54,46 +41,41 @@ class Model:
     voltage: float
     drive: Drive
     shipped: dict[str, int]
-    reply_delay: float = 0.0
-    reversed_by: int | None = None
-    heeds_time: bool = False
-    smaller: bool = False
-    switch_128: bool = False
-    instruction_0b: bool = False
-    name: str = ""
-    number: tuple[int, int] = (0, 0)
-    angle: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Model:
+    """A model in one of its maps; `angle` is rad for a count of its position, `stored` what was stored since."""
+
+    name: str  # in lower case
+    number: tuple[int, int]
+    angle: float
+    table: RegisterMap
+    firmware: tuple[int, int]
+    voltage: float
+    drive: Drive
+    shipped: dict[str, int]
     stored: Mapping[str, int] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def traits(self) -> Traits:
         return TRAITS[self.table.name]
-
-    @property
-    def defaults(self) -> dict[str, int]:
-        """All raw values as shipped that its table does not give."""
-        names = ("firmware_major", "firmware_minor", "model_major", "model_minor")
-        return {**self.shipped, **dict(zip(names, (*self.firmware, *self.number), strict=True))}
 
     @cached_property
     def layout(self) -> Layout:
         """Its registers as shipped."""
-        return Layout(self.table, self.defaults)
+        names = ("firmware_major", "firmware_minor", "model_major", "model_minor")
+        identity = dict(zip(names, (*self.firmware, *self.number), strict=True))
+        return Layout(self.table, self.shipped | identity)
 
     @property
     def rate(self) -> int:
         """The rate as shipped, bit/s."""
         return BAUD_CODES[self.shipped.get("baud_rate", self.table["baud_rate"].default or 0)]
 
-    @property
-    def clears_turns(self) -> bool:
-        """It knows 0x0A: HLS (FTServo_Python), and brushless models (a public STS3215 table: "STBL")."""
-        return self.table.name == "hls" or (self.traits.clear_turns and self.name.endswith("bl"))
-
 
 _STS_DRIVE: Final = Drive(top_speed=3400.0, idle_current=0.15, stall_current=3.25)
 _SCS_DRIVE: Final = Drive(top_speed=2048.0, idle_current=0.1, stall_current=1.0)
-_LEAST_DELAY: Final = 100e-6  # FEETECH page on SMS servos: values of register 7 below 50 act as 50
 
 # fmt: off
 _LIKE_STS: Final = {
@@ -121,68 +103,17 @@ _SCS2: Final = {
     "overload_torque": 80, "baud_rate": 0,
 }
 _LEROBOT: Final = {"max_acceleration": 254}  # what lerobot (configure_motors) writes
+_SMBL: Final = _SMCL | _LOOPS | _LEROBOT | {"phase": 12, "torque_limit": 1000}
 # fmt: on
 
 _KINDS: Final = (
-    Model(
-        table=STS,
-        firmware=(3, 10),
-        voltage=7.4,
-        drive=_STS_DRIVE,
-        shipped=_LEROBOT,
-        reversed_by=7,
-        smaller=True,  # servolab, measured on STS3215
-        switch_128=True,
-        instruction_0b=True,  # dispatcher of firmware 3.10 (kuterd/feetech-fw-util)
-    ),
-    Model(
-        table=SMBL,
-        firmware=(2, 45),
-        voltage=12.0,
-        drive=_STS_DRIVE,
-        shipped=_SMCL | _LOOPS | _LEROBOT | {"phase": 12, "torque_limit": 1000},
-        reply_delay=_LEAST_DELAY,
-        reversed_by=7,
-        switch_128=True,
-    ),
-    Model(
-        table=SMCL,
-        firmware=(1, 10),
-        voltage=12.0,
-        drive=_STS_DRIVE,
-        shipped=_SMCL,
-        reply_delay=_LEAST_DELAY,
-        switch_128=True,
-    ),
-    Model(
-        table=SCS,
-        firmware=(0, 10),
-        voltage=6.0,
-        drive=_SCS_DRIVE,
-        shipped={"baud_rate": 0},  # 1000000 or 500000 by model
-        reversed_by=0,
-        heeds_time=True,
-    ),
-    Model(
-        table=SCS2,
-        firmware=(3, 25),
-        voltage=6.0,
-        drive=_SCS_DRIVE,
-        shipped=_SCS2,
-        reversed_by=0,
-        heeds_time=True,
-    ),
-    Model(
-        table=HLS,
-        firmware=(3, 43),  # met on HLS3955 and HLS3915
-        voltage=12.0,
-        drive=_STS_DRIVE,
-        shipped=_HLS,
-        reversed_by=7,
-        instruction_0b=True,  # FTServo_Python, reOfsCal
-    ),
+    Kind(STS, (3, 10), 7.4, _STS_DRIVE, _LEROBOT),
+    Kind(SMBL, (2, 45), 12.0, _STS_DRIVE, _SMBL),
+    Kind(SMCL, (1, 10), 12.0, _STS_DRIVE, _SMCL),
+    Kind(SCS, (0, 10), 6.0, _SCS_DRIVE, {"baud_rate": 0}),  # 1000000 or 500000 by model
+    Kind(SCS2, (3, 25), 6.0, _SCS_DRIVE, _SCS2),
+    Kind(HLS, (3, 43), 12.0, _STS_DRIVE, _HLS),  # firmware met on HLS3955 and HLS3915
 )
-
 _MOTORS: Final = {
     "sts3250": Drive(60 / 0.133, 0.15, 3.25),  # data sheet A/0: 60° in 0.133 s at 12 V
     "scs15": Drive(330.0, 0.1, 1.5),  # data sheet: 55 rpm at 6 V, 1.5 A at stall
@@ -198,7 +129,7 @@ def _all() -> Mapping[str, Sequence[Model]]:
     for number, known in NUMBERS.items():
         name, angle = known.name.lower(), radians(known.arc) / known.resolution
         for table in known.maps:
-            one = replace(kinds[table], name=name, number=number, angle=angle)
+            one = Model(name=name, number=number, angle=angle, **kinds[table]._asdict())
             if name in _MOTORS:
                 motor = _MOTORS[name]
                 one = replace(one, drive=replace(motor, top_speed=radians(motor.top_speed) / angle))
@@ -243,6 +174,17 @@ def models(names: str, firmwares: str, count: int) -> list[Model]:
     pairs = zip(_spread("model", names, count), _spread("firmware", firmwares, count), strict=True)
     known: dict[tuple[str, str], Model] = {}
     return [known.setdefault(pair, model(*pair)) for pair in pairs]
+
+
+def with_rate(models: Sequence[Model], rate: int) -> list[Model]:
+    """The models with this stored rate (bit/s). Raises RequestError where the map has no code for it."""
+    code = next(code for code, known in BAUD_CODES.items() if known == rate)
+    made: dict[int, Model] = {}
+    for one in models:
+        if code not in BAUD_CODES_OF[one.table.name]:
+            raise RequestError(f"a {one.name} has no rate of {rate} bit/s", expected="a rate of its map")
+        made.setdefault(id(one), replace(one, stored={"baud_rate": code}))
+    return [made[id(one)] for one in models]
 
 
 def _spread(what: str, joined: str, count: int) -> list[str]:

@@ -17,33 +17,30 @@ FEEBLE: Final = 0.01
 """A share of the stall torque below this does not overcome the friction of the gear. # assumption"""
 FULL_ACCELERATION: Final = 25_400.0
 """Counts/s² where the register is 0 or missing: what its greatest value gives. # assumption"""
+TO_A_PLACE: Final = (Mode.POSITION, Mode.STEP)
 
 
 class Order(NamedTuple):
-    """What is asked of a motor.
+    """What registers and world ask of a motor.
 
     `mode`          None: unknown, it rests # assumption
+    `goal`          a place; in velocity mode counts/s; in PWM and current mode a share, signed
+    `speed`         counts/s of the way to a place; 0: standstill, inf: as fast as possible
+    `time`          s of the way to a place if `speed` is 0; 0: not used
+    `acceleration`  counts/s²
     `torque`        share of the stall torque that it may use, 0 to 1
     `load`          share that the outside takes; positive pushes to smaller counts
-    `blocked`       range that the shaft cannot leave; None: free
-    `place`         goal of the modes position and step
-    `speed`         counts/s of the way there; 0: standstill, inf: as fast as possible
-    `time`          s of the way there if `speed` is 0; 0: not used
-    `velocity`      counts/s of velocity mode, signed
-    `share`         duty of PWM mode or current of current mode, as a share, signed
-    `acceleration`  counts/s²
+    `blocked`       range of places that the shaft cannot leave; None: it is free
     """
 
     mode: Mode | None
+    goal: float
+    speed: float
+    time: float
+    acceleration: float
     torque: float
     load: float
     blocked: tuple[float, float] | None
-    place: float
-    speed: float
-    time: float
-    velocity: float
-    share: float
-    acceleration: float
 
 
 class Course(NamedTuple):
@@ -57,14 +54,6 @@ class Course(NamedTuple):
         """Share of the stall torque that the motor gives."""
         return self.load if self.push is None or self.motion.moving(at) else self.push
 
-    def duty(self, at: float, drive: Drive) -> float:
-        """Share of the supply; the register calls it load."""
-        return drive.duty(self.motion.velocity(at), self.torque(at))
-
-    def current(self, at: float, drive: Drive) -> float:
-        """Supply current, A."""
-        return drive.current(self.motion.velocity(at), self.torque(at))
-
 
 def limp(motion: Motion, at: float) -> Course:
     """At rest: the friction of the gear holds it, whatever the load. # assumption"""
@@ -76,45 +65,36 @@ def follow(order: Order, motion: Motion, at: float, drive: Drive) -> Course:
     if order.torque < FEEBLE or order.mode is None:
         return limp(motion, at)
     load = max(-order.torque, min(order.torque, order.load))
-    way = _way(order, motion, at)
-    strength = order.torque
-    if order.mode in (Mode.PWM, Mode.CURRENT):
-        strength = min(strength, abs(order.share))
+    strength, goal = order.torque, order.goal
+    if order.mode in TO_A_PLACE:
+        goal -= motion.position(at)
+    elif order.mode is not Mode.VELOCITY:
+        strength = min(strength, abs(goal))
+    way = copysign(1.0, goal) if goal else 0.0
     spare = strength - load * way
     if way and spare < FEEBLE:
         return Course(rest(at, motion.position(at)), load, way * strength)
     planned = _plan(order, motion, at, drive, way, spare)
-    if order.blocked is not None:
-        stopped, side = _stopped(planned, *order.blocked)
-        if side:
-            return Course(stopped, load, side * strength)
-    return Course(planned, load)
-
-
-def _way(order: Order, motion: Motion, at: float) -> float:
-    """The direction in which it has to work: 1, -1, or 0 to hold or brake."""
-    goal = order.share
-    if order.mode is Mode.VELOCITY:
-        goal = order.velocity
-    elif order.mode in (Mode.POSITION, Mode.STEP):
-        goal = order.place - motion.position(at)
-    return copysign(1.0, goal) if goal else 0.0
+    if order.blocked is None:
+        return Course(planned, load)
+    stopped, side = _stopped(planned, *order.blocked)
+    return Course(stopped, load, side * strength if side else None)
 
 
 def _plan(order: Order, motion: Motion, at: float, drive: Drive, way: float, spare: float) -> Motion:
-    """The movement without obstacles; `spare` is the share of the torque that the load leaves."""
+    """The movement without obstacles; `spare` is the share of the torque that the load leaves for the way."""
     position, velocity, _ = motion.state(at)
     fastest, acceleration = min(1.0, spare) * drive.top_speed, order.acceleration
-    if order.mode in (Mode.POSITION, Mode.STEP):
+    if order.mode in TO_A_PLACE:
         speed = min(order.speed, fastest)
         if not speed and order.time:
-            speed = min(fastest, _speed_for(abs(order.place - position), order.time, acceleration))
-        return move(at, position, order.place, velocity=velocity, speed=speed, acceleration=acceleration)
-    speed = min(abs(order.velocity), fastest)
+            speed = min(fastest, _speed_for(abs(order.goal - position), order.time, acceleration))
+        return move(at, position, order.goal, velocity=velocity, speed=speed, acceleration=acceleration)
+    speed = min(abs(order.goal), fastest)
     if order.mode is Mode.PWM:  # a torque limit does not limit the duty # assumption
-        speed, acceleration = drive.top_speed * (abs(order.share) - order.load * way), FULL_ACCELERATION
+        speed, acceleration = drive.top_speed * (abs(order.goal) - order.load * way), FULL_ACCELERATION
     elif order.mode is Mode.CURRENT:
-        speed, acceleration = drive.top_speed, FULL_ACCELERATION * (spare if way else 1.0)
+        speed, acceleration = drive.top_speed, FULL_ACCELERATION * (spare or 1.0)
     goal = way * min(speed, drive.top_speed)
     return run(at, position, goal, velocity=velocity, acceleration=acceleration)
 
@@ -134,12 +114,10 @@ def _stopped(motion: Motion, low: float, high: float) -> tuple[Motion, float]:
         return motion, 0.0
     phases: list[Phase] = []
     for phase in (*motion.phases, Phase(inf, motion.goal, motion.cruise, 0.0)):
-        time, side, bound = min(
-            (_time_to(low, phase, -1.0), -1.0, low), (_time_to(high, phase, 1.0), 1.0, high)
-        )
+        time, side = min((_time_to(low, phase, -1.0), -1.0), (_time_to(high, phase, 1.0), 1.0))
         if time < phase.duration:
-            end = phase.position if not time else bound
-            phases += [phase._replace(duration=time)] if time else []
+            phases.append(phase._replace(duration=time))
+            end = phase.position if not time else low if side < 0 else high
             return Motion(motion.start, tuple(phases), end), side
         phases.append(phase)
     return motion, 0.0

@@ -1,34 +1,29 @@
 """What makes a servo report alarms and let go: overload, supply, temperature.
 
 Overload: more than register 36 (SCS: 39) for the time of register 35 (SCS: 38), then the torque falls to register 34
-(SCS: 37). HLS servos have no such registers and let go at more than the protection current; on other maps that is left
-out. An alarm that the unload mask (19) does not name changes nothing else. Source: STS3215 memory table V3.6, SCS and
-HLS memory tables.
+(SCS: 37). HLS servos have no such registers. Over-current is left out. An alarm that the unload mask (19) does not name
+changes nothing else. Source: STS3215 memory table V3.6, SCS memory table 1902.
 """
 
 from __future__ import annotations
 
 from math import inf
 
-from motorbus.core.plant import Drive
 from motorbus.families.feetech_new.simulator.memory import Memory
 from motorbus.families.feetech_new.simulator.motor import Course
 
-VOLTAGE, HEAT, CURRENT, OVERLOAD = 0x01, 0x04, 0x08, 0x20  # alarm bits
+VOLTAGE, HEAT, OVERLOAD = 0x01, 0x04, 0x20  # alarm bits
+LATCHED = OVERLOAD | 0x08  # with over-current: alarms that last when their cause has gone
 
 
 class Overload:
-    """The overload protection of one servo; shares are of the stall torque.
+    """The overload protection of one servo.
 
-    `bit` is its alarm; `tripped` lasts until `clear`; `next` is the moment (s) of the next trip, inf without one.
+    `tripped` lasts until `clear`; `next` is the moment (s) of the next trip, inf without one.
     """
 
-    def __init__(self, memory: Memory, drive: Drive) -> None:
+    def __init__(self, memory: Memory) -> None:
         self._memory = memory
-        self._table = memory.layout.table
-        self._by_torque = "overload_torque" in self._table
-        self._stall_current = drive.stall_current
-        self.bit = OVERLOAD if self._by_torque else CURRENT
         self.clear()
 
     def clear(self) -> None:
@@ -39,18 +34,12 @@ class Overload:
 
     @property
     def torque(self) -> float:
-        """The share that it leaves."""
-        if not self.tripped:
-            return 1.0
-        return self._value("protective_torque") if self._by_torque else 0.0
+        """Share of the stall torque that it leaves."""
+        return self._value("protective_torque") if self.tripped else 1.0
 
     def watch(self, course: Course, at: float) -> None:
         """Take the course that the motor follows from this moment (s) on."""
-        if self._by_torque:
-            limit, patience = self._value("overload_torque"), self._value("overload_time")
-        else:
-            limit = self._value("protection_current") / self._stall_current
-            patience = self._value("overcurrent_time")
+        limit, patience = self._value("overload_torque"), self._value("overload_time")
         begin, until = inf, inf
         if limit and patience:  # 0 protects from nothing # assumption
             lasts = abs(course.torque(inf)) > limit
@@ -66,4 +55,6 @@ class Overload:
         self.next = max(at, trip) if trip <= until and not self.tripped else inf
 
     def _value(self, name: str) -> float:
-        return self._memory[name] * self._table[name].scale
+        """The value of a row in its unit; 0 where the map has no such row."""
+        table = self._memory.layout.table
+        return self._memory[name] * table[name].scale if name in table else 0.0

@@ -16,6 +16,9 @@ class Quirks:
     """Behaviour of the simulated servos. Times are in s."""
 
     # fmt: off
+    position: int = switch(-1,
+        "their first position, raw counts; -1: the middle",
+        source="an assumption", span=(-1, 4095))
     firmware: str = switch("",
         "their firmware, as 3.9, or one for each id joined by +; left out: one that has their map; it selects"
         " the map of a model that has several",

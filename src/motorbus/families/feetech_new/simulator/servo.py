@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import inf, tau
-from typing import Final
+from typing import Final, Generic, TypeVar
 
 from motorbus.core import units
 from motorbus.core.plant import Motion, move, rest
@@ -18,16 +18,18 @@ from motorbus.families.feetech_new.simulator.models import Model
 from motorbus.families.feetech_new.simulator.motor import (
     FEEBLE,
     FULL_ACCELERATION,
+    TO_A_PLACE,
     Course,
     Order,
     follow,
     limp,
 )
-from motorbus.families.feetech_new.simulator.protection import HEAT, VOLTAGE, Overload
+from motorbus.families.feetech_new.simulator.protection import HEAT, LATCHED, OVERLOAD, VOLTAGE, Overload
 from motorbus.families.feetech_new.simulator.quirks import Quirks
 from motorbus.families.feetech_new.traits import Mode
 
 AMBIENT: Final = 30.0  # °C # assumption
+LEAST_SMS_DELAY: Final = 50  # FEETECH page on SMS servos: smaller values of register 7 act as 50
 HAND_SPEED: Final = 1.0  # rad/s of a limp shaft that is pushed # assumption
 LONGEST_PUSH: Final = 10 * tau
 ACCELERATION_UNIT: Final = 100.0  # counts/s² (memory table V3.6; servolab measured 104 to 105)
@@ -41,6 +43,26 @@ LOADED: Final = {
     "live_i": "position_i",
 }
 """RAM row -> EEPROM row from which it is loaded at power-up."""
+REVERSES: Final = {"sts": 0x80, "smbl": 0x80, "hls": 0x80, "scs": 0x01, "scs2": 0x01}
+"""Map -> bit of `phase` that reverses position feedback, and the drive with it # assumption"""
+_COUNTING: Final = {"operating_mode", "homing_offset", "phase", "angular_resolution"}
+_LIMITS: Final = {"min_position_limit", "max_position_limit"}
+T = TypeVar("T")
+
+
+class Influence(Generic[T]):
+    """An attribute that a test may set at any time; the servo then starts a new course."""
+
+    def __set_name__(self, owner: type[object], name: str) -> None:
+        self._name = f"_{name}"
+
+    def __get__(self, servo: Servo, owner: type[object]) -> T:
+        value: T = getattr(servo, self._name)
+        return value
+
+    def __set__(self, servo: Servo, value: T) -> None:
+        setattr(servo, self._name, value)
+        servo.move()
 
 
 class Servo(PoweredDevice):
@@ -49,7 +71,11 @@ class Servo(PoweredDevice):
     `memory`      its registers; `memory["goal_position"]` is a raw value
     `motion`      of its shaft, in counts of the encoder without end
     `zero`        the place of the encoder that reads 0
-    `alarm`       alarm bits that a test sets; voltage, temperature and overload add theirs
+    `voltage`     supply, V; outside min_voltage to max_voltage it is an alarm
+    `temperature` in °C; above max_temperature it is an alarm
+    `alarm`       more alarm bits, until a restart
+    `load`        share of the stall torque that the outside takes; positive pushes to smaller positions
+    `blocked`     places that the shaft cannot leave; None: it is free
     `pending`     address and data of a REG WRITE
     `lacks`       codes of instructions that it does not know
     `jitter`      bits by which its replies may be late
@@ -57,29 +83,27 @@ class Servo(PoweredDevice):
     `deaf_until`  moment (s) before which it receives nothing
     """
 
-    def __init__(
-        self,
-        id: int,
-        model: Model,
-        quirks: Quirks,
-        now: Callable[[], float],
-        changed: Callable[[], None],
-        position: int | None = None,
-    ) -> None:
-        """`changed` is called when its id or second id may have changed."""
+    voltage = Influence[float]()
+    temperature = Influence[float]()
+    alarm = Influence[int]()
+    load = Influence[float]()
+    blocked = Influence[tuple[float, float] | None]()
+
+    def __init__(self, id: int, model: Model, quirks: Quirks, now: Callable[[], float]) -> None:
         self.model = model
         self.quirks = quirks
         self.memory = Memory(model.layout, now, quirks.store_time, quirks.torn)
-        self.overload = Overload(self.memory, model.drive)
+        self.overload = Overload(self.memory)
         self.pending: tuple[int, bytes] | None = None
         self.lacks: set[int] = set()
         self.lives = self.jitter = self.zero = self._alarm = 0
-        self._load, self._blocked = 0.0, (-inf, inf)
         self._voltage, self._temperature = model.voltage, AMBIENT
+        self._load, self._blocked = 0.0, None
         self._now = now
-        self._changed = changed
+        self._traits = model.traits
         self._reversed = False
-        self.course = Course(rest(now(), model.traits.turn // 2 if position is None else position))
+        position = model.traits.turn // 2 if quirks.position < 0 else quirks.position
+        self.course = Course(rest(now(), position))
         # As shipped the second id is the first: it then changes nothing. # assumption
         for name, raw in {"id": id, "second_id": id, **model.stored}.items():
             if name in model.table:
@@ -93,7 +117,7 @@ class Servo(PoweredDevice):
     def status(self) -> dict[str, object]:
         """Its state as plain data; positions in raw counts."""
         return {
-            "id": self.memory["id"],
+            "id": self.id,
             "model": self.model.name,
             "plugged": self.plugged,
             "baud_rate": self.baud_rate,
@@ -112,35 +136,6 @@ class Servo(PoweredDevice):
         return self.memory.midway()
 
     @property
-    def alarm(self) -> int:
-        return self._alarm
-
-    @alarm.setter
-    def alarm(self, bits: int) -> None:
-        self._alarm = bits
-        self.move()
-
-    @property
-    def voltage(self) -> float:
-        """Supply, V; outside min_voltage to max_voltage it is an alarm."""
-        return self._voltage
-
-    @voltage.setter
-    def voltage(self, volts: float) -> None:
-        self._voltage = volts
-        self.move()
-
-    @property
-    def temperature(self) -> float:
-        """In °C; above max_temperature it is an alarm."""
-        return self._temperature
-
-    @temperature.setter
-    def temperature(self, degrees: float) -> None:
-        self._temperature = degrees
-        self.move()
-
-    @property
     def raw_position(self) -> int:
         """Present position in raw counts; setting it turns the shaft by hand."""
         return self.position(self._now())
@@ -152,16 +147,15 @@ class Servo(PoweredDevice):
 
     def block_shaft(self, between: tuple[float, float] | None = None) -> None:
         """Block the shaft here, or between two positions (rad). Raises RequestError when it is outside of them."""
-        now = self._now()
-        here, present = round(self.motion.position(now)), self.raw_position * self.model.angle
+        here = round(self.motion.position(self._now()))
+        present = self.raw_position * self.model.angle
         low, high = sorted(here + self._counts(angle - present) for angle in between or (present, present))
         if not low <= here <= high:
             raise RequestError(
                 f"the shaft is at {units.show(present, 'position')}",
                 expected="a range that contains this position",
             )
-        self._blocked = low, high
-        self.move()
+        self.blocked = low, high
 
     def push_shaft(self, angle: float) -> None:
         """Turn the shaft by hand by an angle (rad): a limp one at 1 rad/s, one with torque at once; it returns."""
@@ -169,7 +163,9 @@ class Servo(PoweredDevice):
             raise RequestError(f"{units.show(angle, 'position')} is too far", expected="at most 10 turns")
         now = self._now()
         here = self.motion.position(now)
-        goal = min(max(here + self._counts(angle), self._blocked[0]), self._blocked[1])
+        goal = here + self._counts(angle)
+        if self.blocked is not None:
+            goal = min(max(goal, self.blocked[0]), self.blocked[1])
         if self.available >= FEEBLE:
             self.course = Course(rest(now, goal))
             self.move()
@@ -181,13 +177,11 @@ class Servo(PoweredDevice):
         """Load the shaft with this share of the stall torque, -1 to 1; positive pushes to smaller positions."""
         if not -1.0 <= share <= 1.0:
             raise RequestError(f"{share:.0%} is not possible", expected="-100% to 100%")
-        self._load = share
-        self.move()
+        self.load = share
 
     def release_shaft(self) -> None:
         """End block and load."""
-        self._load, self._blocked = 0.0, (-inf, inf)
-        self.move()
+        self.load, self.blocked = 0.0, None
 
     # -- supply --------------------------------------------------------------------------------------------------
 
@@ -218,7 +212,6 @@ class Servo(PoweredDevice):
                 memory[row] = memory[source]
         memory["lock"] = quirks.lock_at_power_up
         memory["torque_enable"] = quirks.torque_at_power_up
-        self._changed()
         self.forget_turns()
         if quirks.goal_at_power_up == "present" or quirks.torque_at_power_up:
             memory["goal_position"] = self.position(now)
@@ -230,10 +223,10 @@ class Servo(PoweredDevice):
     def id(self) -> int:
         return self.memory["id"]
 
-    @property
-    def second_id(self) -> int | None:
-        """Another id whose writes it obeys; None where the map has no such row."""
-        return self.memory["second_id"] if "second_id" in self.model.table else None
+    def obeys(self, id: int) -> bool:
+        """Whether it carries out writes to this id: its own and that of HLS's row second_id (HLS memory table)."""
+        names = [name for name in ("id", "second_id") if name in self.model.table]
+        return any(self.memory[name] == id for name in names)
 
     @property
     def baud_rate(self) -> int | None:
@@ -243,8 +236,9 @@ class Servo(PoweredDevice):
     @property
     def reply_delay(self) -> float:
         """Seconds from request to reply: register 7 in 2 µs (memory table V3.6; HLS has no such row)."""
-        own = self.memory["return_delay"] * 2e-6 if "return_delay" in self.model.table else 0.0
-        return max(own, self.model.reply_delay)
+        steps = self.memory["return_delay"] if "return_delay" in self.model.table else 0
+        least = LEAST_SMS_DELAY if self.model.table.name in ("smbl", "smcl") else 0
+        return max(steps, least) * 2e-6
 
     @property
     def locked(self) -> bool:
@@ -254,8 +248,8 @@ class Servo(PoweredDevice):
     @property
     def mode(self) -> Mode | None:
         """None for a code that no source explains."""
-        code = self.memory["operating_mode"] if self.model.traits.modes else None
-        return self.model.traits.mode_of(code, self._limits)
+        code = self.memory["operating_mode"] if self._traits.modes else None
+        return self._traits.mode_of(code, self._limits)
 
     @property
     def _limits(self) -> tuple[int, int]:
@@ -264,13 +258,15 @@ class Servo(PoweredDevice):
     @property
     def _resolution(self) -> int:
         """Encoder counts for one count of a position (memory table V3.6); in single-turn mode too. # assumption"""
-        return self.memory["angular_resolution"] or 1 if "angular_resolution" in self.model.table else 1
+        if "angular_resolution" not in self.model.table:
+            return 1
+        return self.memory["angular_resolution"] or 1
 
     @property
     def error(self) -> int:
         """The error byte of its status packets: alarms only."""
         memory = self.memory
-        bits = self._alarm | (self.overload.bit if self.overload.tripped else 0)
+        bits = self._alarm | (OVERLOAD if self.overload.tripped else 0)
         if not memory["min_voltage"] <= round(self._voltage * 10) <= memory["max_voltage"]:
             bits |= VOLTAGE
         return bits | (HEAT if self._temperature > memory["max_temperature"] else 0)
@@ -281,22 +277,22 @@ class Servo(PoweredDevice):
 
         An HLS with goal_torque 0 is limp in position and velocity mode (seen on hardware).
         """
-        memory, traits = self.memory, self.model.traits
+        memory, traits = self.memory, self._traits
         if not self.plugged or memory["torque_enable"] != 1:
             return 0.0
         share = memory[traits.limit or "max_torque"] / 1000
         if traits.current and self.mode in (Mode.POSITION, Mode.VELOCITY):
             share = min(share, abs(self._current))
-        releasing, bit = self.error & memory["unload_mask"], self.overload.bit
-        if releasing & bit and not self._alarm & bit:
+        releasing = self.error & memory["unload_mask"]
+        if releasing & OVERLOAD and not self._alarm & OVERLOAD:
             share = min(share, self.overload.torque)
-            releasing &= ~bit
+            releasing &= ~OVERLOAD
         return 0.0 if releasing else min(share, 1.0)
 
     @property
     def _current(self) -> float:
         """Goal or limit of the current, a share of that at stall."""
-        return self.memory[self.model.traits.current] * AMPERE / self.model.drive.stall_current
+        return self.memory[self._traits.current] * AMPERE / self.model.drive.stall_current
 
     def hears(self, rate: int | None, at: float) -> bool:
         """Whether it receives a packet of this rate (None: any)."""
@@ -316,73 +312,66 @@ class Servo(PoweredDevice):
     def position(self, at: float) -> int:
         """The present position in counts, as its register has it: within one turn unless phase bit 4 is set."""
         counts = round((round(self.motion.position(at)) - self.zero) / self._resolution)
-        traits = self.model.traits
-        return counts if traits.tells_turns(self.memory["phase"]) else counts % traits.turn
+        return counts if self._traits.tells_turns(self.memory["phase"]) else counts % self._traits.turn
 
-    def move(self) -> None:
-        """Start the course that registers and world ask for now."""
+    def move(self, *, step: bool = False) -> None:
+        """Start the course that registers and world ask for now; `step`: the one that a step orders."""
         now = self._now()
-        place = self._goal(now) if self.mode is Mode.POSITION else self._last(now)
-        self._start(follow(self._order(place), self.motion, now, self.model.drive))
-
-    def step(self) -> None:
-        """Step mode: go on by goal_position from the last goal. # assumption"""
-        now = self._now()
-        place = round(self._last(now)) + self.memory["goal_position"] * self._resolution
-        self._start(follow(self._order(place), self.motion, now, self.model.drive))
+        self._start(follow(self._order(now, step), self.motion, now, self.model.drive))
 
     def _start(self, course: Course) -> None:
         self.course = course
         self.overload.watch(course, self._now())
 
-    def _last(self, now: float) -> float:
-        """The goal of the present movement; where it is if it has none."""
-        motion = self.motion
-        return motion.goal if motion.moving(now) and not motion.cruise else motion.position(now)
-
-    def _goal(self, now: float) -> float:
-        """The place of goal_position, clamped to the limits # assumption
-
-        Within one turn the way does not cross the seam (STS_servos#7).
-        """
-        traits, goal, limits = self.model.traits, self.memory["goal_position"], self._limits
-        if limits == (0, 0):
-            if not traits.many_turns:
-                return self.zero + goal * self._resolution
-            farthest = int(FARTHEST * traits.turn) - 1
-            return self.zero + min(max(goal, -farthest), farthest) * self._resolution
-        goal = min(max(goal, limits[0]), limits[1])
-        return round(self.motion.position(now)) + (goal - self.position(now)) * self._resolution
-
-    def _order(self, place: float) -> Order:
-        memory, traits, table, mode = self.memory, self.model.traits, self.model.table, self.mode
-        phase, acceleration, share, time = memory["phase"], FULL_ACCELERATION, 0.0, 0.0
-        unit = traits.velocity_scale(phase) * round(
-            table["goal_velocity"].scale / table["goal_position"].scale
-        )
-        velocity = memory["goal_velocity"] * unit
-        if traits.acceleration:
-            acceleration = memory[traits.acceleration] * ACCELERATION_UNIT or FULL_ACCELERATION
-        if self.model.heeds_time:
-            time = memory[traits.time] / 1000
-        if mode is Mode.CURRENT:
-            share = self._current
-        elif mode is Mode.PWM and traits.duty:
-            row = traits.duty_row(table)
-            duty = row.decode(memory.read(row.address, row.size)) / 1000
-            share = max(-1.0, min(1.0, -duty if self.model.smaller else duty))
+    def _order(self, now: float, step: bool) -> Order:
+        memory, traits, table = self.memory, self._traits, self.model.table
+        mode, phase = self.mode, memory["phase"]
+        unit = table["goal_velocity"].scale / table["goal_position"].scale
+        velocity = memory["goal_velocity"] * round(unit) * traits.velocity_scale(phase)
+        acceleration = memory[traits.acceleration] * ACCELERATION_UNIT if traits.acceleration else 0.0
+        goal = 0.0
+        match mode:
+            case Mode.POSITION:
+                goal = self._place(now)
+            case Mode.STEP:  # counted from the last goal # assumption
+                goal = self._last_goal(now)
+                if step:
+                    goal = round(goal) + memory["goal_position"] * self._resolution
+            case Mode.VELOCITY:
+                goal = velocity
+            case Mode.CURRENT:
+                goal = self._current
+            case Mode.PWM if traits.duty:  # HLS: the row is not published, so nothing moves
+                goal = max(-1.0, min(1.0, memory.decode(traits.duty_row(table)) / 1000))
+                goal *= -1 if table.name == "sts" else 1  # servolab, measured on STS3215
         return Order(
             mode=mode,
+            goal=goal,
+            speed=abs(velocity) or (inf if traits.zero_is_maximum(phase) else 0.0),
+            # Of maps with modes no firmware is known to heed it (memory tables of SCS and STS3215).
+            time=0.0 if traits.modes else memory[traits.time] / 1000,
+            acceleration=acceleration or FULL_ACCELERATION,
             torque=self.available,
             load=self._load,
             blocked=self._blocked,
-            place=place,
-            speed=abs(velocity) or (inf if traits.zero_is_maximum(phase) else 0.0),
-            time=time,
-            velocity=velocity,
-            share=share,
-            acceleration=acceleration,
         )
+
+    def _place(self, now: float) -> float:
+        """The place of goal_position, clamped to the limits. # assumption
+
+        Within one turn the way does not cross the seam (STS_servos#7).
+        """
+        goal, (low, high) = self.memory["goal_position"], self._limits
+        if low == high == 0 and self._traits.many_turns:
+            farthest = int(FARTHEST * self._traits.turn) - 1
+            return self.zero + max(-farthest, min(goal, farthest)) * self._resolution
+        goal = max(low, min(goal, high))
+        return round(self.motion.position(now)) + (goal - self.position(now)) * self._resolution
+
+    def _last_goal(self, now: float) -> float:
+        """The goal of the present movement; where it is if it has none."""
+        motion = self.motion
+        return motion.goal if motion.moving(now) and not motion.cruise else motion.position(now)
 
     def _counts(self, angle: float) -> float:
         """An angle (rad) in counts of the encoder."""
@@ -391,14 +380,14 @@ class Servo(PoweredDevice):
     def forget_turns(self) -> None:
         """Stand still, within the first turn."""
         now = self._now()
-        self.course = Course(rest(now, self.motion.position(now) % self.model.traits.turn))
+        self.course = Course(rest(now, self.motion.position(now) % self._traits.turn))
         self.count_anew()
 
     def count_anew(self) -> None:
         """Put zero where the homing offset says, in position mode only (feetech-cli, servolab, on STS3215)."""
-        now, memory, turn = self._now(), self.memory, self.model.traits.turn
-        bit = self.model.reversed_by
-        if self._reversed != (bit is not None and bool(memory["phase"] >> bit & 1)):
+        now, memory, turn = self._now(), self.memory, self._traits.turn
+        reverses = REVERSES.get(self.model.table.name, 0)
+        if self._reversed is not bool(memory["phase"] & reverses):
             self._reversed = not self._reversed
             self.course = Course(rest(now, -self.motion.position(now)))
         applies = "homing_offset" in self.model.table and self.mode is Mode.POSITION
@@ -411,50 +400,43 @@ class Servo(PoweredDevice):
     def read(self, address: int, count: int) -> bytes:
         """The bytes of a READ."""
         for row in self.memory.layout.touched(address, count):
-            feedback = FEEDBACK.get(row.name)
-            if feedback:
-                self.memory[row.name] = feedback(self, self._now())
+            if row.name in FEEDBACK:
+                self.memory[row.name] = FEEDBACK[row.name](self, self._now())
         return self.memory.read(address, count)
 
     def write(self, address: int, data: bytes) -> None:
         """Obey a WRITE."""
-        memory, traits = self.memory, self.model.traits
+        memory, traits, quirks = self.memory, self._traits, self.quirks
         torque = memory["torque_enable"]
-        strict = self.quirks.out_of_range == "drop"
+        strict = quirks.out_of_range == "drop"
         names = memory.write(address, data, locked=self.locked, strict=strict)
-        if names & {"id", "second_id"}:
-            self._changed()
-        if "torque_enable" in names and memory["torque_enable"] == MIDDLE and self.model.switch_128:
-            memory["torque_enable"] = torque  # a command and no state # assumption
+        switched = "torque_enable" in names
+        if switched and memory["torque_enable"] == MIDDLE and traits.modes and traits.calibrates == "offset":
+            memory["torque_enable"] = torque  # 128 is a command and no state # assumption
             self.calibrate(traits.turn // 2)
             return
-        released = "torque_enable" in names and not memory["torque_enable"]
-        if released and self.quirks.overload_clears == "torque_off":
+        if switched and not memory["torque_enable"] and quirks.overload_clears == "torque_off":
             self.overload.clear()
-        decisive = {"operating_mode", "homing_offset", "phase", "angular_resolution"}
-        if not traits.modes:
-            decisive |= {"min_position_limit", "max_position_limit"}
-        if names & decisive:
+            self._alarm &= ~LATCHED
+        if names & _COUNTING or (not traits.modes and names & _LIMITS):
             self.count_anew()
-        mode = self.mode
-        if "goal_position" in names and traits.goal_switches_on and mode in (Mode.POSITION, Mode.STEP):
+        ordered = "goal_position" in names
+        if ordered and traits.goal_switches_on and self.mode in TO_A_PLACE:
             memory["torque_enable"] = 1
-        if "goal_position" in names and mode is Mode.STEP:
-            self.step()
-        elif names - {"lock"}:
-            self.move()
+        if names - {"lock"}:
+            self.move(step=ordered)
 
     def calibrate(self, counts: int) -> None:
         """Give the present pose this position by the homing offset, cut to what the register can express; then hold.
 
         At one pose an STS is one count beside (lerobot#3370). It is stored only with the lock open. # assumption
         """
-        memory, turn, row = self.memory, self.model.traits.turn, self.model.table["homing_offset"]
+        memory, turn, row = self.memory, self._traits.turn, self.model.table["homing_offset"]
         difference = round(self.motion.position(self._now())) - counts * self._resolution
         offset = round(((difference + turn // 2) % turn - turn // 2) / self._resolution)
         memory["homing_offset"] = max(row.low, min(row.high, offset))
         if not self.locked:
-            memory.store(range(row.address, row.address + row.size))
+            memory.store_row("homing_offset")
         self.count_anew()
         self._hold()
 
@@ -476,10 +458,15 @@ def _velocity(servo: Servo, at: float) -> int:
     )
 
 
+def _load(servo: Servo, at: float) -> int:
+    """The duty of the motor, in 0.1 %."""
+    return round(1000 * servo.model.drive.duty(servo.motion.velocity(at), servo.course.torque(at)))
+
+
 def _current(servo: Servo, at: float) -> int:
     if not servo.model.traits.tells_current(servo.memory["phase"]):
         return 0
-    return round(servo.course.current(at, servo.model.drive) / AMPERE)
+    return round(servo.model.drive.current(servo.motion.velocity(at), servo.course.torque(at)) / AMPERE)
 
 
 def _moving(servo: Servo, at: float) -> int:
@@ -494,7 +481,7 @@ def _moving(servo: Servo, at: float) -> int:
 FEEDBACK: Final[dict[str, Callable[[Servo, float], int]]] = {
     "present_position": Servo.position,
     "present_velocity": _velocity,
-    "present_load": lambda servo, at: round(1000 * servo.course.duty(at, servo.model.drive)),
+    "present_load": _load,
     "present_voltage": lambda servo, at: round(servo.voltage * 10),
     "present_temperature": lambda servo, at: round(servo.temperature),
     "reg_write_pending": lambda servo, at: int(servo.pending is not None),
