@@ -9,10 +9,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple, TypeAlias
 
 from motorbus.core.access import readable_rows, writable_values
-from motorbus.core.register import Register, RegisterMap, Storage, Value, changed
+from motorbus.core.register import Register, RegisterMap, Storage, Value, changed, is_number, shown
 from motorbus.core.request import Effect, Request, Stops
 from motorbus.core.setpoint import Deferred
-from motorbus.errors import MotorbusError, OutcomeUnknown
+from motorbus.errors import MotorbusError, OutcomeUnknown, RequestError
 from motorbus.families.feetech_new import protocol
 from motorbus.families.feetech_new.driver import eeprom, goals
 from motorbus.families.feetech_new.driver.identity import check_map, known, writable
@@ -93,9 +93,9 @@ async def write(node: Node, /, *, force: bool = False, **values: Value) -> None:
     goal means something else afterwards (`TorqueAfterWrite`). `force` writes equal values too. Raises RequestError for
     what cannot be written by name, LimitExceeded for a goal outside the limits.
     """
-    check_names(values)
+    check_values(values)
     table = await writable(node)
-    raws = check_values(node, table, values)
+    raws = raw_values(node, table, values)
     stored = [one for one in raws if one[0].storage is Storage.EEPROM]
     limp = [one for one in raws if _needs_limp(one[0])]
     live = [one for one in raws if one not in stored and one not in limp]
@@ -131,7 +131,20 @@ def check_names(names: Iterable[str]) -> None:
             tables[0][name]  # raises, with suggestions
 
 
-def check_values(node: Node, table: RegisterMap, values: Mapping[str, Value]) -> Raws:
+def check_values(values: Mapping[str, Value]) -> None:
+    """Raise RequestError for an unknown name, no number, and a row that no map lets a user write."""
+    check_names(values)
+    for name, value in values.items():
+        rows = [table[name] for table in BY_NAME.values() if name in table]
+        if not rows or not is_number(value):
+            raise RequestError(f"{name}: {shown(value)} is not a finite number")
+        if all(row.protected or not row.writable for row in rows):
+            row = rows[0]
+            refusal = f"use {METHODS[name]}" if row.writable and name in METHODS else "it can only be read"
+            raise RequestError(f"{name} is not written by name: {refusal}")
+
+
+def raw_values(node: Node, table: RegisterMap, values: Mapping[str, Value]) -> Raws:
     """These rows with their raw values. Raises RequestError for what cannot be written by name."""
 
     def to_raw(row: Register, value: Value) -> int:
@@ -230,7 +243,7 @@ def ram_block(node: Node, values: Mapping[str, Value], what: str) -> Block:
     """These values as one block of RAM registers. Raises RequestError if they are none, or unknown map."""
     check_map(node)
     assert node.table is not None
-    raws = check_values(node, node.table, values)
+    raws = raw_values(node, node.table, values)
     found = list(blocks_of(node, raws))
     if len(found) == 1 and all(row.storage is Storage.RAM and not _needs_limp(row) for row, _ in raws):
         return found[0]
@@ -246,7 +259,7 @@ async def reg_write(node: Node, /, **values: Value) -> None:
 
     Never sent twice: raises OutcomeUnknown if it was not acknowledged.
     """
-    check_names(values)
+    check_values(values)
     await writable(node)
     await hand_over(node, ram_block(node, values, "REG WRITE"))
 

@@ -9,6 +9,7 @@ and where a servo with a torn cell starts (id 1, or a rate as shipped), unless a
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 from motorbus.core.family import Found, IdChanged
@@ -144,7 +145,7 @@ async def change_address(node: Node, verb: str, new: Address) -> Found:
     await Emit(JournalEntry(verb, ASKED, {}))
     table = await writable(node)
     assert node.identity is not None
-    found = Found(new.id, new.rate, node.identity)
+    found = Found(new.id, new.rate, replace(node.identity, node=new.id))
     old = Address(node.node, await SetBitrate(0))
     if old == new:
         await Exclusive(close_lock(node, table["lock"].address))

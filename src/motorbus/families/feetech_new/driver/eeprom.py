@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 from motorbus.core.register import RegisterMap
 from motorbus.core.request import Effect, Stops
 from motorbus.core.steps import Emit, Exclusive, Guard, catch
-from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown, RequestError, WireError
+from motorbus.errors import LinkError, MotorbusError, OutcomeUnknown, RequestError
 from motorbus.families.feetech_new.driver.motion import disable_torque, is_limp, limp, torque_on_unless
 from motorbus.families.feetech_new.driver.node import Node
 from motorbus.families.feetech_new.driver.requests import STORE, Block, confirmed, read_block, verified
@@ -49,7 +49,7 @@ class Unlocked(Guard):
         await disable_torque(self.node)
 
     async def leave(self, error: BaseException | None) -> None:
-        self.node.forget_settings()
+        self.node.forget_settings(written=True)
         if error is not None and self.before:
             if await catch(self.check_open()) is not None:  # it restarted, maybe with torque on
                 await catch(disable_torque(self.node))
@@ -59,8 +59,8 @@ class Unlocked(Guard):
             try:
                 await close_lock(self.node, self.lock)
                 return
-            except (NoReply, OutcomeUnknown, WireError) as failure:
-                if attempt == ATTEMPTS - 1:
+            except MotorbusError as failure:
+                if attempt == ATTEMPTS - 1 or isinstance(failure, LinkError):
                     failure.add_note(f"the EEPROM lock of node {self.node.node} may be open: write(lock=1)")
                     raise
 

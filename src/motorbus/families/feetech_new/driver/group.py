@@ -26,8 +26,10 @@ from motorbus.core.steps import Emit, Exclusive, SetBitrate, catch, with_cleanup
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech_new import protocol
 from motorbus.families.feetech_new.driver.access import (
+    Span,
     action_all,
     check_names,
+    check_values,
     decode_span,
     hand_over,
     ram_block,
@@ -134,6 +136,7 @@ async def collect(
     found = await _sync_blocks(able, address, count) if len(able) > 1 else {}
     for node in nodes:
         if node.node in found:
+            node.reads_alone = False
             continue
         data = await catch(read_block(node, address, count, bytes))
         if isinstance(data, MotorbusError):
@@ -161,7 +164,10 @@ def sync_request(
     decode: Callable[[Response], T],
     decode_exact: ExactDecoder[T] | None = None,
 ) -> Request[T]:
-    """SYNC READ one block of each of these, in this order."""
+    """SYNC READ one block of each of these, in this order. Raises RequestError for a servo without SYNC READ."""
+    for node in nodes:
+        if not node.traits.sync_read or node.reads_alone:
+            raise node.refusal("has no SYNC READ", "use sync_read(), which reads such servos one by one")
     ids = [node.node for node in nodes]
     return Request(
         protocol.sync_read(address, count, ids),
@@ -249,11 +255,7 @@ def _table(node: Node) -> RegisterMap:
 def known_row(node: Node, name: str) -> Register:
     """A row of an identified servo. Raises RequestError if it is not, DeviceError for an unknown map."""
     if node.table is None or node.settings is None:
-        raise RequestError(
-            f"node {node.node} is not identified: its limits and units are unknown",
-            advice="identify() each servo before the loop, or run prepare_all(); nothing was sent",
-            node=node.node,
-        )
+        raise node.refusal("is not identified, so its limits and units are unknown", "run prepare_all()")
     if not node.table[name].unit:
         raise unknown_map(node, f"cannot tell its {name.replace('_', ' ')} in a unit")
     return node.row(name)
@@ -274,7 +276,7 @@ async def sync_write(values: Mapping[One, Mapping[str, Value]]) -> None:
 async def _prepared(values: Mapping[One, Mapping[str, Value]], what: str) -> tuple[list[Node], list[Block]]:
     """The servos, identified, and the block of each."""
     for orders in values.values():
-        check_names(orders)
+        check_values(orders)
     nodes = as_nodes(values)
     errors = await prepare_all(nodes)
     if errors:
@@ -323,7 +325,7 @@ async def send_all(requests: Sequence[Request[None]]) -> None:
 class GoalWriter:
     """Makes SYNC WRITEs of goal positions of identified servos for a loop; see `__call__`.
 
-    Raises RequestError unless all are in position mode, of maps with one byte order, and fit one packet.
+    Raises RequestError unless all are in position mode and fit one packet.
     """
 
     def __init__(self, nodes: Sequence[Node]) -> None:
@@ -331,9 +333,7 @@ class GoalWriter:
         for node in nodes:
             position_goal(node, 0.0)
         if len(nodes) > protocol.sync_write_capacity(2):
-            raise RequestError(
-                f"one packet cannot carry the goals of {len(nodes)} servos", advice="divide them"
-            )
+            raise RequestError(f"{len(nodes)} servos are too many for one packet", advice="divide them")
         self._made: Final = [(node, node.settings) for node in nodes]
         self._nodes: Final = nodes
         self._rows: Final = rows
@@ -390,17 +390,13 @@ def _cell(node: Node, row: Register) -> tuple[int, float, int, int, bool]:
 class ServoGroup:
     """Identified servos of one bus for a loop; its requests may be kept and run again.
 
-    Raises RequestError for a servo that is not identified, or has no SYNC READ: `sync_read` reads those one by one.
+    Raises RequestError for a servo that is not identified; `read` and `positions` for one without SYNC READ.
     """
 
     def __init__(self, servos: Sequence[Node]) -> None:
         self.servos: Final = as_nodes(servos)
         for node in self.servos:
             known_row(node, "present_position")
-            if not node.traits.sync_read or node.reads_alone:
-                raise RequestError(
-                    f"node {node.node} has no SYNC READ", advice="use sync_read()", node=node.node
-                )
 
     @property
     def positions(self) -> Request[Positions]:
@@ -410,24 +406,18 @@ class ServoGroup:
     def read(self, *names: str) -> Request[dict[int, dict[str, Value]]]:
         """These registers of all servos that answer, by id and name; they must lie alike in the maps of all."""
         check_names(names)
-        found = {tuple(spans(rows_of(_table(node), names))) for node in self.servos}
-        (first, *others) = sorted({(span.address, span.size) for group in found for span in group})
-        if others:
-            raise RequestError(
-                f"{', '.join(names)} are not in one place in these servos", advice="read fewer registers"
-            )
-        address, size = first
         rows = {node.node: rows_of(_table(node), names) for node in self.servos}
+        (span, *others) = {span._replace(rows=()) for found in rows.values() for span in spans(found)}
+        if others:
+            raise RequestError(f"{', '.join(names)} are not in one place", advice="read fewer registers")
+        address, size, _ = span
         by_id = {node.node: node for node in self.servos}
 
         def decode(answer: Response) -> dict[int, dict[str, Value]]:
             values = {}
             for id, data in _heard(self.servos, answer):
-                pairs = [
-                    (row, row.decode(data[row.address - address : row.address - address + row.size]))
-                    for row in rows[id]
-                ]
-                values[id] = {row.name: by_id[id].value(row, raw) for row, raw in pairs}
+                raws = decode_span(Span(address, size, tuple(rows[id])), data)
+                values[id] = {row.name: by_id[id].value(row, raws[row.name]) for row in rows[id]}
             return values
 
         return sync_request(self.servos, address, size, decode)

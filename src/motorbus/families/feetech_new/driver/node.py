@@ -100,9 +100,10 @@ class Node:
         self.last_move: object = None
         self.bound: int | None = None  # raw goal torque of an HLS, as last read or written
         self.former_limits: tuple[float, float] | None = None  # of an SCS that was made a motor
-        self.reads_alone = False  # it answers READ and not SYNC READ
+        self.reads_alone: bool | None = None  # it answers READ and not SYNC READ; None: unknown
         self.kept: Final[dict[str, tuple[Settings, Request[Any]]]] = {}  # requests, with their settings
         self._last: Settings | None = None
+        self._is_written = False  # since `_last` was read
 
     @property
     def limits(self) -> tuple[float, float] | None:
@@ -131,16 +132,18 @@ class Node:
 
     def learn_settings(self, settings: Settings) -> None:
         """Its settings were read. Equal ones stay the same object, so what was made by them still holds."""
-        if settings == self._last:
+        if settings == self._last and not self._is_written:
             settings = self._last
         else:
             self.epoch += 1
         self.settings = self._last = settings
+        self._is_written = False
 
-    def forget_settings(self) -> None:
-        """Its settings may have changed: they are read before they are used again."""
+    def forget_settings(self, *, written: bool = False) -> None:
+        """Its settings may have changed, or were `written`: they are read before they are used again."""
         self.settings = None
         self.bound = None
+        self._is_written |= written
 
     def row(self, name: str) -> Register:
         """A register of an identified servo, as its present mode codes it."""

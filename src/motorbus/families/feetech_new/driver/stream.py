@@ -46,8 +46,9 @@ async def open_stream(servos: Sequence[Node], *, rate: int) -> ServoStream:
     for node in nodes:
         known_row(node, "goal_position")
         position_goal(node, 0.0)
-    await collect(nodes, PRESENT, 2, errors)
-    raise_first(list(errors.values()))
+    if any(node.reads_alone is None for node in nodes if node.traits.sync_read):
+        await collect(nodes, PRESENT, 2, errors)
+        raise_first(list(errors.values()))
     able = [node for node in nodes if node.traits.sync_read and not node.reads_alone]
     able = able if len(able) > 1 else []
     positions = [positions_request(part) for part in await divided(able, 2)]
