@@ -64,7 +64,7 @@ class FeetechBus:
             self._add(id, model)
         if not self.servos:
             raise RequestError("a simulated bus needs at least one servo", advice="give ids, such as 1-6")
-        self.usual_rate = self.servos[0].baud_rate
+        self.usual_rate: int = self.servos[0].baud_rate or 0
 
     def _add(self, id: int, model: Model) -> Servo:
         if not 0 <= id <= MAX_ID:
@@ -131,7 +131,7 @@ class FeetechBus:
             servo.trip()
         self.now = max(self.now, to)
 
-    # -- instructions --------------------------------------------------------------------------------------------
+    # -- instructions ------------------------------------------------------------------------------
 
     def _carry_out(self, packet: protocol.Packet, at: float) -> None:
         id, code, parameters = packet
@@ -153,7 +153,7 @@ class FeetechBus:
 
     def _receivers(self, id: int, code: int, at: float) -> list[Servo]:
         """The servos that take this instruction to this id."""
-        servos = [servo for servo in self.servos if servo.hears(self.rate, at)]
+        servos = [servo for servo in self.servos if servo.receives(self.rate, at)]
         if id == BROADCAST:
             return servos
         if code in WRITES:
@@ -204,7 +204,7 @@ class FeetechBus:
             elif self.quirks.sync_read_missing == "wait":
                 at += self._byte_time(None) * (length + OVERHEAD)
 
-    # -- the wire ------------------------------------------------------------------------------------------------
+    # -- the wire ----------------------------------------------------------------------------------
 
     def _speak(self, replies: Iterable[Reply]) -> float:
         """Send replies of one moment, those that overlap as one; returns the end (s) of the last one."""

@@ -100,7 +100,7 @@ class Memory:
         self.store(cells, self._time)
         return names
 
-    # -- EEPROM --------------------------------------------------------------------------------------------------
+    # -- EEPROM ------------------------------------------------------------------------------------
 
     def store(self, addresses: Iterable[int], time: float) -> None:
         """Store the live values of these cells after those that wait, in `time` s altogether."""
@@ -149,7 +149,7 @@ class Memory:
             self._cells[address] = value
             self._wear[address] += 1
 
-    # -- supply --------------------------------------------------------------------------------------------------
+    # -- supply ------------------------------------------------------------------------------------
 
     def power_off(self) -> None:
         """The supply goes: the cell in work is torn, those behind it are lost."""

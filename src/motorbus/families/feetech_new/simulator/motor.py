@@ -16,7 +16,7 @@ from motorbus.families.feetech_new.traits import Mode
 FEEBLE: Final = 0.01
 """A share of the stall torque below this does not overcome the friction of the gear. # assumption"""
 FULL_ACCELERATION: Final = 25_400.0
-"""Counts/s² where the register is 0 or missing: what its greatest value gives. # assumption"""
+"""Counts/s² where the register is 0 or missing: what its highest value gives. # assumption"""
 TO_A_PLACE: Final = (Mode.POSITION, Mode.STEP)
 
 

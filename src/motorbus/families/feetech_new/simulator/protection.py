@@ -1,4 +1,4 @@
-"""What makes a servo report alarms and let go: overload, supply, temperature.
+"""What makes a servo report alarms and release its torque: overload, supply, temperature.
 
 Overload: more than register 36 (SCS: 39) for the time of register 35 (SCS: 38), then the torque falls to register 34
 (SCS: 37). HLS servos have no such registers. Over-current is left out. An alarm that the unload mask (19) does not name
@@ -39,9 +39,9 @@ class Overload:
 
     def watch(self, course: Course, at: float) -> None:
         """Take the course that the motor follows from this moment (s) on."""
-        limit, patience = self._value("overload_torque"), self._value("overload_time")
+        limit, duration = self._value("overload_torque"), self._value("overload_time")
         begin, until = inf, inf
-        if limit and patience:  # 0 protects from nothing # assumption
+        if limit and duration:  # 0 protects from nothing # assumption
             lasts = abs(course.torque(inf)) > limit
             if abs(course.load) > limit:
                 begin, until = at, inf if lasts else course.motion.done_at
@@ -51,7 +51,7 @@ class Overload:
         if begin == at and first <= at <= last:
             begin = first  # above the limit without a break
         self._span = begin, until
-        trip = begin + patience
+        trip = begin + duration
         self.next = max(at, trip) if trip <= until and not self.tripped else inf
 
     def _value(self, name: str) -> float:

@@ -112,7 +112,7 @@ class Servo(PoweredDevice):
         self.power_on()
         self.deaf_until = -inf
 
-    # -- for tests and the control socket ------------------------------------------------------------------------
+    # -- for tests and the control socket ----------------------------------------------------------
 
     def status(self) -> dict[str, object]:
         """Its state as plain data; positions in raw counts."""
@@ -183,7 +183,7 @@ class Servo(PoweredDevice):
         """End block and load."""
         self.load, self.blocked = 0.0, None
 
-    # -- supply --------------------------------------------------------------------------------------------------
+    # -- supply ------------------------------------------------------------------------------------
 
     def power_off(self) -> None:
         """The supply goes: what is not stored is lost, the shaft stays."""
@@ -217,7 +217,7 @@ class Servo(PoweredDevice):
             memory["goal_position"] = self.position(now)
         self.move()
 
-    # -- settings ------------------------------------------------------------------------------------------------
+    # -- settings ----------------------------------------------------------------------------------
 
     @property
     def id(self) -> int:
@@ -294,11 +294,11 @@ class Servo(PoweredDevice):
         """Goal or limit of the current, a share of that at stall."""
         return self.memory[self._traits.current] * AMPERE / self.model.drive.stall_current
 
-    def hears(self, rate: int | None, at: float) -> bool:
+    def receives(self, rate: int | None, at: float) -> bool:
         """Whether it receives a packet of this rate (None: any)."""
         return self.plugged and at >= self.deaf_until and rate in (None, self.baud_rate)
 
-    # -- motion --------------------------------------------------------------------------------------------------
+    # -- motion ------------------------------------------------------------------------------------
 
     @property
     def motion(self) -> Motion:
@@ -348,7 +348,7 @@ class Servo(PoweredDevice):
             mode=mode,
             goal=goal,
             speed=abs(velocity) or (inf if traits.zero_is_maximum(phase) else 0.0),
-            # Of maps with modes no firmware is known to heed it (memory tables of SCS and STS3215).
+            # Of maps with modes no firmware is known to use it (memory tables of SCS and STS3215).
             time=0.0 if traits.modes else memory[traits.time] / 1000,
             acceleration=acceleration or FULL_ACCELERATION,
             torque=self.available,
@@ -381,9 +381,9 @@ class Servo(PoweredDevice):
         """Stand still, within the first turn."""
         now = self._now()
         self.course = Course(rest(now, self.motion.position(now) % self._traits.turn))
-        self.count_anew()
+        self.set_zero()
 
-    def count_anew(self) -> None:
+    def set_zero(self) -> None:
         """Put zero where the homing offset says, in position mode only (feetech-cli, servolab, on STS3215)."""
         now, memory, turn = self._now(), self.memory, self._traits.turn
         reverses = REVERSES.get(self.model.table.name, 0)
@@ -395,7 +395,7 @@ class Servo(PoweredDevice):
         counts = round(self.motion.position(now))
         self.zero = counts - (counts - offset) % turn
 
-    # -- requests ------------------------------------------------------------------------------------------------
+    # -- requests ----------------------------------------------------------------------------------
 
     def read(self, address: int, count: int) -> bytes:
         """The bytes of a READ."""
@@ -419,7 +419,7 @@ class Servo(PoweredDevice):
             self.overload.clear()
             self._alarm &= ~LATCHED
         if names & _COUNTING or (not traits.modes and names & _LIMITS):
-            self.count_anew()
+            self.set_zero()
         ordered = "goal_position" in names
         if ordered and traits.goal_switches_on and self.mode in TO_A_PLACE:
             memory["torque_enable"] = 1
@@ -437,7 +437,7 @@ class Servo(PoweredDevice):
         memory["homing_offset"] = max(row.low, min(row.high, offset))
         if not self.locked:
             memory.store_row("homing_offset")
-        self.count_anew()
+        self.set_zero()
         self._hold()
 
     def clear_turns(self) -> None:
