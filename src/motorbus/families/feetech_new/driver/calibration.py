@@ -207,7 +207,11 @@ async def _read_pose(node: Node, row: Register) -> Pose:
     """Offset and position. Raises DeviceError for an offset outside the range of its register."""
     data = await read_block(node, row.address, row.size, bytes, timeout=STORE)
     offset = row.decode(data)
-    if row.encode(max(row.low, min(offset, row.high))) != data and offset:
+    code, sign = (
+        int.from_bytes(data, "little"),
+        row.sign_bit or 0,
+    )  # one byte on SCS2, little-endian elsewhere
+    if not row.low <= offset <= row.high or code >> (sign + 1):
         raise DeviceError(
             f"node {node.node}: its homing offset reads {data.hex(' ')}, which its register cannot mean",
             expected=f"{row.low} to {row.high}, the sign at bit {row.sign_bit}",
