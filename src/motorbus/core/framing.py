@@ -30,6 +30,7 @@ class FrameParser:
         self._length: Final = length
         self._is_valid: Final = is_valid
         self._buffer = b""
+        self._damaged = 0  # bytes of the buffer that are part of a frame with a wrong checksum
 
     @property
     def held(self) -> int:
@@ -37,12 +38,13 @@ class FrameParser:
         return len(self._buffer)
 
     def feed(self, data: bytes, *, end: bool = False) -> list[tuple[bytes, str]]:
-        """Take bytes; return frames with "", and noise with its fault, "framing" or "checksum".
+        """Take bytes; return frames with "", and noise with its fault, "checksum" or "framing".
 
-        `end`: no more bytes follow, so an incomplete frame is noise.
+        "checksum" are the bytes of a whole frame with a wrong checksum, however the stream was cut. `end`: no more
+        bytes follow, so an incomplete frame is noise.
         """
         found: list[tuple[bytes, str]] = []
-        buffer, start, noise, fault = self._buffer + data, 0, 0, "framing"
+        buffer, start, noise = self._buffer + data, 0, 0
         while start < len(buffer):
             size: int | None = 0
             if buffer.startswith(self._headers, start):
@@ -53,19 +55,28 @@ class FrameParser:
                 break
             frame = buffer[start : start + size] if size and size <= len(buffer) - start else b""
             if frame and self._is_valid(frame):
-                if noise < start:
-                    found.append((buffer[noise:start], fault))
+                self._add_noise(found, buffer, noise, start)
                 found.append((frame, ""))
-                start = noise = start + len(frame)
-                fault = "framing"
-            else:
-                fault = "checksum" if frame else fault
-                next_start = self._first_byte.search(buffer, start + 1)
-                start = next_start.start() if next_start else len(buffer)
-        if noise < start:
-            found.append((buffer[noise:start], fault))
+                start = noise = self._damaged = start + len(frame)
+                continue
+            if frame:
+                if start >= self._damaged:
+                    self._add_noise(found, buffer, noise, start)
+                    noise = start
+                self._damaged = max(self._damaged, start + len(frame))
+            next_start = self._first_byte.search(buffer, start + 1)
+            start = next_start.start() if next_start else len(buffer)
+        self._add_noise(found, buffer, noise, start)
         self._buffer = buffer[start:]
+        self._damaged = max(0, self._damaged - start)
         return found
+
+    def _add_noise(self, found: list[tuple[bytes, str]], buffer: bytes, start: int, end: int) -> None:
+        damaged = max(start, min(end, self._damaged))
+        if start < damaged:
+            found.append((buffer[start:damaged], "checksum"))
+        if damaged < end:
+            found.append((buffer[damaged:end], "framing"))
 
 
 class FrameReceiver:

@@ -230,10 +230,23 @@ def test_the_longest_packets_have_259_bytes() -> None:
 def test_any_cut_gives_the_same_packets_and_every_byte_once(top: int, data: bytes, cuts: list[int]) -> None:
     places = [0, *sorted({cut % (len(data) + 1) for cut in cuts}), len(data)]
     pieces = [data[start:end] for start, end in pairwise(places)]
-    for cut in ([data], pieces, bytes_of(data)):
-        found = parse(protocol.parser(top), cut)
-        assert valid(found) == packets_in(data, top)
-        assert b"".join(piece for piece, _ in found) == data
+    whole = parse(protocol.parser(top), [data])
+    assert valid(whole) == packets_in(data, top)
+    assert b"".join(piece for piece, _ in whole) == data
+    for cut in (pieces, bytes_of(data)):
+        assert faults(parse(protocol.parser(top), cut)) == faults(whole)
+
+
+def faults(found: list[tuple[bytes, str]]) -> list[tuple[int, str]]:
+    """The fault of each byte."""
+    return [(byte, fault) for data, fault in found for byte in data]
+
+
+def test_each_bad_packet_is_noise_by_itself_and_what_is_inside_belongs_to_it() -> None:
+    bad = REPLY[:-1] + b"\x00"
+    assert protocol.parser().feed(bad + bad + b"\x33") == [(bad, "checksum")] * 2 + [(b"\x33", "framing")]
+    outer = b"\xff\xff\x02\x0c\x00" + bad + b"\x11\x22\x33"
+    assert protocol.parser().feed(outer) == [(outer, "checksum")]
 
 
 def events(receiver: FrameReceiver, data: bytes) -> list[Event]:
