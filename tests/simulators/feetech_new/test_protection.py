@@ -163,9 +163,11 @@ def test_overshoot_over_both_bounds_stops_at_the_first() -> None:
 
 
 def test_pushed_shaft() -> None:
-    host = Host(position=1000)
+    host = Host(position=1000).wait(0.0)
     host.servo.push_shaft(100 * COUNT)
     assert host.servo.raw_position == 1000  # limp: it takes its time
+    assert (host.wait(0.05).read(1, LOAD), host.read(1, CURRENT)) == (0, 0)
+    assert host.read(1, 58) > 0
     assert host.wait(1.0).servo.raw_position == 1100
     host.write(1, POSITION, *word(1100))
     host.servo.push_shaft(-100 * COUNT)

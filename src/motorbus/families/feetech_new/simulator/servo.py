@@ -166,7 +166,7 @@ class Servo(PoweredDevice):
         goal = here + self._counts(angle)
         if self.blocked is not None:
             goal = min(max(goal, self.blocked[0]), self.blocked[1])
-        if self.available >= FEEBLE:
+        if self.driven:
             self.course = Course(rest(now, goal))
             self.move()
         else:
@@ -288,6 +288,11 @@ class Servo(PoweredDevice):
             share = min(share, self.overload.torque)
             releasing &= ~OVERLOAD
         return 0.0 if releasing else min(share, 1.0)
+
+    @property
+    def driven(self) -> bool:
+        """Whether the motor has torque."""
+        return self.available >= FEEBLE
 
     @property
     def _current(self) -> float:
@@ -460,11 +465,13 @@ def _velocity(servo: Servo, at: float) -> int:
 
 def _load(servo: Servo, at: float) -> int:
     """The duty of the motor, in 0.1 %."""
+    if not servo.driven:
+        return 0
     return round(1000 * servo.model.drive.duty(servo.motion.velocity(at), servo.course.torque(at)))
 
 
 def _current(servo: Servo, at: float) -> int:
-    if not servo.model.traits.tells_current(servo.memory["phase"]):
+    if not (servo.driven and servo.model.traits.tells_current(servo.memory["phase"])):
         return 0
     return round(servo.model.drive.current(servo.motion.velocity(at), servo.course.torque(at)) / AMPERE)
 
