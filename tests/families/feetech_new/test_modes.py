@@ -84,7 +84,7 @@ def test_a_mode_that_the_map_lacks_is_refused(name: str) -> None:
 
 
 def test_an_scs_becomes_a_servo_again_by_limits_that_somebody_knows() -> None:
-    with world("scs") as (_, servo, simulation):
+    with world("scs") as (_, servo, _simulation):
         before = servo.read("limits")
         servo.set_mode("pwm")
         assert servo.read_raw("limits") == {"min_position_limit": 0, "max_position_limit": 0}
@@ -135,7 +135,7 @@ class TestVelocity:
 
     @pytest.mark.parametrize("phase", [12, 8])
     def test_its_unit_follows_the_phase_bit(self, phase: int) -> None:
-        with world() as (bus, servo, simulation):
+        with world() as (_bus, servo, simulation):
             simulation[1].memory["phase"] = phase
             servo.set_mode("velocity")
             servo.enable_torque()
@@ -192,7 +192,7 @@ def test_a_negative_duty_has_its_sign_at_bit_10(name: str) -> None:
 
 
 def test_the_time_of_an_scs_is_a_plain_number_up_to_65_s() -> None:
-    with world("scs") as (_, servo, simulation):
+    with world("scs") as (_, servo, _simulation):
         servo.enable_torque()
         servo.write(goal_time=1500)
         assert servo.read("goal_time") == {"goal_time": 1500}

@@ -96,7 +96,7 @@ class TestOutsideItsLimits:
     """A servo that was turned beyond its limits by hand."""
 
     def test_torque_is_refused_unless_the_jump_is_allowed(self) -> None:
-        with world(position=1800) as (bus, servo, simulation):
+        with world(position=1800) as (bus, servo, _simulation):
             servo.write(min_position_limit=3.0, max_position_limit=3.5)
             with traffic(bus) as sent, pytest.raises(LimitExceeded, match="it would jump to 3"):
                 servo.enable_torque()

@@ -124,12 +124,15 @@ async def _store(
             await close_lock(node, unlocked.lock)
         return False
     held = keep_torque and not await is_limp(node)
+    level = table["status_return_level"].address
     async with unlocked:
         if held:
             await confirmed(node, limp(node)._replace(unless=unlocked.stopped))  # counts the stops so far
         for block, before in changes:
             unlocked.before.append(before)
             await confirmed(node, block, timeout=STORE)
+            if block.address <= level < block.address + len(block.data):
+                node.forget_answers()
             await verified(node, block, timeout=STORE)
         await unlocked.check_open()
     if held:

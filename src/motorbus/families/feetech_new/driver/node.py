@@ -121,6 +121,12 @@ class Node:
         return TRAITS.get(self.identity.table, NO_TRAITS) if self.identity else NO_TRAITS
 
     @property
+    def answers_writes(self) -> bool:
+        """It acknowledges writes, as far as is known."""
+        known = self.settings or self._last
+        return known is None or known.answers_writes
+
+    @property
     def is_writable(self) -> bool:
         """Its register map is known."""
         return self.identity is not None and bool(self.identity.table)
@@ -155,6 +161,10 @@ class Node:
     def refusal(self, what: str, fix: str = "", *, expected: str = "") -> RequestError:
         """The error for an impossible request to this servo: `node 3 WHAT`."""
         return RequestError(f"node {self.node} {what}", expected=expected, advice=fix, node=self.node)
+
+    def forget_answers(self) -> None:
+        """Its status return level was written: whether it acknowledges writes is unknown."""
+        self.settings = self._last = None
 
     def value(self, row: Register, raw: int) -> Value:
         """Raw value -> value in the unit of the row, by the last known settings of this servo."""

@@ -148,10 +148,9 @@ def acknowledged(
         if deferred is not None:
             deferred.done = True
 
-    answers = node.settings is None or node.settings.answers_writes
     return Request(
         wire,
-        (Expected(node.node, node.node, ACKNOWLEDGED),) if answers else (),
+        (Expected(node.node, node.node, ACKNOWLEDGED),) if node.answers_writes else (),
         decode,
         priority=priority,
         effect=block.effect,
