@@ -13,7 +13,7 @@ from typing import Final
 
 from motorbus.core.register import Register, Storage
 from motorbus.core.request import Effect
-from motorbus.families.kst.profiles import BIT_RATES, PROFILES
+from motorbus.families.kst.profiles import PROFILES, RATES
 from motorbus.families.kst.sdo import ABORTS
 from motorbus.families.kst.simulator import OPTIONS
 from scripts.pages import kept, listed
@@ -90,7 +90,7 @@ ERRATA: Final = (
      "errata_12_and_13_position_outside_the_range_of_the_profile_is_not_sent"),
     (14, "Rounding of degrees.", "Half a count away from zero, in decimal.",
      "erratum_14_half_a_count_rounds_away_from_zero"),
-    (15, "The bit rate cannot be read.", "It is tried once.", "erratum_15_bit_rate_is_read_once_and_may_be_unknown"),
+    (15, "The bit rate cannot be read.", "It is only written.", "erratum_15_bit_rate_is_not_read"),
     (16, "Version: four characters; CiA 301: any length.", "Four are read.",
      "erratum_16_a_version_has_at_most_four_characters"),
     (17, "Unknown objects.", "One abort code per cause.",
@@ -100,8 +100,8 @@ ERRATA: Final = (
     (19, "Unknown rate codes and ids.", "Refused with 0x06090030.", "erratum_19_impossible_id_or_rate_is_refused"),
     (20, "Two new servos share 0x25.", "Equal replies are one frame, others collide.",
      "erratum_20_two_servos_with_one_id_get_no_other"),
-    (21, "The default rate is provisional.", "A scan listens first, then tries each rate.",
-     "erratum_21_scan_of_other_rates_listens_before_it_sends"),
+    (21, "The default rate is provisional.", "A scan tries each rate that is named.",
+     "erratum_21_scan_tries_the_rates_that_are_named"),
     (22, "Late replies.", "Index and sub-index of every reply are compared.",
      "erratum_22_reply_to_another_request_is_not_accepted"),
 )  # fmt: skip
@@ -122,7 +122,7 @@ def _profiles() -> Iterator[str]:
     for one in PROFILES.values():
         degrees_of_limit = f"{one.limit / one.counts_per_degree:.4g}°"
         scale = f"1° = {one.counts_per_degree} counts, range ±{degrees_of_limit} = ±{one.limit} counts."
-        lines = (f"{one.title}.", scale, START[one.nmt], *_sources(one.source, one.conflicts))
+        lines = (f"{one.table.title}.", scale, START[one.nmt], *_sources(one.source, one.conflicts))
         rows.append((f"`{one.name}`", "<br>".join(lines)))
     yield from listed(("profile", "servo"), rows)
 
@@ -177,7 +177,7 @@ def _commands() -> Iterator[str]:
     ]
     yield from listed(("command", "method, object and test"), rows)
     yield "Bit rates (bit/s) and their codes in command 1:"
-    yield f"{', '.join(f'{rate} is {code}' for code, rate in BIT_RATES.items())}.\n"
+    yield f"{', '.join(f'{rate} is {code}' for code, rate in enumerate(RATES))}.\n"
 
 
 def _aborts() -> Iterator[str]:

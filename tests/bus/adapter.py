@@ -19,7 +19,7 @@ from motorbus.core.setpoint import Setpoint
 from motorbus.core.steps import Exclusive, WaitFor
 from motorbus.errors import LinkLost
 from motorbus.families import feetech, kst
-from motorbus.families.kst.sdo import download_due, upload_due
+from motorbus.families.kst import sdo
 from motorbus.link.memory import MemoryLink
 from tests.bus.script import Check
 
@@ -39,9 +39,8 @@ def request(
     **options: Any,
 ) -> Request[Any]:
     """One request and the replies it calls for: (node, key, length) each; None: all until the deadline."""
-    makers = {"upload": upload_due, "download": download_due}
     dues = tuple(
-        makers[key[0]](node, key[1]) if isinstance(key, tuple) else Expected(node, key, length)
+        sdo.expected(node, *key) if isinstance(key, tuple) else Expected(node, key, length)
         for node, key, length in expected or ()
     )
 

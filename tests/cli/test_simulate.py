@@ -214,15 +214,16 @@ def test_switches_are_flags_and_settings_belong_to_the_address(tmp_path: Path) -
         link=tmp_path / "can",
         tcp="0",
         profile="kst-ext",
-        status_6002="x1x2",
-        x1="64",
+        out_of_range="clamp",
         bitrate="500000",
     ) as simulated:
         assert simulated.bus == f"kst:can://slcan{tmp_path / 'can'},profile=kst-ext,bitrate=500000"
         assert simulated.buses[1].endswith(",profile=kst-ext,bitrate=500000")
         terminal = os.open(tmp_path / "can", os.O_RDWR | os.O_NOCTTY)
         try:
-            assert slcan(terminal) == b"t5A584B02600040000000\r"
+            assert slcan(terminal) == POSITION
+            refused = asked(terminal, b"t62582203600000700000\r", 24).removeprefix(b"z\r")
+            assert refused == b"t5A586003600000000000\r", "it takes a position that is out of range"
         finally:
             os.close(terminal)
 

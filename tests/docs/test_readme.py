@@ -44,7 +44,7 @@ PORTS = {
 NAMED = re.compile(r"^motorbus (pose|park|teach|replay|follow|loop-stats|move shoulder)")
 """Commands that go by names of a machine file."""
 FOR_EVER = re.compile(r"^motorbus simulate ")
-WITH_HANDS = re.compile(r"^motorbus kst provision ")
+WITH_HANDS = re.compile(r"^motorbus set-id kst:")
 POWER_CYCLE = "at 9 s: power-cycle 37"
 """What its user does when the command asks for it."""
 FEED = """format = 1
@@ -149,7 +149,7 @@ def run_process(words: list[str], folder: Path) -> Ran:
 
 def shortened(line: str) -> str:
     """The same for a shorter time, where it says one, and without most of the ids that nobody has."""
-    line = re.sub(r"^(motorbus set-id .*)", r"\1 --among 1-9", line)
+    line = re.sub(r"^(motorbus set-id feetech.*)", r"\1 --among 1-9", line)
     return re.sub(r"--seconds \d+", "--seconds 1", line).replace("--baud all", "--baud all --ids 1-6")
 
 

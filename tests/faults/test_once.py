@@ -18,7 +18,7 @@ from motorbus.core.request import Data
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown
 from motorbus.families.feetech import FAMILY, Servo, wire
 from motorbus.families.feetech.driver.exchanges import Block, acknowledged, write_block
-from motorbus.families.kst.driver.requests import write_register
+from motorbus.families.kst.driver.requests import write_row
 from motorbus.families.stepper.table import ORDERS
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.safety import Gate
@@ -119,7 +119,7 @@ def test_l18_a_change_of_id_or_baud_is_written_once(what: str, register: int) ->
 
 
 def _mid_point(rig: KstRig) -> None:
-    rig.run(write_register(rig.servo, rig.servo.table["mid_point"], 0))
+    rig.run(write_row(rig.servo, rig.servo.table["mid_point"], 0))
 
 
 KST: dict[str, tuple[Callable[[KstRig], Any], bytes, int]] = {

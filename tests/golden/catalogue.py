@@ -6,6 +6,7 @@ from math import nan, tau
 from typing import Any
 
 from motorbus import stepper
+from motorbus.families.kst.profiles import SAVE
 from tests.golden.recording import Argument, Call, Case
 
 MODELS = {
@@ -302,10 +303,14 @@ KST: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("move", 0.2, wait=False), "no_wait", ()),
     (call("move", 99.0), "beyond_limits", ()),
     (call("move", nan), "nan", ()),
-    (call("move", 0.15), "travel_limits", (call("set_travel_limits", -0.2, 0.1),)),
-    (call("write", goal_position=0.15), "travel_limits", (call("set_travel_limits", -0.2, 0.1),)),
-    (call("set_travel_limits", 0.1, 0.5), "above_zero", ()),
-    (call("set_travel_limits", -9.0, 9.0), "huge", ()),
+    (call("move", 0.15), "travel_limits", (call("write", negative_limit=-0.2, positive_limit=0.1),)),
+    (
+        call("write", goal_position=0.15),
+        "travel_limits",
+        (call("write", negative_limit=-0.2, positive_limit=0.1),),
+    ),
+    (call("write", negative_limit=0.1), "limit_above_zero", ()),
+    (call("write", negative_limit=-9.0, positive_limit=9.0), "limits_huge", ()),
     (call("write", node_id=9), "protected", ()),
     (call("write", nonsense=1), "unknown", ()),
     (call("read", "nonsense"), "unknown", ()),
@@ -315,28 +320,27 @@ KST: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("version"), "", ()),
     (call("node_id"), "", ()),
     (call("set_node_id", 9), "", ()),
-    (call("bit_rate"), "", ()),
     (call("set_bit_rate", 250_000), "", ()),
     (call("save"), "", ()),
     (call("provision", new_id=9, new_rate=250_000), "", ()),
     (call("set_id", 9), "", ()),
     (call("set_baud", 250_000), "", ()),
-    (call("start_reports", 0.02), "", ()),
-    (call("stop_reports"), "", (call("start_reports", 0.02),)),
+    (call("set_reports", True), "", ()),
+    (call("set_reports", False), "off", (call("set_reports", True),)),
     (call("set_mid_point"), "", ()),
-    (call("travel_limits"), "", ()),
-    (call("set_travel_limits", -0.5, 0.5), "", ()),
+    (call("read", "negative_limit", "positive_limit"), "limits", ()),
+    (call("write", negative_limit=-0.5, positive_limit=0.5), "limits", ()),
     (call("reversed"), "", ()),
     (call("set_reversed", True), "", ()),
 ]
 KST_GROUP: list[tuple[Call, str]] = [
     (shared("scan", SETTINGS, (1, 2, 3)), "ids"),
     (shared("broadcast_read", "node_id", SETTINGS), ""),
-    (shared("broadcast_position", 0.2, (1, 2), SETTINGS), ""),
-    (shared("broadcast_save", SETTINGS), ""),
-    (shared("broadcast_bit_rate", 250_000, SETTINGS), ""),
-    (shared("broadcast_node_id", 9, SETTINGS), "refused"),
-    (shared("broadcast_node_id", 9, SETTINGS, force=True), "forced"),
+    (shared("broadcast_write", "goal_position", 0.2, SETTINGS, nodes=(1, 2)), "goal"),
+    (shared("broadcast_write", "store", SAVE, SETTINGS), "save"),
+    (shared("broadcast_write", "bit_rate_code", 4, SETTINGS), "bit_rate"),
+    (shared("broadcast_write", "node_id", 9, SETTINGS), "node_id_refused"),
+    (shared("broadcast_write", "node_id", 9, SETTINGS, force=True), "node_id_forced"),
 ]
 """On a bus of two servos."""
 
@@ -344,14 +348,12 @@ KST_GROUP: list[tuple[Call, str]] = [
 def _kst() -> list[Case]:
     cases = []
     for profile in PROFILES:
-        options = {"profile": profile, "position": 50}
+        options = {"profile": profile}
         for one, label, before in KST:
             restarts = one.name in ("provision", "set_id", "set_baud")
             cases.append(Case("kst", profile, one, label, before, (1,), options, power_cycle=restarts))
         for one, label in KST_GROUP:
-            reports = (
-                profile == "xqpower" and one.name == "broadcast_position"
-            )  # the start rule starts reports too
+            reports = profile == "xqpower" and label == "goal"  # the start rule starts reports too
             cases.append(
                 Case(
                     "kst",
@@ -367,9 +369,9 @@ def _kst() -> list[Case]:
             )
     cases.append(Case("kst", "kst", shared("scan", SETTINGS), "all", ids=(1, 2), lanes=True))
     for one in (call("move", 0.2, wait=False), call("save"), call("set_node_id", 9)):
-        for form, value in (("sized_only", "accept_unsized"), ("unsized_only", "accept_sized")):
-            cases.append(Case("kst", "kst", one, form, options={"profile": "kst", value: False}))
-    beyond = shared("broadcast_position", 99.0, (1, 2), SETTINGS)
+        for form, value in (("sized_only", "yes"), ("unsized_only", "no")):
+            cases.append(Case("kst", "kst", one, form, options={"profile": "kst", "sized": value}))
+    beyond = shared("broadcast_write", "goal_position", 99.0, SETTINGS, nodes=(1, 2))
     cases.append(Case("kst", "kst", beyond, "beyond_limits", ids=(1, 2), lanes=True))
     extended = {"profile": "kst-ext", "id_format": "ext"}
     cases.append(Case("kst", "kst-ext", call("position"), "extended_id", options=extended))

@@ -13,7 +13,7 @@ import pytest
 
 from motorbus.core.register import Coding, Register
 from motorbus.core.request import Effect
-from motorbus.families.kst.profiles import PROFILES, Profile
+from motorbus.families.kst.profiles import PROFILES, VERSIONS, Profile
 from tests.interop.can_bus import Way, can_bus
 from tests.interop.canopen_peer import Canopen, CanopenError
 
@@ -33,7 +33,7 @@ def dictionary(profile: Profile) -> str:
     listed = [f"{number}=0x{row.address:04X}" for number, row in enumerate(rows, 1)]
     lines = ["[DeviceInfo]", "[OptionalObjects]", f"SupportedObjects={len(rows)}", *listed]
     for row in rows:
-        is_text, signed = row in profile.version_rows, row.coding is Coding.TWOS_COMPLEMENT
+        is_text, signed = row.name in VERSIONS, row.coding is Coding.TWOS_COMPLEMENT
         kind = VISIBLE_STRING if is_text else TYPES[row.size, signed]
         lines += [f"[{row.address:04X}]", f"ParameterName={row.name}", "ObjectType=0x7", "PDOMapping=0"]
         lines += [f"DataType=0x{kind:04X}", f"AccessType={'rw' if row.writable else 'ro'}"]

@@ -28,7 +28,7 @@ SILENCE = 0.5
 POSITIONS = ["minus-90", "minus-10.9", "minus-0.8", "0", "0.8", "10.9", "90"]
 EXCHANGES = {
     **{f"bit-rate-{code}": "bit-rate-set" for code in range(8)},
-    **{f"node-id-{id}": "node-id-set" for id in (1, 37, 127)},
+    **{f"node-id-{id}": "node-id-set" for id in (1, 127, 37)},
     "read-node-id": "node-id",
     "read-node-id-x": "node-id",
     "read-version": "version",
@@ -106,7 +106,7 @@ def test_every_frame_the_manual_prints_is_sent_or_awaited_here() -> None:
 
 def test_each_request_of_the_manual_has_the_reply_of_the_manual(tmp_path: Path) -> None:
     with (
-        can_bus(tmp_path, firmware="V1.2", pending_id="active") as bus,
+        can_bus(tmp_path) as bus,
         PythonCan(bus.way()) as peer,
     ):
         heard = {name: peer.ask(FRAMES[name]) for name in EXCHANGES}
@@ -122,9 +122,10 @@ def test_each_column_of_the_position_table(tmp_path: Path) -> None:
 
 
 def test_the_status_by_the_very_frame_that_reads_a_position(tmp_path: Path) -> None:
-    flags = {"status_6002": "x1x2", "x1": "0x40", "x2": "1"}
-    with can_bus(tmp_path, "0x25", **flags) as bus, PythonCan(bus.way()) as peer:
-        assert peer.ask(FRAMES["read-status"]) == [FRAMES["status"]]
+    status = FRAMES["status"]
+    with can_bus(tmp_path) as bus, PythonCan(bus.way()) as peer:
+        assert peer.ask(f"625#22036000{status[12:16]}0000") == [FRAMES["position-set"]]
+        assert peer.await_(FRAMES["read-status"], status)[-1] == status
 
 
 def test_refusals_in_the_bytes_of_the_manual(tmp_path: Path) -> None:
@@ -171,12 +172,12 @@ def test_without_a_save_a_power_cycle_loses_node_id_and_bit_rate(tmp_path: Path)
 
 
 def test_with_a_save_node_id_and_bit_rate_count_after_the_power_cycle_only(tmp_path: Path) -> None:
-    with can_bus(tmp_path, pending_id="active") as bus:
+    with can_bus(tmp_path) as bus:
         with PythonCan(bus.way()) as peer:
             written(peer)
             assert peer.ask(FRAMES["save"], 0) + peer.listen(SILENCE) == []
             assert peer.ask(READ_ID_26, 0) + peer.listen(SILENCE) == []
-            assert peer.ask(FRAMES["read-node-id"]) == [FRAMES["node-id"]]
+            assert peer.ask(FRAMES["read-node-id"]) == ["5A5#4F00300026000000"]
             power_cycled(bus)
             for request in (FRAMES["read-node-id"], READ_ID_26):
                 assert peer.ask(request, 0) + peer.listen(SILENCE) == []

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 from motorbus.core.steps import catch, gather
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import sync_write, sync_write_positions
-from motorbus.families.kst import broadcast_position, settings_of
+from motorbus.families.kst import broadcast_write, settings_of
 from motorbus.session.robot import Robot
 from motorbus.simulation.named import Simulation
 from tests.safety.decoders import COUNT, TENTH, FeetechWitness, KstWitness, Witness
@@ -250,7 +250,11 @@ class Caller:
         named = [0x25] if self.chance.random() < 0.5 else [0x25, 0x26]
         bus: Any = self.robot.buses["can"]
         wants = dict.fromkeys((spot for spot in BOUNDS if spot[0] == "can"), goal)
-        return Call("broadcast", lambda: bus.run(broadcast_position(goal, named, settings_of(bus))), wants)  # type: ignore[arg-type]
+
+        def send() -> object:
+            return bus.run(broadcast_write("goal_position", goal, settings_of(bus), nodes=named))  # type: ignore[arg-type]
+
+        return Call("broadcast", send, wants)
 
     def two(self) -> Call:
         """Two callers at the same time on one bus, each with one device of it."""

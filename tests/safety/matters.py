@@ -15,7 +15,7 @@ import motorbus
 from motorbus.core.request import Effect, Request
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import action_all, sync_write, sync_write_positions, wire
-from motorbus.families.kst import broadcast_position, settings_of
+from motorbus.families.kst import broadcast_write, settings_of
 from motorbus.motion.safety.lease import Lease
 from motorbus.session.robot import Robot
 from motorbus.simulation.named import Simulation
@@ -97,8 +97,8 @@ class Matters(Courses):
             return [
                 *common,
                 lambda: device.move(goal, wait=False),
-                lambda: bus.run(broadcast_position(goal, [other.node], settings_of(bus))),
-                lambda: bus.run(broadcast_position(goal, _pair(spot), settings_of(bus))),
+                lambda: _broadcast(bus, goal, [other.node]),
+                lambda: _broadcast(bus, goal, _pair(spot)),
             ]
         return [
             *common,
@@ -258,6 +258,10 @@ class Matters(Courses):
             {("arm", node): nan},
             barred=[("arm", node)],
         )
+
+
+def _broadcast(bus: Any, goal: Any, nodes: list[int]) -> object:
+    return bus.run(broadcast_write("goal_position", goal, settings_of(bus), nodes=nodes))
 
 
 def _pair(spot: Spot) -> list[int]:

@@ -78,7 +78,7 @@ FACES: dict[str, Callable[[Robot], object]] = {
     ),
     "action all": lambda robot: _on(robot, "arm", feetech.action_all([robot["a1"].device])),
     "broadcast": lambda robot: _on(
-        robot, "can", kst.broadcast_position(0.1, [robot["c1"].device], kst.BusSettings())
+        robot, "can", kst.broadcast_write("goal_position", 0.1, kst.BusSettings(), nodes=[robot["c1"].device])
     ),
     "start project": lambda robot: robot["lift"].device.start_project(1),
     "stepper jog": lambda robot: robot["lift"].device.jog_forward(0.2),

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import Health, State
 from motorbus.core.request import Data
 from motorbus.errors import Faulted, Refused, RequestError
@@ -212,24 +213,28 @@ def test_torque_that_comes_back_with_the_next_goal_hides_no_restart(comes_back: 
         assert bool(sim[1].memory["torque_enable"]) is (comes_back == "yes")
 
 
-def test_a_kst_servo_that_says_that_it_starts_is_at_fault_and_one_that_says_nothing_is_not_known_to_be() -> (
-    None
-):
-    for says in (True, False):
-        options = {"can": {"boot_notice": says}}
-        with machine(can="0x25,0x26", options=options) as (made, sims), Robot.of(made) as robot:
-            sim, bus = sims["can"], robot.buses["can"]
-            line = sim.line = At(bus.link.now() + 0.5, sim[0x26].power_cycle)
-            if not says:
-                robot.move(
-                    {"c1": 0.4, "c2": 0.4}, duration=2.0
-                )  # it obeys the next goal as if nothing had been
-                assert robot.faults == {}
-                continue
-            with pytest.raises(Faulted, match="c2 is at fault: can#0x26 has restarted"):
-                robot.move({"c1": 0.4, "c2": 0.4}, duration=2.0)
-            assert bus.link.now() - line.moment < 2 * HEALTH
-            assert set(robot.faults) == {"c2"}
+class Boots(At):
+    """A wire on which servo 0x26 sends a boot message (CiA 301) after what happens."""
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        before, found = self._happens, super().carry(sender, data, at)
+        boot = Delivery(at, Side.HOST, CanFrame(0x726, b"\0"))
+        return [*found, boot] if before and not self._happens else found
+
+
+@pytest.mark.parametrize("line", [At, Boots])
+def test_a_kst_servo_is_at_fault_when_it_says_that_it_starts(line: type[At]) -> None:
+    with machine(can="0x25,0x26") as (made, sims), Robot.of(made) as robot:
+        sim, bus = sims["can"], robot.buses["can"]
+        wire = sim.line = line(bus.link.now() + 0.5, sim[0x26].power_cycle)
+        if line is At:
+            robot.move({"c1": 0.4, "c2": 0.4}, duration=2.0)  # it obeys the next goal as if nothing had been
+            assert robot.faults == {}
+            return
+        with pytest.raises(Faulted, match="c2 is at fault: can#0x26 has restarted"):
+            robot.move({"c1": 0.4, "c2": 0.4}, duration=2.0)
+        assert bus.link.now() - wire.moment < 2 * HEALTH
+        assert set(robot.faults) == {"c2"}
 
 
 def test_torque_that_goes_while_nothing_moves_is_noted_when_somebody_looks() -> None:

@@ -9,12 +9,11 @@ from math import inf
 from struct import Struct
 from typing import Any, Final, TypeVar
 
+from motorbus.core import move as core
 from motorbus.core.access import readable_rows, writable_values
-from motorbus.core.arrival import wait_in_position
 from motorbus.core.family import AxisDriver, Explanation, Health, Identity, Receiver, State, Stop
 from motorbus.core.framing import FrameReceiver
 from motorbus.core.half_duplex import HalfDuplexSerial
-from motorbus.core.interrupted import Moving, stopped_if_interrupted
 from motorbus.core.register import Register, Storage, Value
 from motorbus.core.request import Effect, Expected, Precondition, Priority, Request, Response, TimeoutClass
 from motorbus.core.setpoint import Setpoint
@@ -228,25 +227,29 @@ async def enable_torque(node: Node) -> None:
     await write_row(node, TABLE["torque_enable"], 1)
 
 
+class Move(core.MoveLogic[Node]):
+    """How these servos move, see `core.move`."""
+
+    async def check(self, node: Node, to: float) -> Setpoint:
+        (setpoint,) = goal(node, to, await limits(node)).setpoints
+        return setpoint
+
+    def send(self, node: Node, goal: Setpoint) -> Request[None]:
+        return write_row(node, GOAL, GOAL.to_raw(goal.value), setpoints=(goal,))
+
+    def sample(self, node: Node) -> Request[State]:
+        return telemetry(node)
+
+    def stop(self, node: Node) -> Request[Promise]:
+        return stop(node)
+
+
 async def move(node: Node, to: float, *, wait: bool = True) -> None:
     """Move to `to` rad; return in position, or at once with `wait=False`. An interrupt of the wait stops the servo.
 
     Raises LimitExceeded for a goal outside the limits, Stalled when the servo stops elsewhere.
     """
-    send = goal(node, to, await limits(node))
-
-    async def send_and_wait() -> None:
-        await send
-        await wait_in_position(
-            lambda: telemetry(node), to, node=node.node, tolerance=0.01, timeout=lambda way: 5.0 + 2.0 * way
-        )
-
-    if wait:
-        device = Moving(node, partial(stop, node), partial(position, node))
-        await stopped_if_interrupted(send_and_wait(), device)
-    else:
-        node.last_move = None  # an earlier move that is interrupted does not stop this one
-        await send
+    await core.move(Move(), {node: to}, wait=wait)
 
 
 async def open_stream(nodes: Sequence[Node], *, rate: int) -> PositionStream[Node]:

@@ -99,7 +99,8 @@ class SyncTable:
     def mark_owed(self, lane: int, due: Expected, quiet_until: float) -> None:
         """This reply did not come in time, or was sent twice: it may still come."""
         node = self._fire(due.node, "missed")
-        node.owed[lane, due.key, due.length] = None
+        for key in (due.key, *due.refusals):
+            node.owed[lane, key, due.length] = None
         if due.refusal:
             node.owed[lane, due.key, due.refusal] = None
         node.quiet_until = quiet_until

@@ -16,7 +16,7 @@ from importlib import import_module
 from math import inf
 from typing import Any, NamedTuple, Protocol
 
-from motorbus.core.recording import RecordingReceiver
+from motorbus.core.recording import ABSENT, RecordingReceiver
 from motorbus.core.register import RegisterMap
 from motorbus.core.request import Data, Event, Request, Response
 from motorbus.core.steps import Procedure, Runnable
@@ -175,6 +175,9 @@ class Explanation(NamedTuple):
     title: str
     parts: tuple[Part, ...]
     fault: str = ""
+    kind: str = ""  # of a CAN frame, with `node` and `code`: see `core.recording.RecordedFrame`; "" for noise
+    node: int = ABSENT
+    code: int = ABSENT
 
 
 class Receiver(Protocol):
@@ -388,7 +391,8 @@ class Family:
     """driver(family, **settings) makes the driver of a bus. Raises RequestError for a bad setting."""
     # Names of modules that are imported on first use.
     simulator_module: str  # has `simulate(ids, model, **options)`, and `OPTIONS` if it has options
-    recording_module: str = ""  # has `Recording(direction)`; "": the receiver of the bus decodes recordings
+    recording_module: str = ""
+    """Has `Recording(direction)`. "": the bus driver decodes recordings, frames by `decode`, bytes by its receiver."""
     cli: str = ""  # has the shell commands of this family
 
     def open(self, **settings: object) -> BusDriver:

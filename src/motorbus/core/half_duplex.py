@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, ClassVar, Final
 
 from motorbus.core.family import BusDriver, Family, Found
 from motorbus.core.request import ANY, Request, TimeoutClass
-from motorbus.core.scan import BitrateRestored, set_or_skip
+from motorbus.core.scan import scan_rates
 from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate
 from motorbus.errors import DeviceError, NoReply, WireError
 
@@ -65,16 +66,8 @@ class HalfDuplexSerial(BusDriver):
         """Ping each id, a silent one twice; see `BusDriver.scan`. A rate that the adapter lacks is `Skipped`."""
         nodes = ids or tuple(self.ids)
         if rates:
-            return await Exclusive(self._scan_rates(nodes, rates))
+            return await Exclusive(scan_rates(rates, partial(self._scan_ids, nodes)))
         return await self._scan_ids(nodes, await SetBitrate(0))
-
-    async def _scan_rates(self, ids: tuple[int, ...], rates: tuple[int, ...]) -> list[Found]:
-        found = []
-        async with BitrateRestored():
-            for rate in rates:
-                if await set_or_skip(rate):
-                    found += await self._scan_ids(ids, rate)
-        return found
 
     async def _scan_ids(self, ids: tuple[int, ...], rate: int) -> list[Found]:
         found: dict[int, Found] = {}

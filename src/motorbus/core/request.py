@@ -55,10 +55,13 @@ class Expected(NamedTuple):
     key: Key
     length: int
     refusal: int = 0  # length of a refusal where that differs; 0: none, as for a probe
+    refusals: tuple[Key, ...] = ()  # keys of a refusal of the same length, where those differ
 
     def accepts(self, key: Key, size: int) -> bool:
         """A reply with this key and number of bytes is this one."""
-        return key == self.key and (size == self.length or 0 < size == self.refusal)
+        if key == self.key:
+            return size == self.length or 0 < size == self.refusal
+        return size == self.length and key in self.refusals
 
 
 class Any_(Enum):  # noqa: N801 - typing.Any is taken

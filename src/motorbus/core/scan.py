@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
-from motorbus.core.steps import Emit, Guard, SetBitrate
+from motorbus.core.family import Found
+from motorbus.core.steps import Emit, Guard, Procedure, SetBitrate
 from motorbus.errors import LinkError, LinkLost
 
 
@@ -37,3 +39,13 @@ async def set_or_skip(rate: int) -> bool:
         await Emit(Skipped(rate, error.summary))
         return False
     return True
+
+
+async def scan_rates(rates: Iterable[int], scan_at: Callable[[int], Procedure[list[Found]]]) -> list[Found]:
+    """What `scan_at` finds at each of these bit rates; the present one is restored. Reserve the bus."""
+    found = []
+    async with BitrateRestored():
+        for rate in rates:
+            if await set_or_skip(rate):
+                found += await scan_at(rate)
+    return found

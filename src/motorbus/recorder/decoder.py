@@ -166,28 +166,45 @@ def _receiver(family: Family, direction: str) -> RecordingReceiver:
         raise RequestError(
             f"there is no direction {direction!r}", expected='"rx" from the devices, "tx" to them, "" both'
         )
-    return family.recording(direction) or _BusReceiver(family)
+    receiver = _FrameReceiver if family.link.kind == "frames" else _BusReceiver
+    return family.recording(direction) or receiver(family)
+
+
+class _FrameReceiver:
+    """CAN frames, each explained by itself: its identifier gives the direction."""
+
+    def __init__(self, family: Family) -> None:
+        self._driver = family.open()
+        self.code_meaning: str = getattr(self._driver, "code_meaning", "")
+
+    def feed(self, data: Data) -> list[RecordedEvent]:
+        assert isinstance(data, CanFrame)
+        (one,) = self._driver.decode(data.flat())
+        if not one.kind:
+            return [Noise(one.data, "foreign")]
+        return [RecordedFrame(one.data, one.kind, one.node, one.code)]
+
+    def flush(self) -> list[RecordedEvent]:
+        return []
 
 
 class _BusReceiver:
-    """The receiver of a bus: replies and notices only. A reply has a node where each node has its own lane."""
+    """The receiver of a serial bus: replies and notices only."""
 
     code_meaning = ""
 
     def __init__(self, family: Family) -> None:
         self._receiver = family.open().receiver()
-        self._frames = family.link.kind == "frames"
 
     def feed(self, data: Data) -> list[RecordedEvent]:
-        return [self._recorded(event, data) for event in self._receiver.feed(data)]
+        return [self._recorded(event) for event in self._receiver.feed(data)]
 
     def flush(self) -> list[RecordedEvent]:
-        return [self._recorded(event, b"") for event in self._receiver.flush()]
+        return [self._recorded(event) for event in self._receiver.flush()]
 
-    def _recorded(self, event: Event, data: Data) -> RecordedEvent:
-        whole = data.flat() if isinstance(data, CanFrame) else event.data
+    def _recorded(self, event: Event) -> RecordedEvent:
         if isinstance(event, Noise):
-            return Noise(whole, event.fault)
+            return Noise(event.data, event.fault)
         if isinstance(event, Notification):
-            return RecordedFrame(whole, "notice", event.node, ABSENT)
-        return RecordedFrame(whole, "reply", event.lane if self._frames else ABSENT, ABSENT)
+            return RecordedFrame(event.data, "notice", event.node, ABSENT)
+        return RecordedFrame(event.data, "reply", ABSENT, ABSENT)

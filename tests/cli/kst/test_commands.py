@@ -11,35 +11,32 @@ from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Run
 
 
-def test_provision_reports_each_step_and_verifies_after_the_power_cycle(run: Run) -> None:
+def test_set_id_verifies_after_the_power_cycle(run: Run) -> None:
     with motorbus.simulate("kst", ids="0x25+0x26", faults="at 9 s: power-cycle 37") as servos:
-        ran = run("kst", "provision", f"{servos.url}#0x25", "--new-id", "0x27", "--yes", "--json")
+        ran = run("set-id", f"{servos.url}#0x25", "0x27", "--yes")
         assert ran.code == 0, ran.err
-        assert {one["schema"] for one in ran.records} == {"motorbus.kst.provision/1"}
-        events = [one for one in ran.records if one["event"] != "progress"]
-        assert [one["event"] for one in events] == ["power-cycle", "provisioned"]
-        assert (events[-1]["id"], events[-1]["from"], events[-1]["resumed"]) == (39, 37, False)
         assert "switch the supply of this servo off and on again now" in ran.err
         assert [one["id"] for one in run("scan", servos.url, "--json").document["devices"]] == [38, 39]
 
 
-def test_provision_resumes_after_a_timeout(servos: Simulation, run: Run) -> None:
-    words = ["kst", "provision", f"{servos.url}#37", "--new-id", "39", "--yes", "--timeout", "1s"]
-    ran = run(*words)
-    assert ran.code == 1
-    assert "did not come back within 1 s" in ran.err
-    servos[37].power_cycle()
-    ran = run(*words)
-    assert ran.code == 0, ran.err
-    assert "#39 (0x27) had these values already: it answers at 500000 bit/s" in ran.out
+def test_set_baud_resumes_after_a_timeout(run: Run) -> None:
+    with motorbus.simulate("kst", ids="0x25") as servos:
+        words = ["set-baud", f"{servos.url}#37", "1000000", "--yes", "--timeout", "1s"]
+        ran = run(*words)
+        assert ran.code == 1
+        assert "did not come back within 1 s" in ran.err
+        servos[37].power_cycle()
+        ran = run(*words)
+        assert ran.code == 0, ran.err
+        assert servos[37].bit_rate == 1_000_000
 
 
 def test_limits_are_saved_and_bound_the_next_move(newer: Simulation, run: Run) -> None:
     device = f"{newer.url}#37"
-    assert run("kst", "limits", device, "-45deg", "30deg", "--yes").code == 0
+    assert run("write", device, "negative_limit=-45deg", "positive_limit=30deg", "--yes").code == 0
     newer[37].power_cycle()
-    document = run("kst", "limits", device, "--json").document
-    assert (document["low"], document["high"]) == pytest.approx((radians(-45), radians(30)))
+    rows = run("read", device, "negative_limit", "positive_limit", "--json").document["registers"]
+    assert [row["value"] for row in rows] == pytest.approx([radians(-45), radians(30)])
     assert run("move", f"{device}=40deg").code == 8
 
 
@@ -66,10 +63,6 @@ def test_mid_point_sets_the_zero_here(newer: Simulation, run: Run) -> None:
     ("words", "frames"),
     [
         ("move BUS=90deg", ["625#2203600084030000"]),
-        (
-            "kst provision BUS --new-id 39 --new-bitrate 1M",
-            ["625#2200300027000000", "625#2201300007000000", "625#2210100173617665"],
-        ),
         ("move BUS=40deg --profile xqpower", ["000#0125", "625#22036000D0020000"]),
     ],
 )

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Self, TypeVar
 
-from motorbus.core.can_frame import ERROR_FLAG, CanFrame
 from motorbus.core.request import Data
-from motorbus.errors import LinkError
 from motorbus.families.kst import FAMILY, PowerCycleNeeded, Servo, settings_of
 from motorbus.families.kst.simulator import KstBus
 from motorbus.families.kst.simulator import Servo as SimulatedServo
@@ -36,23 +34,6 @@ class Answers(PerfectLine):
         return [Delivery(at + 0.0001, Side.HOST, frame(one)) for one in text.split()]
 
 
-class NoErrorFrames(PerfectLine):
-    """An adapter that reports no bus errors, as most slcan adapters."""
-
-    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
-        is_error = isinstance(data, CanFrame) and data.id & ERROR_FLAG
-        return [] if is_error else super().carry(sender, data, at)
-
-
-class NoListening(MemoryLink):
-    """An adapter without a listen-only mode."""
-
-    def tune(self, rate: int, listen_only: bool = False) -> None:
-        if listen_only:
-            raise LinkError("this adapter has no listen-only mode")
-        super().tune(rate, listen_only)
-
-
 class Bench:
     """A bus on simulated servos, by default one with id 5. `on` is called with each event of the bus."""
 
@@ -61,6 +42,7 @@ class Bench:
         *ids: int,
         settings: Mapping[str, object] | None = None,
         link: type[MemoryLink] = MemoryLink,
+        position: int = 0,
         line: Line | None = None,
         profile: str = "kst",
         **options: object,
@@ -68,6 +50,8 @@ class Bench:
         simulator = FAMILY.simulator(ids or (5,), profile, **options)
         assert isinstance(simulator, KstBus)
         self.simulator = simulator
+        for servo in simulator.servos:
+            servo.raw_position = servo.values["goal_position"] = position
         self.link: Any = link(simulator, rate=500_000, line=line)
         self.events: list[object] = []
         self.on: Callable[[object], object] = lambda event: None

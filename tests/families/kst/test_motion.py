@@ -8,10 +8,15 @@ from math import radians
 import pytest
 
 from motorbus.core.family import Identity
-from motorbus.errors import LimitExceeded, MotionError, Stalled
-from motorbus.families.kst import FAMILY, Promise, Started
+from motorbus.core.move import move
+from motorbus.core.request import Notification
+from motorbus.errors import DeviceError, LimitExceeded, MotionError, OutcomeUnknown, Stalled
+from motorbus.families.kst import FAMILY, Promise
+from motorbus.families.kst.driver.motion import MOVE
+from motorbus.families.kst.driver.node import Node
+from motorbus.families.kst.notifications import LOW_VOLTAGE
+from motorbus.link.base import PerfectLine
 from tests.families.kst.bench import Answers, Bench, abort
-from tests.simulators.kst.host import frame
 
 POSITION = "605#4002600000000000"
 LIMITS = ["605#400A300000000000", "605#400B300000000000"]
@@ -25,26 +30,25 @@ def position(raw: int) -> str:
 def test_move_is_one_target_or_a_start_and_a_target() -> None:
     with Bench() as bench:
         bench.servo().move(0.2, wait=False)
-        assert (bench.sent(), bench.of(Started)) == (["605#2203600073000000"], [])
+        assert bench.sent() == ["605#2203600073000000"]
         bench.servo().move(0.2)
         assert bench.servo().position() == pytest.approx(0.2, abs=0.02)
     with Bench(profile="xqpower") as bench:
         bench.servo().move(0.2, wait=False)
         assert bench.sent() == ["000#0105", "605#22036000CE000000"]
-        assert bench.of(Started) == [Started(5, frame("000#0105"))]
 
 
 def test_move_outside_the_travel_limits_of_the_servo_is_refused() -> None:
     with Bench(profile="kst-ext") as bench:
         servo = bench.servo()
-        servo.set_travel_limits(-0.2, 0.1)
+        servo.write(negative_limit=-0.2, positive_limit=0.1)
         bench.sent()
         with pytest.raises(LimitExceeded):
             servo.move(0.15)
         assert bench.sent() == LIMITS
         servo.move(0.05, wait=False)
         assert bench.sent() == ["605#220360001D000000"], "the limits are known"
-        servo.set_travel_limits(-0.2, 0.2)
+        servo.write(positive_limit=0.2)
         servo.move(0.15, wait=False)
 
 
@@ -83,8 +87,7 @@ def test_stall_names_the_start_rule_and_alarms() -> None:
         with pytest.raises(Stalled, match="off its goal") as raised:
             bench.servo().move(0.5)
         assert "profile=xqpower" in raised.value.advice
-        bench[5].voltage = 3.0
-        bench.link.advance(0.01)
+        bench.settings.state.note(Notification(5, "alarm", LOW_VOLTAGE))
         with pytest.raises(Stalled, match="low voltage"):
             bench.servo().move(0.5)
 
@@ -108,12 +111,26 @@ def test_estop_holds_each_known_servo_also_outside_the_range() -> None:
         assert [bench[node].memory["goal_position"] for node in (5, 6)] == [300, 900]
 
 
-@pytest.mark.parametrize("has_notice", [False, True])
-def test_health_is_one_read_and_counts_boot_messages(has_notice: bool) -> None:
-    for profile, request in (("kst", POSITION), ("kst-ext", "605#4005600000000000")):
-        with Bench(profile=profile, boot_notice=has_notice) as bench:
-            health, servo = FAMILY.open().axis(Identity(5, "", "", profile)).health, bench.servo()
-            assert bench.bus.run(health(servo)).restarts == 0
-            assert bench.sent() == [request]
-            bench[5].power_cycle()
-            assert bench.bus.run(health(servo)).restarts == int(has_notice)
+@pytest.mark.parametrize(("profile", "request_"), [("kst", POSITION), ("kst-ext", "605#4005600000000000")])
+def test_health_is_one_read_and_counts_boot_messages(profile: str, request_: str) -> None:
+    line = Answers({request_: [abort(0, 0), f"705#00 {abort(0, 0)}"]})
+    with Bench(profile=profile) as bench:
+        health, servo = FAMILY.open().axis(Identity(5, "", "", profile)).health, bench.servo()
+        assert bench.bus.run(health(servo)).restarts == 0
+        assert bench.sent() == [request_]
+        bench.link.line = line
+        for _ in range(2):
+            with pytest.raises(DeviceError):
+                bench.bus.run(health(servo))
+        bench.link.line = PerfectLine()
+        assert bench.bus.run(health(servo)).restarts == 1
+
+
+def test_one_servo_that_takes_no_target_stops_the_others() -> None:
+    with Bench(5, 6) as bench:
+        bench[6].raw_position = 100
+        bench[5].unplug()
+        goals: dict[Node, float] = {bench.servo(6): -0.5, bench.servo(5): 0.5}
+        with pytest.raises(OutcomeUnknown):
+            bench.bus.run(move(MOVE, goals))
+        assert -286 < bench[6].memory["goal_position"] < 100

@@ -11,7 +11,6 @@ from motorbus.errors import DeviceError, NoReply, RequestError, UnexpectedReply,
 from tests.families.kst.bench import Answers, Bench, abort
 
 ID, POSITION = "605#4000300000000000", "605#4002600000000000"
-RATE = "605#4001300000000000"
 FIRMWARE, SOFTWARE = "605#400A100000000000", "605#400B100000000000"
 SET_ID_9 = "605#2200300009000000"
 ABSENT, HARDWARE = 0x0602_0000, 0x0606_0000
@@ -19,9 +18,9 @@ HALF_PI = round(pi / 2, 6)
 
 
 def test_identify_takes_profile_version_and_id() -> None:
-    with Bench(firmware="1.23") as bench:
+    with Bench() as bench:
         identity = bench.servo().identify()
-        assert (identity.node, identity.table, identity.firmware) == (5, "kst", "1.23")
+        assert (identity.node, identity.table, identity.firmware) == (5, "kst", "V1.2")
         assert identity.details == {"profile": "kst", "id_format": "std", "reads_back_id": 5}
     refused = {ID: abort(0x3000, ABSENT), FIRMWARE: abort(0x100A, 0x0800_0000)}
     with Bench(line=Answers(refused)) as bench:
@@ -40,12 +39,6 @@ def test_identify_takes_profile_version_and_id() -> None:
         ("version", {FIRMWARE: abort(0x100A, ABSENT), SOFTWARE: "585#430B100056310000"}, "V1"),
         ("version", {FIRMWARE: abort(0x100A, ABSENT), SOFTWARE: abort(0x100B, ABSENT)}, DeviceError),
         ("version", {FIRMWARE: abort(0x100A, HARDWARE)}, DeviceError),
-        ("bit_rate", {RATE: "585#4F01300005000000"}, 500_000),
-        ("bit_rate", {RATE: "585#4F01300009000000"}, None),
-        ("bit_rate", {RATE: abort(0x3001, ABSENT)}, None),
-        ("bit_rate", {RATE: ""}, None),
-        ("bit_rate", {RATE: "", ID: ""}, NoReply),
-        ("bit_rate", {RATE: abort(0x3001, HARDWARE)}, DeviceError),
         ("position", {POSITION: "585#4B02600084030000"}, HALF_PI),
         ("position", {POSITION: "585#4202600084030000"}, HALF_PI),
         ("position", {POSITION: "585#4302600084030000"}, HALF_PI),
@@ -68,18 +61,18 @@ def test_reply_is_a_value_or_an_error(method: str, answers: dict[str, str], expe
 
 
 def test_a_version_in_segments_is_not_read() -> None:
-    with Bench(firmware="1.00 of today") as bench:
+    with Bench(line=Answers({FIRMWARE: "585#410A10000E000000"})) as bench:
         with pytest.raises(UnexpectedReply, match="sends firmware_version in segments"):
             bench.servo().version()
         assert bench.servo().identify().firmware == "unknown"
 
 
 def test_servo_that_needs_lengths_is_written_with_sized() -> None:
-    with Bench(accept_unsized=False) as bench:
+    with Bench(sized="yes") as bench:
         with pytest.raises(DeviceError, match="refused goal_position") as raised:
             bench.servo().move(0.1)
         assert "sized=yes" in raised.value.advice
-    with Bench(accept_unsized=False, settings={"sized": "yes"}) as bench:
+    with Bench(sized="yes", settings={"sized": "yes"}) as bench:
         bench.servo().move(0.1)
         assert "605#2B03600039000000" in bench.sent()
 

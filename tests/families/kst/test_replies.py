@@ -47,7 +47,9 @@ class FalseReplies(PerfectLine):
 def test_read_returns_the_value_of_its_own_request(probability: float, rounds: Rounds) -> None:
     """The servo stands elsewhere before each read, and reports its position on the identifier of its replies."""
     line = FalseReplies(probability)
-    with Bench(profile="kst-ext", line=line, reports_ms=5.0) as bench:
+    with Bench(profile="kst-ext", line=line) as bench:
+        bench.servo().write(report_interval=0.005)
+        bench.servo().set_reports(True)
         servo, total, failed = bench.servo(), rounds(100_000, 1_000), 0
         for count in range(total):
             bench[5].raw_position = raw = count * 719 % 1800 - 900

@@ -7,12 +7,13 @@ from collections.abc import Sequence
 import pytest
 
 from motorbus.core.family import Found
+from motorbus.core.scan import Skipped
 from motorbus.core.steps import Progress
 from motorbus.errors import LinkError, LinkLost, RequestError
-from motorbus.families.kst import ScanWarning, Skipped, scan
+from motorbus.families.kst import ScanWarning, scan
 from motorbus.families.kst.profiles import RATES
 from motorbus.link.memory import MemoryLink
-from tests.families.kst.bench import Bench, NoErrorFrames, NoListening
+from tests.families.kst.bench import Bench
 
 ALL = "600#4000300000000000"
 
@@ -27,11 +28,11 @@ def test_scan_sends_one_broadcast_and_reads_silent_ids_twice() -> None:
         found = [(1, 500_000), (37, 500_000), (127, 500_000)]
         assert run_scan(bench) == found
         frames = bench.sent()
-        assert (frames[0], len(frames)) == (ALL, 1 + 2 * 124 + 3 * 3)
+        assert (frames[0], len(frames)) == (ALL, 1 + 2 * 124 + 3 * 8)
         assert bench.events[:3] == [Found(*one, None) for one in found]
         progress = [event.done for event in bench.of(Progress)]
         assert progress == sorted(progress)
-        assert bench.link.now() < 0.5
+        assert bench.link.now() < 1.0
         assert run_scan(bench, (37, 38)) == [(37, 500_000)]
         assert ALL not in bench.sent()
         for ids, rates in (((0,), ()), ((5,), (9600,))):
@@ -51,12 +52,17 @@ def test_scan_reports_an_id_that_needs_a_restart(ids: tuple[int, ...]) -> None:
         assert "reads back the id 9" in warning.what
 
 
-def test_scan_warns_of_duplicates_without_bus_errors() -> None:
-    with Bench(5, 5, 6, line=NoErrorFrames()) as bench:
-        bench.simulator.servos[1].raw_position = 3
+@pytest.mark.parametrize(
+    ("ids", "duplicate", "evidence"),
+    [((5, 5, 6), "", "no read of its position"), ((5, 6), "5", "2 answers to one request")],
+)
+def test_scan_warns_of_two_servos_with_one_id(ids: tuple[int, ...], duplicate: str, evidence: str) -> None:
+    with Bench(*ids, duplicate=duplicate) as bench:
+        bench[5].raw_position = 3
         assert run_scan(bench) == [(5, 500_000), (6, 500_000)]
         (warning,) = bench.of(ScanWarning)
-        assert "never of its position" in warning.what
+        assert warning.node == 5
+        assert evidence in warning.what
 
 
 @pytest.mark.parametrize(("sent", "accepted"), [("std", "ext"), ("ext", "std")])
@@ -65,16 +71,6 @@ def test_scan_without_a_reply_names_the_other_id_format(sent: str, accepted: str
         assert run_scan(bench) == []
         (warning,) = bench.of(ScanWarning)
         assert "id_format=ext" in warning.what
-
-
-def test_scan_of_a_silent_bus_loses_one_frame_at_each_named_rate() -> None:
-    with Bench(bit_rate=250_000) as bench:
-        wrong = [rate for rate in RATES if rate not in (250_000, 500_000)]
-        assert run_scan(bench, (5,), (*wrong, 250_000)) == [(5, 250_000)]
-        assert [one[:2] for one in bench.of(ScanWarning)] == [(0, rate) for rate in wrong]
-        assert bench[5].status()["errors"] == len(wrong)
-    with Bench(bit_rate=250_000, link=NoListening) as bench:
-        assert run_scan(bench, (5,), (125_000, 250_000)) == [(5, 250_000)]
 
 
 class Without800k(MemoryLink):
@@ -90,13 +86,6 @@ def test_rate_that_the_adapter_lacks_is_skipped() -> None:
     with Bench(link=Without800k) as bench:
         assert run_scan(bench, (5,), (800_000, 500_000)) == [(5, 500_000)]
         assert bench.of(Skipped) == [Skipped(800_000, "this adapter has no such rate")]
-
-
-def test_nothing_is_sent_at_a_rate_with_errors() -> None:
-    with Bench(bit_rate=1_000_000, reports_ms=100, profile="kst-ext") as bench:
-        assert run_scan(bench, (5,), (250_000,)) == []
-        assert bench.sent() == []
-        assert [one.rate for one in bench.of(Skipped)] == [250_000]
 
 
 def test_a_lost_adapter_ends_a_scan() -> None:

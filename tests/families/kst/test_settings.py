@@ -17,15 +17,16 @@ READ = "605#400A300000000000"
 ACK, NEW, OLD = "585#600A300000000000", "585#4B0A30000CFE0000", "585#4B0A300018FC0000"
 
 
-def test_reports_begin_and_end_by_start_and_stop() -> None:
+def test_reports_begin_and_end() -> None:
     with Bench(profile="kst-ext") as bench:
         servo = bench.servo()
-        servo.start_reports(0.01)
+        servo.write(report_interval=0.01)
+        servo.set_reports(True)
         notices = bench.bus.notices.subscribe()
         bench.link.advance(0.1)
         assert servo.ping()
         assert 9 <= len([notice for notice in notices if notice.kind == "report"]) <= 11
-        servo.stop_reports()
+        servo.set_reports(False)
         bench.link.advance(0.1)
         assert servo.ping()
         assert not [notice for notice in notices if notice.kind == "report"]
@@ -37,33 +38,29 @@ def test_reports_begin_and_end_by_start_and_stop() -> None:
 @pytest.mark.parametrize(("form", "start"), [("vendor", "005#0100"), ("standard", "000#0105")])
 def test_start_form_is_a_setting(form: str, start: str) -> None:
     with Bench(profile="kst-ext", settings={"nmt": form}) as bench:
-        bench.servo().start_reports()
+        bench.servo().set_reports(True)
         assert bench.sent() == [start]
     with Bench(profile="kst-ext", settings={"nmt": "none"}) as bench:
         with pytest.raises(RequestError, match="no form of start"):
-            bench.servo().stop_reports()
+            bench.servo().set_reports(False)
         assert bench.sent() == []
 
 
 SETTINGS: dict[str, tuple[Callable[[Servo], object], dict[str, int]]] = {
-    "limits": (lambda servo: servo.set_travel_limits(-0.5, 0.25), {"negative_limit": -286}),
-    "limits by name": (lambda servo: servo.write(positive_limit=0.75), {"positive_limit": 430}),
+    "limits": (lambda servo: servo.write(negative_limit=-0.5, positive_limit=0.75), {"positive_limit": 430}),
     "reverse bit": (lambda servo: servo.set_reversed(True), {"function_enable": 0x53 | 0x20}),
     "mid point": (lambda servo: servo.set_mid_point(), {"present_position": 0}),
 }
 
 
 @pytest.mark.parametrize("name", SETTINGS)
-def test_setting_survives_power_off_and_is_not_written_again(name: str) -> None:
+def test_setting_survives_power_off(name: str) -> None:
     call, expected = SETTINGS[name]
     with Bench(profile="kst-ext") as bench:
         bench[5].values["function_enable"] = 0x53
         bench[5].raw_position = 600
-        servo = bench.servo()
-        call(servo)
+        call(bench.servo())
         assert bench.written().count(SAVE) == 1
-        call(servo)
-        assert bench.written() == []
         call(bench.servo())
         assert bench.written()[-1] == SAVE, "another program may have written it without a save"
         bench[5].power_cycle()
@@ -84,13 +81,11 @@ def test_latched_stop_refuses_settings_that_may_move_the_servo() -> None:
 def test_settings_read_as_they_were_written() -> None:
     with Bench(profile="kst-ext") as bench:
         servo = bench.servo()
-        servo.set_travel_limits(-0.5, 0.5)
-        assert [round(limit, 3) for limit in servo.travel_limits()] == [-0.499, 0.499]
         servo.set_reversed(True)
         assert servo.reversed() is True
         with pytest.raises(VerificationFailed) as raised:
-            servo.set_travel_limits(-0.5, 0.25)
-        assert "set_reversed(False) first" in raised.value.cause
+            servo.write(negative_limit=-0.5, positive_limit=0.25)
+        assert "set_reversed(False) first" in raised.value.advice
 
 
 def test_xqpower_needs_half_a_second_after_a_mid_point() -> None:
@@ -133,5 +128,3 @@ def test_write_that_cannot_be_read_back_is_saved_by_the_next_call() -> None:
         assert bench.written() == [LIMIT[4:]]
         set_limit(servo)
         assert bench.written() == [SAVE]
-        set_limit(servo)
-        assert bench.written() == []

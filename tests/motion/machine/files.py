@@ -210,7 +210,7 @@ UNOPENABLE = (
     Broken(FEETECH, "feetech:sim,startup_time=abc", "bus.arm.address: option startup_time: 'abc'", "a number, 0"),
     Broken(FEETECH, "feetech:sim,faults=at 1 s: power-cycle 9", "bus.arm.address: fault at 1 s: power", "one of 1"),
     Broken(KST, "kst:sim,model=zzz", "bus.gimbal.address: there is no simulated KST profile 'zzz'", "one of kst, "),
-    Broken(KST, "kst:sim,reports_ms=0.01", "bus.gimbal.address: option reports_ms: 0.01 is", "0, or 0.1 and more"),
+    Broken(KST, "kst:sim,flash_cut=half", "bus.gimbal.address: option flash_cut: 'half' is", "one of old, new"),
     Broken(KST, "stepper:sim,ids=2", "bus.gimbal.address: a stepper line has one controller, not 2", "a line for each"),
     # families, ports and channels
     Broken("feetech:/dev", "fetech:/dev", "bus.arm.address: there is no family 'fetech'", "one of feetech, kst"),

@@ -12,7 +12,6 @@ from motorbus.core.request import Effect
 from motorbus.core.units import parse
 from motorbus.errors import RequestError
 from motorbus.families.kst.profiles import (
-    BIT_RATES,
     DEFAULT_NODE,
     DEFAULT_RATE,
     PROFILES,
@@ -108,9 +107,9 @@ def test_rows_have_effect_protection_scale_and_source(profile: Profile) -> None:
 
 def test_bit_rates_and_values_with_names_are_those_of_the_manual() -> None:
     kilobits = [20, 50, 100, 125, 250, 500, 800, 1000]
-    assert dict(BIT_RATES) == {code: rate * 1000 for code, rate in enumerate(kilobits)}
+    assert list(RATES) == [1000 * rate for rate in kilobits]
     assert [bit_rate_code(rate) for rate in RATES] == list(range(8))
-    assert (BIT_RATES[5], DEFAULT_NODE) == (DEFAULT_RATE, 0x25) == (500_000, 37)
+    assert (RATES[5], DEFAULT_NODE) == (DEFAULT_RATE, 0x25) == (500_000, 37)
     for rate in (0, 10_000, 5, True):
         with pytest.raises(RequestError, match="no rate"):
             bit_rate_code(rate)
@@ -123,26 +122,16 @@ def test_bit_rates_and_values_with_names_are_those_of_the_manual() -> None:
 
 def test_profiles_have_the_values_of_their_sources() -> None:
     found = {
-        one.name: (
-            one.vendor,
-            one.counts_per_degree,
-            one.limit,
-            one.current_scale,
-            one.nmt,
-            (one.mid_point_value, one.mid_point_wait, one.flash_wait),
-        )
+        one.name: (one.counts_per_degree, one.limit, one.current_scale, one.nmt, one.mid_point_value)
         for one in PROFILES.values()
     }
     assert found == {
-        "kst": ("KST", 10, 900, 0.01, "none", (0, 0.15, 0.15)),
-        "kst-ext": ("KST", 10, 1000, 0.01, "vendor", (0, 0.15, 0.15)),
-        "kingmax": ("Kingmax", 10, 1000, 0.01, "vendor", (0, 0.15, 0.15)),
-        "xqpower": ("XQPOWER", 18, 800, 0.001, "standard", (1, 0.5, 0.15)),
+        "kst": (10, 900, 0.01, "none", 0),
+        "kst-ext": (10, 1000, 0.01, "vendor", 0),
+        "kingmax": (10, 1000, 0.01, "vendor", 0),
+        "xqpower": (18, 800, 0.001, "standard", 1),
     }
-    for one in PROFILES.values():
-        assert (one.table, one.status_row) == (TABLES[one.name], one.table.at(0x6005, 0))
-        names = ("firmware_version", "software_version")
-        assert list(one.version_rows) == [one.table[name] for name in names if name in one.table]
+    assert {name: one.table for name, one in PROFILES.items()} == TABLES
 
 
 @pytest.mark.parametrize("name", ["kst-ext", "xqpower"])

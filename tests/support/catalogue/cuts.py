@@ -139,7 +139,7 @@ def kst(profile: str, method: str, *arguments: Any, name: str = "", **fields: An
             device.status(),
             device.memory,
             dict(device.values),
-            device.flash.stored(inf),
+            device.stored(inf),
         ),
         guarded=False,
         atomic=True,
@@ -160,24 +160,29 @@ def provisioning() -> Iterator[Command]:
     ]
     for wish in wishes:
         for flash in ("old", "new"):
-            for pending in ("pending", "active"):
-                first = (flash, pending) == ("old", "pending")
-                yield kst(
-                    "kst",
-                    "provision",
-                    name="".join(f"-{key}" for key in (*wish, flash, pending)),
-                    ids=(OLD,) if "new_rate" in wish else (OLD, OTHER),
-                    options={**wish, "timeout": 5.0},
-                    quirks={"flash_cut": flash, "pending_id": pending, "flash_time": 0.05},
-                    react=power_cycle_when_asked,
-                    cuts=0 if first else 8,
-                    pairs=50 if first else 0,
-                )
+            yield kst(
+                "kst",
+                "provision",
+                name="".join(f"-{key}" for key in (*wish, flash)),
+                ids=(OLD,) if "new_rate" in wish else (OLD, OTHER),
+                options={**wish, "timeout": 5.0},
+                quirks={"flash_cut": flash},
+                react=power_cycle_when_asked,
+                cuts=0 if flash == "old" else 8,
+                pairs=50 if flash == "old" else 0,
+            )
 
 
 KST = [
     *provisioning(),
-    kst("kst-ext", "set_travel_limits", -0.5, 0.5, ids=(OLD, OTHER), pairs=50),
+    kst(
+        "kst-ext",
+        "write",
+        options={"negative_limit": -0.5, "positive_limit": 0.5},
+        name="-limits",
+        ids=(OLD, OTHER),
+        pairs=50,
+    ),
     kst("kst-ext", "set_reversed", True, ids=(OLD, OTHER), pairs=50),
 ]
 

@@ -16,13 +16,11 @@ from motorbus.errors import DeviceError, MotorbusError, NoReply
 from motorbus.families.kst import (
     FAMILY,
     Servo,
-    broadcast_bit_rate,
-    broadcast_position,
     broadcast_read,
-    broadcast_save,
+    broadcast_write,
 )
-from motorbus.families.kst.driver.requests import read_register, write_register
-from motorbus.families.kst.profiles import BIT_RATES
+from motorbus.families.kst.driver.requests import read_row, write_row
+from motorbus.families.kst.profiles import RATES, SAVE
 from motorbus.families.kst.simulator import KstBus
 from motorbus.link.base import Line
 from motorbus.link.memory import MemoryLink
@@ -112,12 +110,12 @@ def read_4(rig: KstRig) -> None:
 def refused_read(rig: KstRig) -> None:
     """A refusal is an answer, and never a value."""
     row = changed(rig.servo.table["status"], address=MISSING)
-    _refused(rig, read_register(rig.servo, row, int), NO_OBJECT)
+    _refused(rig, read_row(rig.servo, row, int), NO_OBJECT)
 
 
 def refused_write(rig: KstRig) -> None:
     row = rig.servo.table["present_position"]
-    _refused(rig, write_register(rig.servo, row, 0x0201), READ_ONLY)
+    _refused(rig, write_row(rig.servo, row, 0x0201), READ_ONLY)
 
 
 def _refused(rig: KstRig, operation: Runnable[Any], code: int) -> None:
@@ -161,7 +159,7 @@ def write_4(rig: KstRig) -> None:
     sim.raw_position = 100 + rig.count % 200
     before = sim.raw_position
     try:
-        rig.run(write_register(rig.servo, rig.servo.table["mid_point"], 0))
+        rig.run(write_row(rig.servo, rig.servo.table["mid_point"], 0))
     except MotorbusError:
         assert sim.raw_position in (0, before)
         raise
@@ -170,8 +168,8 @@ def write_4(rig: KstRig) -> None:
 
 def set_bit_rate(rig: KstRig) -> None:
     rig.count += 1
-    code = rig.count % len(BIT_RATES)
-    _written(rig, lambda: rig.servo.set_bit_rate(BIT_RATES[code]), "bit_rate_code", code)
+    code = rig.count % len(RATES)
+    _written(rig, lambda: rig.servo.set_bit_rate(RATES[code]), "bit_rate_code", code)
 
 
 def save(rig: KstRig) -> None:
@@ -182,8 +180,8 @@ def save(rig: KstRig) -> None:
 
 def start_reports(rig: KstRig) -> None:
     """Nobody answers a start or a stop."""
-    rig.servo.start_reports()
-    rig.servo.stop_reports()
+    rig.servo.set_reports(True)
+    rig.servo.set_reports(False)
 
 
 def broadcast_reading(rig: KstRig) -> None:
@@ -198,19 +196,19 @@ def broadcast_move(rig: KstRig) -> None:
     """Who acknowledges has got the target."""
     raw = rig.stir() // 2
     row = rig.servo.table["goal_position"]
-    acknowledged = rig.run(broadcast_position(float(row.to_value(raw)), NODES, rig.settings))
+    acknowledged = rig.run(broadcast_write("goal_position", row.to_value(raw), rig.settings, nodes=NODES))
     assert all(rig.servos[node].values["goal_position"] == raw for node in acknowledged)
 
 
 def broadcast_rate(rig: KstRig) -> None:
     rig.count += 1
-    code = rig.count % len(BIT_RATES)
-    acknowledged = rig.run(broadcast_bit_rate(BIT_RATES[code], rig.settings))
+    code = rig.count % len(RATES)
+    acknowledged = rig.run(broadcast_write("bit_rate_code", code, rig.settings))
     assert all(rig.servos[node].values["bit_rate_code"] == code for node in acknowledged)
 
 
 def broadcast_saving(rig: KstRig) -> None:
-    rig.run(broadcast_save(rig.settings))
+    rig.run(broadcast_write("store", SAVE, rig.settings))
     rig.link.advance(0.5)
 
 
@@ -218,7 +216,7 @@ def stopping(rig: KstRig) -> None:
     """What an emergency stop says to a servo: where are you, and stay there. Success means that this is its target."""
     raw = rig.stir()
     (ask,) = rig.bus.driver.stop({NODE: None}).requests
-    answer: Response = rig.run(ask)
+    answer: Response = rig.run(ask.with_decoder(lambda response: response))
     (hold,) = rig.bus.driver.stop({NODE: answer}).requests
     _written(rig, lambda: rig.run(hold), "goal_position", raw)
 

@@ -9,18 +9,11 @@ from __future__ import annotations
 from typing import Final
 
 from motorbus.core.family import DeviceTypes, Family, LinkSpec, Option
-from motorbus.core.scan import Skipped
-from motorbus.families.kst.driver.broadcast import (
-    broadcast_bit_rate,
-    broadcast_node_id,
-    broadcast_position,
-    broadcast_read,
-    broadcast_save,
-)
+from motorbus.families.kst.driver.broadcast import broadcast_read, broadcast_write
 from motorbus.families.kst.driver.bus import KstDriver
 from motorbus.families.kst.driver.feedback import RawStatus, Status
-from motorbus.families.kst.driver.motion import Promise, Started
-from motorbus.families.kst.driver.node import ID_FORMATS, NMT, SIZED, BusSettings, Node
+from motorbus.families.kst.driver.motion import Promise
+from motorbus.families.kst.driver.node import ID_FORMATS, NMT, SIZED, BusSettings
 from motorbus.families.kst.driver.provisioning import PowerCycleNeeded, Provisioned
 from motorbus.families.kst.driver.scan import ScanWarning, scan
 from motorbus.families.kst.driver.servo import AsyncServo, Servo, settings_of
@@ -31,21 +24,15 @@ __all__ = [
     "AsyncServo",
     "BusSettings",
     "KstDriver",
-    "Node",
     "PowerCycleNeeded",
     "Promise",
     "Provisioned",
     "RawStatus",
     "ScanWarning",
     "Servo",
-    "Skipped",
-    "Started",
     "Status",
-    "broadcast_bit_rate",
-    "broadcast_node_id",
-    "broadcast_position",
     "broadcast_read",
-    "broadcast_save",
+    "broadcast_write",
     "scan",
     "settings_of",
 ]
@@ -64,6 +51,5 @@ FAMILY: Final = Family(
     devices=DeviceTypes(Servo, AsyncServo),
     driver=KstDriver,
     simulator_module="motorbus.families.kst.simulator",
-    recording_module="motorbus.families.kst.recording",
     cli="motorbus.families.kst.cli",
 )

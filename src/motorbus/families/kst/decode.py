@@ -16,48 +16,20 @@ from motorbus.core.register import Register
 from motorbus.core.request import Notification
 from motorbus.families.kst import notifications, profiles, sdo
 from motorbus.families.kst.profiles import KST_EXT, PROFILES, VERSIONS, Profile, version_text
+from motorbus.families.kst.sdo import Sdo
 
 HEAD: Final = 5  # bytes before the data in `CanFrame.flat()`: identifier (4), number of data bytes (1)
-BUS_ERRORS: Final = (
-    "a frame could not be sent in time",
-    "arbitration was lost",
-    "trouble in the controller",
-    "a protocol error",
-    "trouble in the transceiver",
-    "no acknowledgement",
-    "bus off",
-    "a bus error",
-    "the controller was restarted",
-)
-"""Bits of the identifier of an error frame, from bit 0 (SocketCAN)."""
 SHAPES: Final = {"report": ": a position (2) and two zeros", "heartbeat": ": 0, 4, 5 or 127"}
-NMT: Final = {0x80: "be pre-operational", 0x81: "restart", 0x82: "restart communication"}
-"""Commands of network management (CiA 301) besides start and stop."""
-EMERGENCIES: Final = {
-    0x0: "no error",
-    0x1: "generic error",
-    0x2: "current",
-    0x3: "voltage",
-    0x4: "temperature",
-    0x5: "device hardware",
-    0x6: "device software",
-    0x7: "additional modules",
-    0x8: "monitoring",
-    0x9: "external error",
-    0xF: "specific to the device",
+SDO: Final = {
+    ("request", "upload"): ("read (upload)", "read {0}"),
+    ("request", "download"): ("write (download), {0}", "write {0} = {1}"),
+    ("request", "abort"): ("abort", "give up {0}: {1}"),
+    ("reply", "upload"): ("value (upload), {0}", "{0} = {1}"),
+    ("reply", "segments"): ("upload in segments", "{0} comes in segments"),
+    ("reply", "download"): ("written", "{0} is written"),
+    ("reply", "abort"): ("abort", "{0} refused: {1}"),
 }
-"""Upper four bits of the code of an emergency (CiA 301)."""
-ERROR_REGISTER: Final = (
-    "generic",
-    "current",
-    "voltage",
-    "temperature",
-    "communication",
-    "profile",
-    "reserved",
-    "vendor",
-)
-"""Bits of object 0x1001 (CiA 301)."""
+"""Meaning of the specifier (with the stated length), and title (with object and value)."""
 
 
 def decode(data: bytes, profile: Profile = PROFILES["kst"]) -> list[Explanation]:
@@ -76,8 +48,12 @@ def decode(data: bytes, profile: Profile = PROFILES["kst"]) -> list[Explanation]
     return found
 
 
+CODE_MEANING: Final = "of SDO frames specifier, index and sub-index as one number of 32 bits; of others the identifier without the node"
+"""The meaning of `Explanation.code`."""
+
+
 class _Frame:
-    """One frame; `fields`, `row` (of its object) and `fault` are set while it is decoded."""
+    """One frame; `fields`, `row` (of its object), `fault`, `kind`, `node` and `code` are set while it is decoded."""
 
     def __init__(self, flat: bytes, profile: Profile) -> None:
         number = int.from_bytes(flat[:4], "big")
@@ -86,7 +62,8 @@ class _Frame:
         self.profile = profile
         self.fields = Fields(flat)
         self.row: Register | None = None
-        self.fault = ""
+        self.fault = self.kind = ""
+        self.node, self.code = self.frame.id & 0x7F, self.frame.id & ~0x7F
 
     def explain(self) -> Explanation:
         digits, bits = (8, 29) if self.frame.extended else (3, 11)
@@ -97,105 +74,67 @@ class _Frame:
         if self.fault:
             self.fields.take_rest("data", self.fault)
         self.fields.take_reserved()
-        return Explanation(self.flat, title, tuple(self.fields.parts), self.fault)
+        parts = tuple(self.fields.parts)
+        return Explanation(self.flat, title, parts, self.fault, self.kind, self.node, self.code)
 
     def _title(self) -> str:
         """Decode the frame; return its title."""
-        frame = self.frame
-        node, base = frame.id & 0x7F, frame.id & ~0x7F
+        frame, node = self.frame, self.node
         if frame.id & ERROR_FLAG:
-            classes = [text for bit, text in enumerate(BUS_ERRORS) if frame.id >> bit & 1]
-            self.fault = f"no data frame: the adapter reports {', '.join(classes) or 'an error on the bus'}"
+            self.fault = "no data frame: the adapter reports an error on the bus"
+            self.kind, self.node, self.code = "notice", sdo.BROADCAST, ERROR_FLAG
             return "error on the bus"
-        if base == sdo.REQUEST:
-            return self._request(_name(node))
-        if base == sdo.REPLY and node and len(frame.data) != notifications.REPORT_LENGTH:
-            return self._reply(node)
+        if self.code == sdo.REQUEST:
+            return self._sdo("request", sdo.decode_request(frame.data), f"request to {_name(node)}:")
+        if self.code == sdo.REPLY and node and len(frame.data) != notifications.REPORT_LENGTH:
+            return self._sdo("reply", sdo.decode_reply(frame.data), f"reply of {_name(node)}:")
         if (start := notifications.decode_start(frame)) is not None:
+            self.kind, self.node, self.code = "request", start.node, 0
             return self._start(start)
         if (notification := notifications.decode_notification(frame)) is not None:
+            self.kind = "notice"
             return f"{notification.kind} of node {node}: {self._notification(notification)}"
-        if frame.id == 0 and len(frame.data) == 2 and frame.data[0] in NMT and frame.data[1] < sdo.NODES.stop:
-            command, who = NMT[frame.data[0]], _name(frame.data[1])
-            self.fields.take(1, "command", command)
-            self.fields.take(1, "node", who)
-            return f"to {who}: {command}"
-        return self._foreign(node, base)
+        return self._foreign()
 
     # -- requests and replies ------------------------------------------------------------------------------------
 
-    def _request(self, who: str) -> str:
-        request = sdo.decode_request(self.frame)
-        if request is None or request.kind == "unknown":
-            return self._invalid("request", "8 data bytes")
-        title = f"request to {who}:"
-        match request.kind:
-            case "upload":
-                return f"{title} read {self._object('read (upload)', request)}"
-            case "abort":
-                name = self._object("abort", request)
-                return f"{title} give up {name}: {self._abort_code()}"
-        size = len(request.data) if request.sized else None
-        name = self._object(f"write (download), {_stated(size)}", request)
-        return f"{title} write {name} = {self._value(size)}"
-
-    def _reply(self, node: int) -> str:
-        reply = sdo.decode_reply(self.frame.data)
-        if reply is None:
-            return self._invalid("reply", "8 data bytes (or, as a report, 4)")
-        title = f"reply of node {node}:"
-        match reply.kind:
-            case "abort":
-                name = self._object("abort", reply)
-                return f"{title} {name} refused: {self._abort_code()}"
-            case "download":
-                return f"{title} {self._object('written', reply)} is written"
-            case "upload-start":
-                name = self._object("upload in segments", reply)
-                size = "without saying how long" if reply.size is None else counted(reply.size)
-                if reply.size is not None:
-                    self.fields.take_rest("size", size)
-                return f"{title} {name} comes in segments, {size}"
-        name = self._object(f"value (upload), {_stated(reply.size)}", reply)
-        return f"{title} {name} = {self._value(reply.size)}"
-
-    def _invalid(self, what: str, length: str) -> str:
+    def _sdo(self, what: str, one: Sdo | None, who: str) -> str:
         data = self.frame.data
-        if len(data) != sdo.LENGTH:
-            self.fault = f"a {what} has {length}, here are {len(data)}"
-        else:
-            self.fault = f"specifier 0x{data[0]:02X} is of no {what}, or of a transfer that is not supported"
-        return f"no {what}"
+        if one is None:
+            self.fault = f"a {what} has 8 data bytes, here are {len(data)}"
+            if len(data) == sdo.LENGTH:
+                self.fault = f"specifier 0x{data[0]:02X} is of no {what} that is supported"
+            return f"no {what}"
+        self.kind, self.code = what, data[0] << 24 | one.index << 8 | one.subindex
+        meaning, title = SDO[what, one.kind]
+        length = "length not stated" if one.size is None else counted(one.size)
+        name = self._object(meaning.format(length), one)
+        text = self._abort_code(one) if one.kind == "abort" else self._value(one) if "{1}" in title else ""
+        return f"{who} {title.format(name, text)}"
 
-    def _specifier(self, meaning: str) -> None:
-        self.fields.take(1, "specifier", f"0x{self.frame.data[0]:02X}: {meaning}")
-
-    def _object(self, meaning: str, frame: sdo.SdoRequest | sdo.SdoReply) -> str:
+    def _object(self, meaning: str, one: Sdo) -> str:
         """Decode specifier, index and sub-index; return the name of the object."""
         table = self.profile.table
-        self.row = table.at(frame.index, frame.subindex) or KST_EXT.at(frame.index, frame.subindex)
+        self.row = table.at(one.index, one.subindex) or KST_EXT.at(one.index, one.subindex)
         shown = self.row.name if self.row else "no object that is known"
         if self.row and self.row.name not in table:
             shown += f", not in profile {self.profile.name}"
-        if self._is_ambiguous:
-            shown += "; commands 6 and 7 of the manual, position and status, are this one frame"
-        self._specifier(meaning)
-        self.fields.take(2, "index", f"0x{frame.index:04X}, {shown}")
-        self.fields.take(1, "sub-index", f"{frame.subindex}")
-        return self.row.name if self.row else f"0x{frame.index:04X}:{frame.subindex}"
+        self.fields.take(1, "specifier", f"0x{self.frame.data[0]:02X}: {meaning}")
+        self.fields.take(2, "index", f"0x{one.index:04X}, {shown}")
+        self.fields.take(1, "sub-index", f"{one.subindex}")
+        return self.row.name if self.row else f"0x{one.index:04X}:{one.subindex}"
 
-    def _abort_code(self) -> str:
-        code = int.from_bytes(self.fields.rest, "little")
-        text = sdo.abort_text(code)
-        self.fields.take_rest("abort code", f"0x{code:08X}: {text}" if code in sdo.ABORTS else text)
+    def _abort_code(self, one: Sdo) -> str:
+        text = sdo.abort_text(one.code)
+        self.fields.take_rest("abort code", f"0x{one.code:08X}: {text}" if one.code in sdo.ABORTS else text)
         return text
 
     # -- values --------------------------------------------------------------------------------------------------
 
-    def _value(self, stated: int | None) -> str:
+    def _value(self, one: Sdo) -> str:
         """Decode the value; without a stated length the object has its own. Returns its text."""
         row = self.row
-        size = stated or (row.size if row else 4)
+        size = one.size or (row.size if row else sdo.EXPEDITED)
         data = self.fields.rest[:size]
         name, note = row.name if row else "data", ""
         if name in VERSIONS:
@@ -205,7 +144,7 @@ class _Frame:
             text = f"{int.from_bytes(data, 'little')} ({data.hex(' ').upper()})"
             text += f", but {row.name} has {counted(row.size)}" if row else ""
         elif name == "status":
-            known = self.profile if self.profile.status_row else PROFILES["kst-ext"]
+            known = self.profile if "status" in self.profile.table else PROFILES["kst-ext"]
             raw = row.decode(data)
             ampere = f"{profiles.current(known, raw):.6g} A ({known.current_scale:g} A per count)"
             degrees = f"{profiles.temperature(raw)} °C"
@@ -243,7 +182,11 @@ class _Frame:
     @property
     def _is_ambiguous(self) -> bool:
         """The object is the position, which the manual also calls the status."""
-        return self.row is not None and self.row.name == "present_position" and not self.profile.status_row
+        return (
+            self.row is not None
+            and self.row.name == "present_position"
+            and "status" not in self.profile.table
+        )
 
     def _angle(self, raw: int) -> str:
         return f"{self._degrees(raw)} (raw {raw}, {self.profile.counts_per_degree} per degree)"
@@ -260,22 +203,16 @@ class _Frame:
                 what = self._angle(notifications.decode_report(data))
                 self.fields.take(2, "position", what)
             case "alarm":
-                what = (
-                    "low voltage"
-                    if data == notifications.LOW_VOLTAGE
-                    else f"not known ({data.hex(' ').upper()})"
-                )
+                what = notifications.alarm_text(data)
                 self.fields.take_rest("alarm", what)
             case "heartbeat":
                 guard = ", toggle bit of node guarding set" if data[0] & 0x80 else ""
                 what = notifications.STATES[data[0] & 0x7F] + guard
                 self.fields.take_rest("state", what)
             case _:  # an emergency
-                code = int.from_bytes(data[:2], "little")
-                what = f"0x{code:04X}, {EMERGENCIES.get(code >> 12, 'not known')}"
-                bits = [name for bit, name in enumerate(ERROR_REGISTER) if data[2] >> bit & 1]
+                what = f"code 0x{int.from_bytes(data[:2], 'little'):04X}"
                 self.fields.take(2, "error code", what)
-                self.fields.take(1, "error register", f"0x{data[2]:02X}: {', '.join(bits) or 'no error'}")
+                self.fields.take(1, "error register", f"0x{data[2]:02X}")
                 self.fields.take_rest("vendor", "defined by the maker")
         return what
 
@@ -287,23 +224,15 @@ class _Frame:
             self.fields.take(1, "node", _name(start.node))
         return f"to {_name(start.node)}: {verb}, in {by}"
 
-    def _foreign(self, node: int, base: int) -> str:
-        kind, length = notifications.NOTIFICATIONS.get(base, ("", 0))
+    def _foreign(self) -> str:
+        kind, length = notifications.NOTIFICATIONS.get(self.code, ("", 0))
         self.fault = "no frame of this protocol has this identifier"
-        if not self.frame.extended and self.frame.id & 0x1FFF_FFFF > 0x7FF:
-            self.fault = "the identifier does not fit 11 bits"
-        elif self.frame.id & REMOTE_FLAG:
+        if self.frame.id & REMOTE_FLAG:
             self.fault = "a remote frame: this protocol has none"
-        elif base == 0:
-            self.fault = "no start or stop (01 00, 02 00) and no command of network management"
-        elif kind and node:
+        elif kind and self.node:
             self.fault = f"a {kind} has {counted(length)}{SHAPES.get(kind, '')}"
         return "no frame of this protocol"
 
 
 def _name(node: int) -> str:
     return f"node {node}" if node != sdo.BROADCAST else "everyone"
-
-
-def _stated(size: int | None) -> str:
-    return "length not stated" if size is None else counted(size)

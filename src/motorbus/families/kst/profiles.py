@@ -16,21 +16,17 @@ from dataclasses import dataclass, replace
 from decimal import ROUND_HALF_UP, Decimal
 from functools import partial
 from math import degrees, isfinite, pi
-from types import MappingProxyType
 from typing import Final
 
 from motorbus.core.register import Access, Coding, Register, RegisterMap, Storage, changed
 from motorbus.core.request import Effect
 from motorbus.errors import RequestError
 
-BIT_RATES: Final = MappingProxyType(
-    dict(enumerate((20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000)))
-)
-"""Bit-rate code of object 0x3001 -> bit/s (KST CAN protocol manual, command 1).
+RATES: Final = (20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000)
+"""bit/s by the code of object 0x3001 (KST CAN protocol manual, command 1).
 
 Neither the numbers of slcan nor those of CiA 305 LSS.
 """
-RATES: Final[tuple[int, ...]] = tuple(BIT_RATES.values())
 DEFAULT_NODE: Final = 0x25
 DEFAULT_RATE: Final = 500_000  # bit/s as shipped; the manual adds "provisional"
 SAVE: Final = int.from_bytes(b"save", "little")
@@ -72,7 +68,7 @@ _MANUAL_ROWS = (
     ),
     _kept(
         name="bit_rate_code", address=0x3001, access=Access.WRITE, high=7, default=5, effect=Effect.IDENTITY,
-        protected=True, choices={code: f"{rate} bit/s" for code, rate in BIT_RATES.items()},
+        protected=True, choices={code: f"{rate} bit/s" for code, rate in enumerate(RATES)},
         source=f"{MANUAL}, command 1 and defaults",
         note="takes effect after a save and a restart; the manual has no command that reads it",
     ),
@@ -105,15 +101,13 @@ _LATER_ROWS = (
         note="makes the present position the zero; needs a save. The demo driver writes 0. The length is that of the "
         "one sized write seen (0x23), to a servo of XQPOWER",
     ),
-    _angle(
-        name="negative_limit", address=0x300A, access=Access.READ_WRITE, storage=Storage.EEPROM,
-        low=-1000, high=0, effect=Effect.PERSISTENT, source=FLIGHT,
-        note="needs a save; in reversed sense a change of one limit changes the other too",
-    ),
-    _angle(
-        name="positive_limit", address=0x300B, access=Access.READ_WRITE, storage=Storage.EEPROM,
-        low=0, high=1000, effect=Effect.PERSISTENT, source=FLIGHT,
-        note="needs a save; in reversed sense a change of one limit changes the other too",
+    *(
+        _angle(
+            name=name, address=address, access=Access.READ_WRITE, storage=Storage.EEPROM,
+            low=low, high=low + 1000, effect=Effect.PERSISTENT, source=FLIGHT,
+            note="needs a save; in reversed sense a change of one limit changes the other too",
+        )
+        for name, address, low in (("negative_limit", 0x300A, -1000), ("positive_limit", 0x300B, 0))
     ),
     _kept(
         name="function_enable", address=0x300F, high=255, protected=True, bits={REVERSED: "reversed"},
@@ -175,19 +169,15 @@ class Profile:
     """How the servos of one maker, or of one generation, speak the protocol.
 
     `counts_per_degree` is exact. `current_scale` is A per count of the status. `nmt` says how reports (and at XQPOWER
-    motion) are started: "none", "vendor" (CAN id = node, `01 00`) or "standard" (CAN id 0, `01 node`). `flash_wait` is
-    how long a node is left alone after a save, `mid_point_wait` after a new mid point (s), which is set by writing
-    `mid_point_value`. `conflicts` is where sources disagree.
+    motion) are started: "none", "vendor" (CAN id = node, `01 00`) or "standard" (CAN id 0, `01 node`).
+    `mid_point_value` is written to make the present position the zero. `conflicts` is where sources disagree.
     """
 
     table: RegisterMap
-    vendor: str
     counts_per_degree: int = 10
     current_scale: float = 0.01
     nmt: str
-    flash_wait: float = 0.15
     mid_point_value: int = 0
-    mid_point_wait: float = 0.15
     source: str
     conflicts: str
 
@@ -196,28 +186,13 @@ class Profile:
         return self.table.name
 
     @property
-    def title(self) -> str:
-        return self.table.title
-
-    @property
     def limit(self) -> int:
         """The largest raw position, either way."""
         return self.table["goal_position"].high
 
-    @property
-    def status_row(self) -> Register | None:
-        """None where status is the manual's command 7, the same frame as the position, which nothing decodes."""
-        return self.table.at(0x6005, 0)
-
-    @property
-    def version_rows(self) -> tuple[Register, ...]:
-        """The objects with a version, in the order in which they are read."""
-        return tuple(self.table[name] for name in VERSIONS if name in self.table)
-
 
 _KST = Profile(
     table=KST,
-    vendor="KST",
     nmt="none",
     source=f"{MANUAL}; the wait after a save: {FLIGHT}",
     conflicts="the manual has one frame for position (command 6) and status (command 7); it prints CAN ids of four "
@@ -234,31 +209,26 @@ _KST_EXT = replace(
 _KINGMAX = replace(
     _KST_EXT,
     table=KINGMAX,
-    vendor="Kingmax",
     source=f"{KINGMAX_DRIVER} for position, status and scale; the rest is taken over from kst-ext",
     conflicts="range, start and configuration objects are assumed to be those of kst-ext",
 )
 _XQPOWER = replace(
     _KST_EXT,
     table=XQPOWER,
-    vendor="XQPOWER",
     counts_per_degree=18,
     current_scale=0.001,
     nmt="standard",
     mid_point_value=1,
-    mid_point_wait=0.5,
     source=f"{XQPOWER_DRIVER}; node id, bit rate, save and version are taken over from the {MANUAL}",
     conflicts="18 counts per degree and 1 mA where the others have 10 and 0.01 A; position writes are ignored until "
     "it has been started; the firmware driver writes everything by 0x22, the tools 0x2200 and 0x3009 with a length",
 )
 
-PROFILES: Final[Mapping[str, Profile]] = MappingProxyType(
-    {profile.name: profile for profile in (_KST, _KST_EXT, _KINGMAX, _XQPOWER)}
-)
+PROFILES: Final[Mapping[str, Profile]] = {
+    profile.name: profile for profile in (_KST, _KST_EXT, _KINGMAX, _XQPOWER)
+}
 """Every profile by its name; the first is the default."""
-TABLES: Final[Mapping[str, RegisterMap]] = MappingProxyType(
-    {profile.name: profile.table for profile in PROFILES.values()}
-)
+TABLES: Final[Mapping[str, RegisterMap]] = {name: profile.table for name, profile in PROFILES.items()}
 """Every object dictionary by the name of its profile."""
 
 
@@ -306,8 +276,8 @@ def temperature(raw: int) -> int:
 
 def bit_rate_code(rate: int) -> int:
     """Code of a bit rate (bit/s). Raises RequestError for a rate without a code."""
-    for code, known in BIT_RATES.items():
-        if known == rate and not isinstance(rate, bool):
-            return code
-    rates = ", ".join(map(str, RATES))
-    raise RequestError(f"{rate!r} bit/s is no rate of these servos", expected=f"one of {rates}")
+    if rate in RATES:
+        return RATES.index(rate)
+    raise RequestError(
+        f"{rate!r} bit/s is no rate of these servos", expected=f"one of {', '.join(map(str, RATES))}"
+    )

@@ -1,4 +1,4 @@
-"""SDO frames of KST CAN servos: requests, replies, abort codes, and the keys that match them.
+"""SDO frames of KST CAN servos: requests, replies and abort codes.
 
     request   0x600 + node   8 bytes: specifier, index (2), sub-index, data (4), little-endian; node 0: all nodes
     reply     0x580 + node   8 bytes of the same form; an abort carries a code
@@ -15,8 +15,7 @@ come (CiA 301), are not read. Frames from a device never raise an error here. An
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from struct import pack
+from struct import Struct
 from typing import Final, NamedTuple
 
 from motorbus.core.can_frame import CanFrame
@@ -31,182 +30,110 @@ LENGTH: Final = 8  # data bytes of each request and reply
 EXPEDITED: Final = 4  # maximum number of value bytes in one frame
 
 UPLOAD: Final = 0x40
-DOWNLOAD_UNSIZED: Final = 0x22
+DOWNLOAD: Final = 0x20
 DOWNLOADED: Final = 0x60
 ABORT: Final = 0x80
 _KIND: Final = 0xE0
 _E: Final = 2
 _S: Final = 1
+_HEAD: Final = Struct("<BHB")  # specifier, index, sub-index
 
 
-class SdoRequest(NamedTuple):
-    """A decoded request: "upload", "download", "abort" or "unknown".
+class Sdo(NamedTuple):
+    """A decoded request or reply: "upload", "download" or "abort", of a reply also "segments" (which follow).
 
-    `data` is the value of a download (all four bytes unless `sized`), the code of an abort, else bytes 4 to 7 or empty.
-    """
-
-    node: int
-    kind: str
-    index: int = 0  # type: ignore[assignment]  # hides tuple.index
-    subindex: int = 0
-    data: bytes = b""
-    sized: bool = False
-    extended: bool = False
-
-
-class SdoReply(NamedTuple):
-    """A decoded reply: "upload", "upload-start" (segments follow), "download" or "abort" (with `code`).
-
-    `size` is the stated length of `data`, or of the whole value at an upload-start. None: not stated, and `data` are
-    all four bytes.
+    `size` is the stated number of bytes of `data`; without it (None) `data` are bytes 4 to 7.
     """
 
     kind: str
     index: int  # type: ignore[assignment]  # hides tuple.index
-    subindex: int
+    subindex: int = 0
     data: bytes = b""
-    code: int = 0
     size: int | None = None
 
+    @property
+    def code(self) -> int:
+        """The code of an abort."""
+        return int.from_bytes(self.data, "little")
 
-# -- requests --------------------------------------------------------------------------------------------------
+
+def request_kind(specifier: int) -> str:
+    """Kind of a request with this byte 0; "" for no request."""
+    match specifier & _KIND:
+        case 0x40:
+            return "upload"
+        case 0x20 if specifier & _E:
+            return "download"
+    return "abort" if specifier == ABORT else ""
+
+
+def reply_kind(specifier: int) -> str:
+    """Kind of a reply with this byte 0; "" for no reply."""
+    if specifier & _KIND == UPLOAD:
+        return "upload" if specifier & _E else "segments"
+    return {DOWNLOADED: "download", ABORT: "abort"}.get(specifier, "")
+
+
+def decode_request(data: bytes) -> Sdo | None:
+    """The data field of a request; None for other than 8 bytes or an unknown specifier."""
+    return _decode(data, request_kind(data[0]), "download") if len(data) == LENGTH else None
+
+
+def decode_reply(data: bytes) -> Sdo | None:
+    """The data field of a reply; None for other than 8 bytes or an unknown specifier."""
+    return _decode(data, reply_kind(data[0]), "upload") if len(data) == LENGTH else None
+
+
+def _decode(data: bytes, kind: str, with_value: str) -> Sdo | None:
+    specifier, index, subindex = _HEAD.unpack_from(data)
+    size = EXPEDITED - (specifier >> 2 & 3) if kind == with_value and specifier & _S else None
+    value = data[_HEAD.size :][:size]
+    return Sdo(kind, index, subindex, value, size) if kind else None
 
 
 def encode_upload(node: int, index: int, subindex: int = 0) -> CanFrame:
     """Read an object of one node or of all (0): `40 il ih sub 00 00 00 00`."""
-    return _frame(REQUEST, node, _head(UPLOAD, index, subindex))
+    return _frame(REQUEST, node, UPLOAD, index, subindex)
 
 
 def encode_download(node: int, index: int, subindex: int, data: bytes, *, sized: bool = False) -> CanFrame:
     """Write 1 to 4 bytes to an object of one node or of all (0): specifier 0x22, or `sized` as in CiA 301."""
-    specifier = DOWNLOAD_UNSIZED
-    if sized:
-        specifier |= (EXPEDITED - len(data)) << 2 | _S
-    return _frame(REQUEST, node, _head(specifier, index, subindex) + data)
-
-
-def decode_request(frame: CanFrame) -> SdoRequest | None:
-    """A request with either identifier format; None for any other frame, also for a request without 8 bytes."""
-    node, data, extended = frame.id - REQUEST, frame.data, frame.extended
-    if len(data) != LENGTH or (node != BROADCAST and node not in NODES):
-        return None
-    specifier, index, subindex, rest = data[0], data[1] | data[2] << 8, data[3], data[4:]
-    match specifier & _KIND:
-        case 0x40:
-            return SdoRequest(node, "upload", index, subindex, extended=extended)
-        case 0x20 if specifier & _E:
-            sized = bool(specifier & _S)
-            value = rest[: _size(specifier)] if sized else rest
-            return SdoRequest(node, "download", index, subindex, value, sized, extended=extended)
-    kind = "abort" if specifier == ABORT else "unknown"
-    return SdoRequest(node, kind, index, subindex, rest, extended=extended)
-
-
-# -- replies ---------------------------------------------------------------------------------------------------
-
-
-def reply_kind(specifier: int) -> str:
-    """Kind of a reply with this byte 0, see `SdoReply`; "" for no reply."""
-    kind = specifier & _KIND
-    if kind == 0x40:
-        return "upload" if specifier & _E else "upload-start"
-    if specifier in (DOWNLOADED, ABORT):
-        return "download" if specifier == DOWNLOADED else "abort"
-    return ""
-
-
-def decode_reply(data: bytes) -> SdoReply | None:
-    """The data field of a reply; None for other than 8 bytes or an unknown specifier."""
-    kind = reply_kind(data[0]) if len(data) == LENGTH else ""
-    if not kind:
-        return None
-    specifier, index, subindex, rest = data[0], data[1] | data[2] << 8, data[3], data[4:]
-    stated = bool(specifier & _S)
-    match kind:
-        case "upload":
-            size = _size(specifier) if stated else None
-            return SdoReply(kind, index, subindex, rest[:size], size=size)
-        case "upload-start":
-            return SdoReply(kind, index, subindex, size=int.from_bytes(rest, "little") if stated else None)
-    return SdoReply(kind, index, subindex, code=int.from_bytes(rest, "little") if kind == "abort" else 0)
+    return _frame(REQUEST, node, DOWNLOAD | (_stated(data) if sized else _E), index, subindex, data)
 
 
 def encode_upload_reply(node: int, index: int, subindex: int, data: bytes) -> CanFrame:
     """The value of an object, 1 to 4 bytes: specifier 4F, 4B, 47, 43."""
-    specifier = UPLOAD | (EXPEDITED - len(data)) << 2 | _E | _S
-    return _frame(REPLY, node, _head(specifier, index, subindex) + data)
-
-
-def encode_upload_start(node: int, index: int, subindex: int, size: int | None) -> CanFrame:
-    """Announce segments of `size` bytes in all: specifier 41; 40 without a stated size (None)."""
-    if size is None:
-        return _frame(REPLY, node, _head(UPLOAD, index, subindex))
-    return _frame(REPLY, node, _head(UPLOAD | _S, index, subindex) + size.to_bytes(4, "little"))
+    return _frame(REPLY, node, UPLOAD | _stated(data), index, subindex, data)
 
 
 def encode_download_reply(node: int, index: int, subindex: int) -> CanFrame:
     """Acknowledge a write: `60 il ih sub 00 00 00 00`."""
-    return _frame(REPLY, node, _head(DOWNLOADED, index, subindex))
+    return _frame(REPLY, node, DOWNLOADED, index, subindex)
 
 
 def encode_abort_reply(node: int, index: int, subindex: int, code: int) -> CanFrame:
     """Refuse a request: `80 il ih sub` and the code. Source: KST CAN protocol manual, command 9."""
-    return _frame(REPLY, node, _head(ABORT, index, subindex) + code.to_bytes(4, "little"))
+    return _frame(REPLY, node, ABORT, index, subindex, code.to_bytes(4, "little"))
 
 
-def _frame(base: int, node: int, data: bytes) -> CanFrame:
+def _stated(data: bytes) -> int:
+    return (EXPEDITED - len(data)) << 2 | _E | _S
+
+
+def _frame(base: int, node: int, specifier: int, index: int, subindex: int, data: bytes = b"") -> CanFrame:
     if not BROADCAST <= node < NODES.stop:
         raise RequestError(f"{node} is not a node id", expected="0 to 127", node=node)
-    return CanFrame(base + node, data.ljust(LENGTH, b"\0"))
+    return CanFrame(base + node, (_HEAD.pack(specifier, index, subindex) + data).ljust(LENGTH, b"\0"))
 
 
-def _head(specifier: int, index: int, subindex: int) -> bytes:
-    return pack("<BHB", specifier, index, subindex)
+def expected(node: int, kind: str, index: int, subindex: int = 0) -> Expected:
+    """The reply to a request of this kind ("upload" or "download"): node, kind, index and sub-index match.
 
-
-def _size(specifier: int) -> int:
-    return EXPEDITED - (specifier >> 2 & 3)
-
-
-@dataclass(slots=True, eq=False)
-class Key:
-    """What a reply has in common with its request beside the node: kind, index and sub-index.
-
-    The manual leaves open what an abort repeats. So an abort equals requests with its index and sub-index, or with its
-    index if its sub-index is 0, or all if it says 0:0. Equality is not transitive: one hash for all.
+    The manual leaves open what an abort repeats: index and sub-index, index and 0, or 0 and 0.
     """
+    refusals = tuple(("abort", *place) for place in ((index, subindex), (index, 0), (0, 0)))
+    return Expected(node, (kind, index, subindex), LENGTH, refusals=refusals)
 
-    kind: str
-    index: int = 0
-    subindex: int = 0
-
-    def __hash__(self) -> int:
-        return REPLY
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Key):
-            return NotImplemented
-        if self.kind == other.kind:
-            return self.index == other.index and self.subindex == other.subindex
-        abort, request = (self, other) if self.kind == "abort" else (other, self)
-        if abort.kind != "abort":
-            return False
-        if (abort.index, abort.subindex) == (0, 0):
-            return True
-        return abort.index == request.index and abort.subindex in (0, request.subindex)
-
-
-def upload_due(node: int, index: int, subindex: int = 0) -> Expected:
-    """The reply to `encode_upload`."""
-    return Expected(node, Key("upload", index, subindex), LENGTH)
-
-
-def download_due(node: int, index: int, subindex: int = 0) -> Expected:
-    """The reply to `encode_download`."""
-    return Expected(node, Key("download", index, subindex), LENGTH)
-
-
-# -- abort codes -----------------------------------------------------------------------------------------------
 
 ABORTS: Final[Mapping[int, str]] = {
     0x0503_0000: "Toggle bit not alternated",

@@ -1,22 +1,34 @@
-"""Read and write objects by name, in API units."""
+"""Read and write objects by name, and settings that survive power-off.
+
+A save has no reply, requests during the write to flash are lost or answered with transitional values, and some writes
+fail or are undone. So a setting is written, read back, saved, and read back again; that it is saved shows after a
+restart only. Source: KST CAN protocol manual, command 3; a public flight-controller driver for the wait and the reading
+back. The manual has no mid point and no reverse bit: a profile without them raises RequestError and names others.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Final
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any, Final
 
+from motorbus.core import verify
 from motorbus.core.access import readable_rows, writable_values
 from motorbus.core.register import Register, Storage, Value
-from motorbus.core.request import Effect
-from motorbus.errors import DeviceError, UnexpectedReply
-from motorbus.families.kst.driver.motion import send_target, setpoint, target
-from motorbus.families.kst.driver.node import Node
-from motorbus.families.kst.driver.requests import is_absent, read_register, write_register
-from motorbus.families.kst.driver.settings import store
+from motorbus.core.request import Effect, Priority
+from motorbus.core.steps import Exclusive, Sleep
+from motorbus.errors import DeviceError, UnexpectedReply, VerificationFailed
+from motorbus.families.kst.driver.feedback import position
+from motorbus.families.kst.driver.motion import MOVE, target
+from motorbus.families.kst.driver.node import Node, feature_row
+from motorbus.families.kst.driver.requests import is_absent, read_position, read_row, save, write_row
+from motorbus.families.kst.profiles import REVERSED
+
+MID_POINT_TIME: Final = 0.5  # s that a servo needs after a new mid point; source: public XQPOWER tools
 
 METHODS: Final[Mapping[str, str]] = {
-    "node_id": "set_node_id(), or provision(), which also verifies it after the restart",
-    "bit_rate_code": "set_bit_rate(), or provision(), which also verifies it after the restart",
+    "node_id": "set_id()",
+    "bit_rate_code": "set_baud()",
     "store": "save()",
     "mid_point": "set_mid_point()",
     "function_enable": "set_reversed(), which changes its one known bit and leaves the others",
@@ -37,9 +49,9 @@ async def read_raw(node: Node, /, *names: str) -> dict[str, int]:
     """Objects as raw values by name; see `read`."""
     found: dict[str, int] = {}
     for row in readable_rows(node.table, names):
-        request = read_register(node, row, int, reports_position=row.name == "present_position")
+        is_position = row.name == "present_position"
         try:
-            found[row.name] = await request
+            found[row.name] = await (read_position(node, int) if is_position else read_row(node, row, int))
         except (DeviceError, UnexpectedReply) as error:
             if names or not (is_absent(error) or isinstance(error, UnexpectedReply)):
                 raise
@@ -62,6 +74,83 @@ async def write(node: Node, /, **values: Value) -> None:
         await store(node, stored)
     for row, raw in raws:
         if row.effect is Effect.MOTION:
-            await send_target(node, await setpoint(node, raw))
+            await MOVE.send(node, await MOVE.check(node, values[row.name]))
         elif row.storage is not Storage.EEPROM:
-            await write_register(node, row, raw)
+            await write_row(node, row, raw)
+
+
+async def store(node: Node, values: Sequence[tuple[Register, int]]) -> None:
+    """Write these rows, read them back, save, and read them back again, with the bus reserved.
+
+    Rows that read so already are only saved: another program may have written them without a save. Raises
+    VerificationFailed when a row reads back different after three tries, or after the save.
+    """
+
+    def reading(row: Register, raw: int) -> dict[str, Any]:
+        read, differs = partial(read_row, node, row, int), partial(_differs, node, row, raw)
+        return {"read": read, "expected": raw, "node": node.node, "what": row.name, "differs": differs}
+
+    async def check_all() -> None:
+        for row, raw in values:
+            await verify.check(**reading(row, raw))
+
+    async def write_and_save() -> None:
+        node.limits = None
+        for row, raw in values:
+            if await read_row(node, row, int) != raw:
+                write = partial(write_row, node, row, raw, priority=Priority.CONFIGURATION)
+                await verify.write_verified(write, **reading(row, raw))
+        await check_all()  # one may have changed another
+        await save(node)
+        await check_all()
+
+    await Exclusive(write_and_save())
+
+
+def _differs(node: Node, row: Register, raw: int, found: int) -> VerificationFailed:
+    return VerificationFailed(
+        f"node {node.node}: {row.name} reads back {found}, not {raw}",
+        cause="the servo does not take this value; a write failed, which is known of these servos; or the sense of "
+        "rotation is reversed, and a change of one travel limit changes the other",
+        advice="for limits: set_reversed(False) first, or give symmetric ones",
+        node=node.node,
+    )
+
+
+async def set_mid_point(node: Node) -> float:
+    """Make the present position the zero and save it; return the position (rad) read afterwards, about 0.
+
+    No source says whether the servo then moves to its old target: keep clear, and send a target next. The request is
+    never repeated: OutcomeUnknown says that the servo may have received it.
+    """
+    row = feature_row(node, "mid_point", "mid point")
+
+    async def write_and_save() -> float:
+        node.limits = None
+        await write_row(node, row, node.profile.mid_point_value, priority=Priority.CONFIGURATION)
+        await save(node)
+        await Sleep(MID_POINT_TIME)
+        return await position(node)
+
+    return await Exclusive(write_and_save())
+
+
+async def reversed_(node: Node) -> bool:
+    """Whether the sense of rotation is reversed."""
+    row = feature_row(node, "function_enable", "reverse bit")
+    return bool(await read_row(node, row, int) >> REVERSED & 1)
+
+
+async def set_reversed(node: Node, on: bool) -> None:
+    """Reverse the sense of rotation, or not; the other bits of that object, which are unknown, are kept.
+
+    A restart may undo it: read reversed() after one. No source says whether the servo moves to its old target: keep
+    clear.
+    """
+    row, bit = feature_row(node, "function_enable", "reverse bit"), 1 << REVERSED
+
+    async def read_modify_write() -> None:
+        raw = await read_row(node, row, int)
+        await store(node, [(row, raw | bit if on else raw & ~bit)])
+
+    await Exclusive(read_modify_write())

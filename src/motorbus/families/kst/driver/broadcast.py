@@ -7,6 +7,7 @@ acknowledges a broadcast write is not known, so silence is no error.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from motorbus.core.family import IdChanged
 from motorbus.core.register import Value
@@ -15,11 +16,10 @@ from motorbus.core.setpoint import Setpoint
 from motorbus.core.steps import Emit, Exclusive
 from motorbus.errors import RequestError, UnexpectedReply
 from motorbus.families.kst import sdo
-from motorbus.families.kst.driver.motion import Started, target
-from motorbus.families.kst.driver.node import BusSettings, Node, checked_id, checked_ids
-from motorbus.families.kst.driver.requests import value_bytes
+from motorbus.families.kst.driver.motion import target
+from motorbus.families.kst.driver.node import BusSettings, Node, checked_id
+from motorbus.families.kst.driver.requests import decoded, effect_of, value_bytes
 from motorbus.families.kst.notifications import encode_start
-from motorbus.families.kst.profiles import SAVE, bit_rate_code
 
 
 async def broadcast_read(name: str, settings: BusSettings) -> dict[int, Value]:
@@ -33,9 +33,8 @@ async def broadcast_read(name: str, settings: BusSettings) -> dict[int, Value]:
     # Reserve the bus: a reply to a broadcast looks like a reply to a request to that node.
     answer = await Exclusive(Request[Response](settings.upload(sdo.BROADCAST, row), ANY, lane=EVERY_LANE))
     values: dict[int, set[bytes]] = {}
-    for reply in answer.replies:
-        one = sdo.decode_reply(reply.data)
-        if one and one.kind == "upload" and (one.index, one.subindex) == (row.address, row.subindex):
+    for reply, one in zip(answer.replies, decoded(answer), strict=True):
+        if one.kind == "upload" and (one.index, one.subindex) == (row.address, row.subindex):
             try:
                 values.setdefault(reply.lane, set()).add(value_bytes(Node(reply.lane, settings), row, one))
             except UnexpectedReply:
@@ -43,67 +42,65 @@ async def broadcast_read(name: str, settings: BusSettings) -> dict[int, Value]:
     return {node: row.to_value(row.decode(min(found))) for node, found in values.items() if len(found) == 1}
 
 
-async def broadcast_position(to: float, nodes: Sequence[int], settings: BusSettings) -> tuple[int, ...]:
-    """Send all servos to `to` rad; return the nodes that acknowledged. Errors and start rule as in `move`.
+def broadcast_ping(settings: BusSettings) -> Request[tuple[int, ...]]:
+    """The nodes that answer a read of the node id of all servos; an abort is an answer."""
+    row = settings.profile.table["node_id"]
 
-    `nodes` are the servos that the gate checks: name all on the bus, because all move.
-    """
-    checked = checked_ids(nodes)
-    if not checked:
-        raise RequestError(
-            "a broadcast moves all servos, and none is named", expected="the ids of all servos"
-        )
-    row = settings.profile.table["goal_position"]
-    raw = target(Node(checked[0], settings), to)
-    value, low, high = (float(row.to_value(one)) for one in (raw, row.low, row.high))
-    setpoints = tuple(Setpoint(node, "position", value, low, high) for node in checked)
+    def decode(answer: Response) -> tuple[int, ...]:
+        replies = zip(answer.replies, decoded(answer), strict=True)
+        places = (row.address, 0)  # 0: some aborts name no object
+        return tuple(dict.fromkeys(reply.lane for reply, one in replies if one.index in places))
 
-    async def start_and_move() -> tuple[int, ...]:
-        if settings.must_start:
-            frame = settings.format(encode_start(settings.nmt, sdo.BROADCAST, True))
-            priority, effect = Priority.CONTROL, Effect.MOTION
-            await Request(frame, lane=EVERY_LANE, priority=priority, effect=effect, setpoints=setpoints)
-            await Emit(Started(sdo.BROADCAST, frame))
-        return await _write(settings, "goal_position", raw, setpoints)
-
-    return await Exclusive(start_and_move())
+    return Request(settings.upload(sdo.BROADCAST, row), ANY, decode, lane=EVERY_LANE)
 
 
-async def broadcast_save(settings: BusSettings) -> tuple[int, ...]:
-    """Let all servos save, and wait for their flash; return the nodes that acknowledged, by the manual none."""
-    return await Exclusive(_write(settings, "store", SAVE))
-
-
-async def broadcast_bit_rate(rate: int, settings: BusSettings) -> tuple[int, ...]:
-    """Give all servos another bit rate (bit/s), see `set_bit_rate`; return the nodes that acknowledged."""
-    return await Exclusive(_write(settings, "bit_rate_code", bit_rate_code(rate)))
-
-
-async def broadcast_node_id(new: int, settings: BusSettings, *, force: bool = False) -> tuple[int, ...]:
-    """Give all servos on the bus this id. Raises RequestError without `force`: several servos then have one id."""
-    checked_id(new)
-    if not force:
-        raise RequestError(
-            f"a broadcast would give every servo on this bus the id {new}",
-            expected="force=True where that is meant; else connect one servo and use provision()",
-        )
-    await Emit(IdChanged(None, new))
-    return await Exclusive(_write(settings, "node_id", new))
-
-
-async def _write(
-    settings: BusSettings, name: str, raw: int, setpoints: tuple[Setpoint, ...] = ()
+async def broadcast_write(
+    name: str, value: Value, settings: BusSettings, *, nodes: Sequence[int] = (), force: bool = False
 ) -> tuple[int, ...]:
-    """Write an object of all servos; return the nodes that acknowledged."""
+    """Write an object of all servos, in API units; return the nodes that acknowledged.
+
+    A target moves all servos on the bus: `nodes` names them for the gate. The start rule is that of `move`. A node id
+    needs `force`: several servos then have one id. A save (`store`) waits for the flash; by the manual it has no reply.
+    Raises RequestError, or LimitExceeded for a target out of range.
+    """
     row = settings.profile.table[name]
-    answer = await Request[Response](
-        settings.download(sdo.BROADCAST, row, raw),
-        ANY,
-        lane=EVERY_LANE,
-        priority=Priority.CONTROL if row.effect is Effect.MOTION else Priority.CONFIGURATION,
-        effect=row.effect,
-        setpoints=setpoints,
-        reply_within=TimeoutClass.STORE if name == "store" else TimeoutClass.REPLY,
-    )
+    if not row.writable:
+        raise RequestError(f"{name} can only be read")
+    if name == "node_id" and not force:
+        raise RequestError(
+            f"a broadcast would give every servo on this bus the id {value}",
+            expected="force=True where that is meant; else connect one servo and use set_id()",
+        )
+    setpoints = _setpoints(value, nodes, settings) if row.effect is Effect.MOTION else ()
+    raw = target(Node(nodes[0], settings), value) if setpoints else row.to_raw(value)
+    common: dict[str, Any] = {
+        "lane": EVERY_LANE,
+        "priority": Priority.CONTROL if setpoints else Priority.CONFIGURATION,
+        "effect": effect_of(row),
+        "setpoints": setpoints,
+    }
+    within = TimeoutClass.STORE if name == "store" else TimeoutClass.REPLY
+    frame = settings.download(sdo.BROADCAST, row, raw)
+    request = Request[Response](frame, ANY, reply_within=within, **common)
+
+    async def start_and_write() -> Response:
+        if setpoints and settings.must_start:
+            start = settings.format(encode_start(settings.nmt, sdo.BROADCAST, True))
+            await Request(start, **common)
+        if name == "node_id":
+            await Emit(IdChanged(None, raw))
+        return await request
+
+    answer = await Exclusive(start_and_write())
     acknowledgement = sdo.encode_download_reply(1, row.address, row.subindex or 0).data
     return tuple(dict.fromkeys(reply.lane for reply in answer.replies if reply.data == acknowledgement))
+
+
+def _setpoints(to: Value, nodes: Sequence[int], settings: BusSettings) -> tuple[Setpoint, ...]:
+    """This target for each of these servos, within the range of the profile."""
+    if not nodes:
+        raise RequestError("a broadcast moves all servos", expected="nodes=: the ids of all servos")
+    row = settings.profile.table["goal_position"]
+    raws = target(Node(nodes[0], settings), to), row.low, row.high
+    value, low, high = (float(row.to_value(raw)) for raw in raws)
+    return tuple(Setpoint(checked_id(node), "position", value, low, high) for node in dict.fromkeys(nodes))

@@ -15,15 +15,11 @@ from motorbus.core.family import AxisDriver, Explanation, Family, Found, Identit
 from motorbus.core.register import changed
 from motorbus.core.request import ANY, EVERY_LANE, Priority, Request, Response, TimeoutClass
 from motorbus.core.steps import Procedure, Runnable
-from motorbus.families.kst import sdo
-from motorbus.families.kst.driver import feedback, identity, motion
-from motorbus.families.kst.driver.motion import Promise, hold
-from motorbus.families.kst.driver.node import DEFAULT, Node
-from motorbus.families.kst.driver.requests import acknowledged, decoded, upload
-from motorbus.families.kst.driver.scan import scan
-from motorbus.families.kst.driver.settings import LISTEN
-from motorbus.families.kst.driver.stream import open_stream
-from motorbus.families.kst.notifications import BusState, FrameReceiver
+from motorbus.families.kst import decode, sdo
+from motorbus.families.kst.driver import feedback, identity, motion, scan
+from motorbus.families.kst.driver.node import ID_FORMATS, NMT, SIZED, BusSettings, Node, choice
+from motorbus.families.kst.driver.requests import decoded, position_in, read_position, upload
+from motorbus.families.kst.notifications import FrameReceiver
 from motorbus.families.kst.profiles import PROFILES
 
 STUFFING: Final = 1.1
@@ -35,6 +31,9 @@ SCAN_DELAY: Final = 0.005
 """s for an id that probably has no servo; with the margin of the bus twice the 3 ms of that driver."""
 BROADCAST_TIME: Final = 0.100
 """s in which all servos have answered a broadcast: a public demo driver collects until 100 ms pass without a reply."""
+SAVE_TIME: Final = 0.170
+"""s: 20 ms in which an acknowledgement or abort of a save is accepted (the manual says that neither comes), then 150 ms
+of the write to flash, in which a public flight-controller driver leaves a servo alone."""
 QUIET: Final = 0.020
 """s beside the frames that may still be on their way; as long as the bus waits for a late reply."""
 FRAMES_IN_ADAPTER: Final = 5  # frames of one node that an adapter may hold # assumption
@@ -48,37 +47,50 @@ _AXIS: Final = AxisDriver(
     stop=motion.stop,
     limits=motion.limits,
     travel=motion.travel,
-    stream=open_stream,
+    stream=motion.open_stream,
 )
 
 
 class KstDriver:
-    """KST servos on one open bus; see `core.family.BusDriver`. The keywords are those of `BusSettings`."""
+    """KST servos on one open bus; see `core.family.BusDriver`. Raises RequestError for an invalid setting."""
 
     window = 16
     """Four to ten nodes in flight fill any CAN bus."""
     full_duplex = False
     probe_after = 128
+    code_meaning = decode.CODE_MEANING
 
-    def __init__(self, family: Family, **settings: object) -> None:
+    def __init__(
+        self,
+        family: Family,
+        profile: str = "kst",
+        id_format: str = "std",
+        sized: str = "no",
+        nmt: str = "profile",
+    ) -> None:
         self.family = family
-        self.settings = DEFAULT.replace(state=BusState(), **settings)
+        self.settings = BusSettings(
+            profile=PROFILES[choice("profile", profile, PROFILES)],
+            extended=choice("id_format", id_format, ID_FORMATS) == "ext",
+            sized=choice("sized", sized, SIZED) == "yes",
+            form=choice("nmt", nmt, NMT),
+        )
 
     def air_time(self, request: Request[Any], rate: int) -> float:
         """s on the wire for the request and all replies, with typical stuffing; a broadcast has up to 127 replies."""
         frame = request.wire
         assert isinstance(frame, CanFrame)
-        bits = least(len(frame.data), frame.extended)
         if request.expected is ANY:
-            bits += (len(sdo.NODES) if request.lane == EVERY_LANE else 1) * least(sdo.LENGTH, frame.extended)
+            lengths = [sdo.LENGTH] * (len(sdo.NODES) if request.lane == EVERY_LANE else 1)
         else:
-            bits += sum(least(expected.length, frame.extended) for expected in request.expected)
+            lengths = [expected.length for expected in request.expected]
+        bits = sum(least(length, frame.extended) for length in (len(frame.data), *lengths))
         return bits * STUFFING / rate
 
     def turnaround(self, request: Request[Any]) -> float:
         """Maximum s before the reply; after a save the time to listen and the write to flash."""
         if request.reply_within is TimeoutClass.STORE:
-            return LISTEN + self.settings.profile.flash_wait
+            return SAVE_TIME
         if request.lane == EVERY_LANE:
             return BROADCAST_TIME
         return SCAN_DELAY if request.reply_within is TimeoutClass.SCAN else REPLY_DELAY
@@ -94,57 +106,46 @@ class KstDriver:
         return FrameReceiver(self.settings.extended, self.settings.state)
 
     def probe(self, node: int, attempt: int) -> Request[bool]:
-        """Read the node id, the version, or a sub-index of the node id that no servo has, in turn.
+        """Read the node id, or a sub-index of it that no servo has, in turn.
 
         True if the reply names that object and, for the id, has a valid one (before a restart not that of the node).
         """
         servo = Node(node, self.settings)
-        turn, kind = divmod(attempt, 3)
-        node_id = servo.table["node_id"]
-        rows = node_id, servo.table["firmware_version"], changed(node_id, subindex=1 + turn % 254)
-        row = rows[kind]
+        turn, absent = divmod(attempt, 2)
+        row = changed(servo.table["node_id"], subindex=absent * (1 + turn % 254))
 
         def decode(answer: Response) -> bool:
             for reply in decoded(answer):
-                if (reply.index, reply.subindex) == (row.address, row.subindex) and reply.kind != "download":
-                    return kind != 0 or reply.kind != "upload" or reply.data[0] in sdo.NODES
+                if (reply.index, reply.subindex) == (row.address, row.subindex):
+                    return bool(absent) or reply.kind == "abort" or reply.data[0] in sdo.NODES
             return False
 
         return upload(servo, row, decode)
 
     def stop(self, nodes: Mapping[int, Response | None]) -> Stop:
         """Target := position for each node whose position is known; the others are read first."""
-        requests: list[Request[Response]] = []
+        requests: list[Request[Any]] = []
         for node in (Node(number, self.settings) for number in sorted(nodes)):
-            row, answer = node.table["present_position"], nodes[node.node]
-            replies = decoded(answer) if answer is not None else []
-            here = [
-                reply.data[: row.size]
-                for reply in replies
-                if reply.kind == "upload" and reply.index == row.address and len(reply.data) >= row.size
-            ]
-            if here:
-                requests += hold(node, row.decode(here[0]), Priority.STOP)
+            here = position_in(node.table["present_position"], nodes[node.node])
+            if here is None:
+                requests.append(read_position(node, int, priority=Priority.STOP))
             else:
-                decode = acknowledged(node, row)
-                requests.append(upload(node, row, decode, priority=Priority.STOP, reports_position=True))
-        return Stop(tuple(requests), Promise.HOLD_REQUESTED.value)
+                requests += motion.hold(node, here, Priority.STOP)
+        return Stop(tuple(requests), motion.Promise.HOLD_REQUESTED.value)
 
     def identify(self, node: int) -> Runnable[Identity]:
         return identity.identify(Node(node, self.settings))
 
     def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Procedure[list[Found]]:
-        return scan(self.settings, ids, rates)
+        return scan.scan(self.settings, ids, rates)
 
     def axis(self, identity: Identity) -> AxisDriver:
         profile = PROFILES.get(identity.table)
         if profile is None:
             return AxisDriver()
-        if profile.status_row is None:
+        if "status" not in profile.table:
             return _AXIS
         return replace(_AXIS, current=feedback.current, temperature=feedback.temperature)
 
     def decode(self, data: bytes) -> list[Explanation]:
-        from motorbus.families.kst.decode import decode
-
-        return decode(data, self.settings.profile)
+        return decode.decode(data, self.settings.profile)

@@ -6,27 +6,21 @@ The manual reads the status by the same frame as the position (commands 6 and 7)
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Any, NamedTuple
 
 from motorbus.core.family import Health, State
-from motorbus.core.request import Request, Response
+from motorbus.core.request import Request
 from motorbus.errors import DeviceError
 from motorbus.families.kst import profiles
 from motorbus.families.kst.driver.node import Node, feature_row
-from motorbus.families.kst.driver.requests import accepted, read_register, upload
-
-SAME_FRAME: Final = (
-    "the manual's command 7 is the same frame as its command 6, read position: this device may be returning the "
-    "position, low byte first"
-)
+from motorbus.families.kst.driver.requests import accepted, read_position, read_row, upload
 
 
 class RawStatus(NamedTuple):
-    """The two status bytes of command 7 as received; `warning` says why they are not decoded."""
+    """The two status bytes of command 7 as received; they may be the position, low byte first."""
 
     x1: int
     x2: int
-    warning: str = SAME_FRAME
 
 
 class Status(NamedTuple):
@@ -40,26 +34,21 @@ def position(node: Node) -> Request[float]:
     """Present position, rad."""
     if node.reading is None:
         row = node.table["present_position"]
-        node.reading = read_register(node, row, lambda raw: float(row.to_value(raw)), reports_position=True)
+        node.reading = read_position(node, lambda raw: float(row.to_value(raw)))
     return node.reading
 
 
 def status(node: Node) -> Request[RawStatus | Status]:
-    """Current (A) and temperature (°C); by the profile `kst` the two raw bytes of command 7, with a warning."""
-    if node.profile.status_row is not None:
+    """Current (A) and temperature (°C); by the profile `kst` the two raw bytes of command 7."""
+    if "status" in node.table:
         return _status(node)
     row = node.table["present_position"]
-
-    def decode(answer: Response) -> RawStatus:
-        data = accepted(node, row, answer).data.ljust(2, b"\0")
-        return RawStatus(data[0], data[1])
-
-    return upload(node, row, decode)
+    return upload(node, row, lambda answer: RawStatus(*accepted(node, row, answer).data.ljust(2, b"\0")[:2]))
 
 
 def _status(node: Node) -> Request[Status]:
     row = feature_row(node, "status", "current and temperature")
-    return read_register(node, row, lambda raw: _decode_status(node, raw))
+    return read_row(node, row, lambda raw: _decode_status(node, raw))
 
 
 def _decode_status(node: Node, raw: int) -> Status:
@@ -83,7 +72,7 @@ async def telemetry(node: Node) -> State:
     """
     here = await position(node)
     state = State(at=node.at, position=here)
-    if node.profile.status_row is not None:
+    if "status" in node.table:
         try:
             state = state._replace(**(await _status(node))._asdict())
         except DeviceError as error:
@@ -96,18 +85,13 @@ def health(node: Node) -> Request[Health]:
 
     `restarts` counts boot messages (CiA 301); no source says that these servos send one.
     """
-    status_row, bus = node.profile.status_row, node.settings.state
-    row = status_row or node.table["present_position"]
 
-    def take(raw: int) -> Health:
-        values = (
-            {"position": float(row.to_value(raw))}
-            if status_row is None
-            else _decode_status(node, raw)._asdict()
-        )
-        return Health(
-            State(at=node.at, alarm=node.alarm, **values),
-            restarts=None if bus is None else bus.boots[node.node],
-        )
+    def take(**values: Any) -> Health:
+        state = State(at=node.at, alarm=node.alarm, **values)
+        return Health(state, restarts=node.settings.state.boots[node.node])
 
-    return read_register(node, row, take, reports_position=status_row is None)
+    if "status" in node.table:
+        row = node.table["status"]
+        return read_row(node, row, lambda raw: take(**_decode_status(node, raw)._asdict()))
+    row = node.table["present_position"]
+    return read_position(node, lambda raw: take(position=float(row.to_value(raw))))

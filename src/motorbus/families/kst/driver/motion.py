@@ -1,4 +1,4 @@
-"""Move and stop.
+"""Move, stop, start.
 
 The one motion command is a target position that takes effect at once, at the servo's own speed. A stop makes the
 present position the target; torque stays on. Some makers ignore targets until the servo is started. Source: KST CAN
@@ -7,22 +7,28 @@ protocol manual, command 5; the start rule: a public XQPOWER module.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum
-from functools import partial
-from typing import Final, NamedTuple
+from math import inf
+from typing import Final
 
-from motorbus.core.arrival import wait_in_position
-from motorbus.core.can_frame import CanFrame
+from motorbus.core import move as core
 from motorbus.core.family import State
-from motorbus.core.interrupted import Moving, stopped_if_interrupted
-from motorbus.core.register import Register, changed
-from motorbus.core.request import Effect, Priority, Request, Response
+from motorbus.core.register import Value, changed
+from motorbus.core.request import Effect, Precondition, Priority, Request, Response
 from motorbus.core.setpoint import Setpoint, Stays, torque_on
-from motorbus.core.steps import Emit, catch
+from motorbus.core.steps import gather
+from motorbus.core.stream import PositionStream, read_positions
 from motorbus.errors import DeviceError, LimitExceeded, MotorbusError, RequestError, Stalled
-from motorbus.families.kst.driver.feedback import position
-from motorbus.families.kst.driver.node import Node, check_above_zero
-from motorbus.families.kst.driver.requests import acknowledged, is_absent, read_register, write_register
+from motorbus.families.kst.driver import feedback
+from motorbus.families.kst.driver.node import Node, feature_row
+from motorbus.families.kst.driver.requests import (
+    ask_presence,
+    is_absent,
+    read_position,
+    read_row,
+    write_row,
+)
 from motorbus.families.kst.notifications import encode_start
 
 TOLERANCE: Final = 0.02  # rad, about a degree; no source gives the error under load # assumption
@@ -39,13 +45,6 @@ class Promise(Enum):
     )
 
 
-class Started(NamedTuple):
-    """An event: this servo was started, because its maker's servos ignore positions before."""
-
-    node: int
-    frame: CanFrame
-
-
 async def move(
     node: Node,
     to: float,
@@ -60,52 +59,46 @@ async def move(
     or the travel limits of the servo; Stalled; MotionError after `timeout` s (None: from the distance). Where the
     profile has a start rule, a start is sent first (`Started`). An interrupt of the wait stops the servo.
     """
-    raw = target(node, to)
-    check_above_zero("tolerance", tolerance, "rad", node=node.node)
-    if timeout is not None:
-        check_above_zero("timeout", timeout, "s", node=node.node)
-    goal = await setpoint(node, raw)
-    if not wait:
-        node.last_move = None
-        await send_target(node, goal)
-        return
-
-    async def send_and_wait() -> None:
-        await send_target(node, goal)
-        await wait_arrival(node, goal.value, tolerance, timeout)
-
-    device = Moving(node, partial(stop, node), partial(position, node))
-    await stopped_if_interrupted(send_and_wait(), device)
+    await core.move(MOVE, {node: to}, wait=wait, tolerance=tolerance, timeout=timeout)
 
 
-async def wait_arrival(
-    node: Node, goal: float, tolerance: float = TOLERANCE, timeout: float | None = None
-) -> None:
-    """Wait until the servo is in position. Raises Stalled, or MotionError after `timeout` s."""
+class Move(core.MoveLogic[Node]):
+    """How these servos move, see `core.move`."""
 
-    async def sample() -> State:
-        return State(position=await position(node), at=node.at)
+    tolerance, slowest = TOLERANCE, SLOWEST
 
-    async def stalled(state: State) -> Stalled:
+    async def check(self, node: Node, to: float) -> Setpoint:
+        value = node.table["goal_position"].to_value(target(node, to))
+        return Setpoint(node.node, "position", float(value), *await limits(node))
+
+    async def send(self, node: Node, goal: Setpoint) -> None:
+        """Send the start, each time, because a servo forgets it when it loses its supply; then the target."""
+        row = node.table["goal_position"]
+        if node.settings.must_start:
+            await start(node, goal)
+        await write_row(node, row, node.raw(row, goal.value), (goal,))
+
+    async def sample(self, node: Node) -> State:
+        return State(position=await feedback.position(node), at=node.at)
+
+    async def stop(self, node: Node) -> Promise:
+        return await stop(node)
+
+    def stalled(self, node: Node, state: State, goal: float) -> MotorbusError:
         here = state.position or 0.0
         alarm = f"; alarms: {', '.join(node.alarm)}" if node.alarm else ""
         return Stalled(
             f"node {node.node} stands at {here:.4g} rad, {abs(here - goal):.4g} rad off its goal{alarm}",
-            expected=f"within {tolerance:.4g} rad",
             cause="an obstacle, a heavy load, a weak supply, or a make that must be started first",
             advice="clear the way, or start it (profile=xqpower, nmt=standard); it still pushes: stop() ends that",
             node=node.node,
         )
 
-    def longest(distance: float) -> float:
-        return 1.0 + 2.0 * distance / SLOWEST if timeout is None else timeout
 
-    await wait_in_position(
-        sample, goal, node=node.node, tolerance=tolerance, timeout=longest, stalled=stalled
-    )
+MOVE: Final = Move()
 
 
-def target(node: Node, to: float) -> int:
+def target(node: Node, to: Value) -> int:
     """The raw target, half a count away from zero. Raises LimitExceeded outside the range of the profile."""
     try:
         return node.raw(node.table["goal_position"], to)
@@ -114,44 +107,39 @@ def target(node: Node, to: float) -> int:
         raise LimitExceeded(summary, expected=error.expected, node=node.node) from None
 
 
-async def setpoint(node: Node, raw: int) -> Setpoint:
-    """This raw target as a setpoint, with the limits of the servo for the gate."""
-    low, high = await limits(node)
-    return Setpoint(node.node, "position", float(node.table["goal_position"].to_value(raw)), low, high)
+async def limits(node: Node) -> tuple[float, float]:
+    """Lowest and highest position (rad): the travel limits of the servo within the range of its profile; read once."""
+    if node.limits is None:
+        low, high = await travel(node)
+        if "negative_limit" in node.table:
+            low = max(low, await _limit(node, "negative_limit", low))
+            high = min(high, await _limit(node, "positive_limit", high))
+        node.limits = low, high
+    return node.limits
 
 
-async def send_target(node: Node, goal: Setpoint) -> None:
-    """Send a target; before it the start, each time, because a servo forgets it when it loses its supply."""
+async def _limit(node: Node, name: str, absent: float) -> float:
+    row = node.table[name]
+    try:
+        return await read_row(node, row, lambda raw: float(row.to_value(raw)))
+    except DeviceError as error:
+        if not is_absent(error):
+            raise
+        return absent
+
+
+async def travel(node: Node) -> tuple[float, float]:
+    """Lowest and highest position of the profile (rad). Sends nothing."""
     row = node.table["goal_position"]
-    if node.settings.must_start:
-        await start(node, goal)
-    await write_register(node, row, node.raw(row, goal.value), (goal,))
+    return float(row.to_value(row.low)), float(row.to_value(row.high))
 
 
-async def start(node: Node, goal: Setpoint | None = None) -> None:
-    """Start this servo and report it. With a `goal` the gate checks the start like that goal."""
-    request = start_request(node, True, goal)
-    await request
-    assert isinstance(request.wire, CanFrame)
-    await Emit(Started(node.node, request.wire))
-
-
-def start_request(node: Node, on: bool, goal: Setpoint | None = None) -> Request[object]:
-    """Start or stop, in the form of this bus; it has no reply. A start that lets a servo move counts as torque on."""
-    form = node.settings.nmt
-    frame = node.settings.format(encode_start(form, node.node, on))
-    effect = Effect.NONE
-    setpoints: tuple[Setpoint, ...] = ()
-    if node.settings.must_start:
-        effect = Effect.MOTION if goal else Effect.TORQUE
-        setpoints = (goal or torque_on(node.node),) if on else ()
-    return Request(frame, (), lane=node.node, priority=Priority.CONTROL, effect=effect, setpoints=setpoints)
+# -- stop ------------------------------------------------------------------------------------------------------
 
 
 async def stop(node: Node) -> Promise:
     """Make the present position the target. Torque stays on: these servos have no switch for it."""
-    here = await read_register(node, node.table["present_position"], int, reports_position=True)
-    requests = hold(node, here)
+    requests = hold(node, await read_position(node, int))
     try:
         await requests[-1]
     except DeviceError:
@@ -161,7 +149,7 @@ async def stop(node: Node) -> Promise:
     return Promise.HOLD_REQUESTED
 
 
-def hold(node: Node, here: int, priority: Priority = Priority.CONTROL) -> list[Request[Response]]:
+def hold(node: Node, here: int, priority: Priority = Priority.CONTROL) -> list[Request[None]]:
     """The requests that make this position (raw) the target.
 
     A servo may refuse a position outside its range, so there the end of the range comes first.
@@ -172,31 +160,66 @@ def hold(node: Node, here: int, priority: Priority = Priority.CONTROL) -> list[R
     for raw in dict.fromkeys((max(-limit, min(here, limit)), here)):
         value = float(row.to_value(raw))
         still = Setpoint(node.node, "position", value, value, value, Stays.STILL)
-        request = write_register(node, unlimited, raw, (still,), priority=priority)
-        requests.append(request.with_decoder(acknowledged(node, row)))
+        requests.append(write_row(node, unlimited, raw, (still,), priority))
     return requests
 
 
-async def limits(node: Node) -> tuple[float, float]:
-    """Lowest and highest position (rad): the travel limits of the servo within the range of its profile; read once."""
-    if node.limits is None:
-        goal = node.table["goal_position"]
-        low, high = goal.low, goal.high
-        if "negative_limit" in node.table:
-            low = max(low, await _limit(node, node.table["negative_limit"], low))
-            high = min(high, await _limit(node, node.table["positive_limit"], high))
-        node.limits = float(goal.to_value(low)), float(goal.to_value(high))
-    return node.limits
+# -- start -----------------------------------------------------------------------------------------------------
 
 
-async def _limit(node: Node, row: Register, absent: int) -> int:
-    found = await catch(read_register(node, row, int))
-    if isinstance(found, MotorbusError) and not is_absent(found):
-        raise found
-    return found if isinstance(found, int) else absent
+def start(node: Node, goal: Setpoint | None = None) -> Request[Response]:
+    """Start this servo; it has no reply. With a `goal` the gate checks the start like that goal."""
+    frame = node.settings.format(encode_start(node.settings.nmt, node.node, True))
+    effect, setpoint = (Effect.MOTION, goal) if goal else (Effect.TORQUE, torque_on(node.node))
+    return Request(frame, lane=node.node, priority=Priority.CONTROL, effect=effect, setpoints=(setpoint,))
 
 
-async def travel(node: Node) -> tuple[float, float]:
-    """Lowest and highest position of the profile (rad). Sends nothing."""
-    row = node.table["goal_position"]
-    return float(row.to_value(row.low)), float(row.to_value(row.high))
+async def set_reports(node: Node, on: bool) -> None:
+    """Let the servo report its position at its own interval, or not; it does not acknowledge that.
+
+    Where the profile has a start rule, this also lets it move, or ignore positions until the next start.
+    """
+    feature_row(node, "report_interval", "reports")
+    form = node.settings.nmt
+    if form == "none":
+        raise RequestError(
+            f"node {node.node}: this bus has no form of start and stop",
+            expected="nmt=profile, nmt=vendor or nmt=standard",
+            node=node.node,
+        )
+    frame = node.settings.format(encode_start(form, node.node, on))
+    await (start(node) if on and node.settings.must_start else Request[Response](frame, lane=node.node))
+
+
+# -- control loop ----------------------------------------------------------------------------------------------
+
+
+async def open_stream(servos: Sequence[Node], *, rate: int) -> PositionStream[Node]:
+    """These servos for a control loop. Reads their limits and writes nothing; `rate` (bit/s) has no effect here.
+
+    A target is checked against these limits. After a change of limits, mid point or sense of rotation it means
+    something else and is refused. `start` makes the present position the target; the servos have no speed setting.
+    Raises RequestError for no servo or a repeated one; else the first error of a servo.
+    """
+
+    async def read_limits(node: Node) -> tuple[float, float]:
+        found = await limits(node)
+        if node.at == -inf:  # the profile has no limits to read
+            await ask_presence(node)
+        return found
+
+    found = await gather(*[read_limits(node) for node in servos])
+    known = dict(zip(servos, found, strict=True))
+
+    def goal(node: Node, to: float, precondition: Precondition) -> Request[None]:
+        row, raw = node.table["goal_position"], target(node, to)
+        setpoint = Setpoint(node.node, "position", float(row.to_value(raw)), *known[node])
+        return write_row(node, row, raw, (setpoint,), precondition=precondition)
+
+    async def start_one(node: Node, speed: float | None) -> None:
+        if node.settings.must_start:
+            await start(node)
+        await stop(node)
+
+    positions = [read_positions(node.node, feedback.position(node)) for node in servos]
+    return PositionStream(servos, positions, goal, start_one, lambda node: node.limits != known[node])

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass, field
 from math import inf
-from typing import Any, Final
+from typing import Final
 
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.register import Register, RegisterMap, Value, is_number, shown
@@ -19,43 +20,32 @@ SIZED: Final = ("no", "yes")
 NMT: Final = ("profile", "none", "vendor", "standard")
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
 class BusSettings:
-    """How the servos of one bus are addressed. Raises RequestError, with the choices, for an invalid setting.
+    """How the servos of one bus are addressed.
 
-    `profile`   a name of `PROFILES`: scale, range, objects and start rule of the maker
+    `profile`   scale, range, objects and start rule of the maker
     `extended`  29-bit identifiers (id_format=ext); else 11-bit
     `sized`     writes state their length (CiA 301); else specifier 0x22, as in the manual
-    `nmt`       form of start and stop: "none", "vendor" or "standard"; with the last, servos must be started
-                before they accept positions (`must_start`)
-    `state`     what the open bus has received; None before it is opened
+    `form`      of start and stop, one of `NMT`
+    `state`     what the open bus has received
     """
 
-    def __init__(
-        self,
-        profile: str = "kst",
-        id_format: str = "std",
-        sized: str | bool = "no",
-        nmt: str = "profile",
-        state: BusState | None = None,
-    ) -> None:
-        if isinstance(sized, bool):
-            sized = "yes" if sized else "no"
-        self.profile: Final[Profile] = PROFILES[_choice("profile", profile, PROFILES)]
-        self.extended: Final = _choice("id_format", id_format, ID_FORMATS) == "ext"
-        self.sized: Final = _choice("sized", sized, SIZED) == "yes"
-        form = _choice("nmt", nmt, NMT)
-        self.nmt: Final = self.profile.nmt if form == "profile" else form
-        self.must_start: Final = self.nmt == "standard"
-        self.state: Final = state
-        self._given: Final = {"profile": profile, "id_format": id_format, "sized": sized, "nmt": nmt}
+    profile: Profile = PROFILES["kst"]
+    extended: bool = False
+    sized: bool = False
+    form: str = "profile"
+    state: BusState = field(default_factory=BusState)
 
-    def replace(self, **changed: Any) -> BusSettings:
-        """These settings with some replaced; the state is shared unless it is replaced."""
-        return BusSettings(**{**self._given, "state": self.state, **changed})
+    @property
+    def nmt(self) -> str:
+        """The form of start and stop: "none", "vendor" or "standard"."""
+        return self.profile.nmt if self.form == "profile" else self.form
 
-    def format(self, frame: CanFrame) -> CanFrame:
-        """The frame with an identifier of 11 or 29 bits, as the bus uses."""
-        return frame._replace(extended=self.extended)
+    @property
+    def must_start(self) -> bool:
+        """Servos accept positions only after a start."""
+        return self.nmt == "standard"
 
     def upload(self, node: int, row: Register) -> CanFrame:
         """The request that reads this object of one servo or of all (0)."""
@@ -66,8 +56,13 @@ class BusSettings:
         frame = sdo.encode_download(node, row.address, row.subindex or 0, row.encode(raw), sized=self.sized)
         return self.format(frame)
 
+    def format(self, frame: CanFrame) -> CanFrame:
+        """The frame with an identifier of 11 or 29 bits, as the bus uses."""
+        return frame._replace(extended=self.extended)
 
-def _choice(name: str, value: object, choices: Iterable[str]) -> str:
+
+def choice(name: str, value: object, choices: Iterable[str]) -> str:
+    """The setting in lower case. Raises RequestError, with the choices, for any other."""
     word = str(value).lower()
     if word in choices:
         return word
@@ -82,7 +77,6 @@ class Node:
 
     `at`         arrival time of its last reply (s, link clock)
     `limits`     travel limits (rad) as last read; None: not read yet
-    `saved`      raw values that were saved here, by name
     `last_move`  identifies its latest move
     `reading`    the request for its position, which is made once
     """
@@ -94,15 +88,13 @@ class Node:
         self.table: Final[RegisterMap] = settings.profile.table
         self.limits: tuple[float, float] | None = None
         self.at = -inf
-        self.saved: dict[str, int] = {}
         self.last_move: object = None
         self.reading: Request[float] | None = None
 
     @property
     def alarm(self) -> tuple[str, ...]:
         """Alarms received within 5 s before its last reply; a servo does not report that an alarm is over."""
-        state = self.settings.state
-        return () if state is None else state.alarm(self.node, self.at)
+        return self.settings.state.alarm(self.node, self.at)
 
     def raw(self, row: Register, value: Value) -> int:
         """Value in the unit of the row -> raw value. Raises RequestError if not finite, or an angle out of range."""
@@ -131,19 +123,6 @@ def checked_id(node: int) -> int:
     raise RequestError(f"{shown(node)} is not the id of a servo", expected="1 to 127; 0 addresses all servos")
 
 
-def checked_ids(nodes: Iterable[int]) -> list[int]:
-    """These ids, each once, in order. Raises RequestError for an invalid id."""
-    return list(dict.fromkeys(checked_id(node) for node in nodes))
-
-
 def hexadecimal(node: int) -> str:
     """An id as users of this protocol write it: 0x25 (37)."""
     return f"0x{node:02X} ({node})"
-
-
-def check_above_zero(name: str, value: object, unit: str, *, node: int | None = None) -> None:
-    """Raise RequestError unless this is a finite number above 0."""
-    if not (is_number(value) and value > 0):
-        raise RequestError(
-            f"{name} {shown(value)} is not a finite number above 0", expected=f"a number in {unit}", node=node
-        )

@@ -8,32 +8,31 @@ to 4.
 
 from __future__ import annotations
 
-from contextlib import suppress
-from typing import Final, NamedTuple
+from collections.abc import Iterable
+from typing import Final, NamedTuple, TypeVar
 
-from motorbus.core.request import Priority
+from motorbus.core.family import IdChanged
+from motorbus.core.register import is_number, shown
+from motorbus.core.request import Priority, Request
 from motorbus.core.scan import BitrateRestored
-from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate, Sleep
+from motorbus.core.steps import Emit, Exclusive, Progress, Runnable, SetBitrate, Sleep
 from motorbus.errors import NoReply, OutcomeUnknown, RequestError, VerificationFailed
+from motorbus.families.kst.driver.broadcast import broadcast_ping
 from motorbus.families.kst.driver.identity import (
-    ReplyCount,
     answers_alone,
     count_replies,
-    id_taken,
     identify,
-    set_bit_rate,
-    survey,
-    write_node_id,
+    read_id,
+    second_servo,
 )
-from motorbus.families.kst.driver.node import Node, check_above_zero, checked_id, hexadecimal
-from motorbus.families.kst.driver.scan import broadcast_ids, set_named_rate
-from motorbus.families.kst.driver.settings import save
+from motorbus.families.kst.driver.node import Node, checked_id, hexadecimal
+from motorbus.families.kst.driver.requests import ask_presence, save, write_row
 from motorbus.families.kst.profiles import bit_rate_code
+
+T = TypeVar("T")
 
 TIMEOUT: Final = 120.0  # s to wait for the power cycle
 PERIOD: Final = 0.1  # s between two reads while waiting
-SILENT_READS: Final = 3
-"""Reads without a reply in a row that count as a loss of power; a single one may be a lost frame."""
 STEPS: Final = 4
 
 
@@ -55,11 +54,10 @@ class Provisioned(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Where the servo answered (bit/s), and the id that it read back when everything was written."""
+    """Where a servo answers: its id and its rate (bit/s)."""
 
     node: Node
     rate: int
-    reads_back: int | None = None
 
 
 async def set_id(node: Node, new: int, *, timeout: float = TIMEOUT) -> Provisioned:
@@ -81,175 +79,173 @@ async def provision(
     `PowerCycleNeeded`; waits at most `timeout` s; verifies. It may be called again at any point.
 
     Raises RequestError (nothing is written) for an invalid id or rate, an id in use, two servos with one id, or a new
-    rate while other servos are on the bus; NoReply; VerificationFailed when it comes back with the old values, or
-    beside another servo with its new id; OutcomeUnknown when it does not come back in time, or answers to both ids.
+    rate while other servos are on the bus; NoReply; VerificationFailed when it comes back beside another servo with its
+    new id; OutcomeUnknown when it does not come back in time, or a servo answers to both ids.
     """
     if new_id is None and new_rate is None:
         raise RequestError("nothing to provision", expected="new_id=, new_rate=, or both")
-    check_above_zero("timeout", timeout, "s", node=node.node)
-    new = node
-    if new_id is not None and checked_id(new_id) != node.node:
-        new = Node(new_id, node.settings)
+    if not (is_number(timeout) and timeout > 0):
+        raise RequestError(
+            f"timeout {shown(timeout)} is not a finite number above 0", expected="a number in s"
+        )
     if new_rate is not None:
-        bit_rate_code(new_rate)
-    rate = await SetBitrate(0)
-    change = Change(node, new, rate, rate if new_rate is None else new_rate)
-    place = await Exclusive(change.write())
-    if place is not None:
-        await Emit(PowerCycleNeeded(node.node, new.node, change.new_rate))
-        await change.wait(place, timeout)
+        bit_rate_code(new_rate)  # raises
+    new = node if new_id is None or checked_id(new_id) == node.node else Node(new_id, node.settings)
+    rate = await SetBitrate(0)  # 0 reads it
+    goal = Place(new, new_rate or rate)
+    await Emit(Progress(0, STEPS, "looking for the servo"))
+    found = await Exclusive(_find((node, new), (rate, goal.rate)))
+    if found != goal:
+        await Exclusive(_at(found.rate, _write(found, goal)))
+        await Emit(PowerCycleNeeded(node.node, new.node, goal.rate))
+        await _wait(found, goal, timeout)
     await Emit(Progress(STEPS - 1, STEPS, "it is back: verifying"))
-    firmware = await Exclusive(change.verify(place))
+    firmware = await Exclusive(_at(goal.rate, _verify(found, goal)))
     await Emit(Progress(STEPS, STEPS, "verified after the restart"))
-    return Provisioned(new.node, change.new_rate, firmware, resumed=place is None)
+    return Provisioned(new.node, goal.rate, firmware, resumed=found == goal)
 
 
-class Change:
-    """The servo `old` at `rate` is to become `new` at `new_rate`."""
+async def _at(rate: int, runnable: Runnable[T]) -> T:
+    """Run this at another rate (bit/s) of the bus. Reserve the bus."""
+    async with BitrateRestored():
+        await SetBitrate(rate)
+        return await runnable
 
-    def __init__(self, old: Node, new: Node, rate: int, new_rate: int) -> None:
-        self.old = old
-        self.new = new
-        self.rate = rate
-        self.new_rate = new_rate
 
-    async def write(self) -> Place | None:
-        """Find the servo, write what is missing, save. None: it has everything already, nothing was written."""
-        async with BitrateRestored():
-            await Emit(Progress(0, STEPS, "looking for the servo"))
-            node, rate, _ = await self._find()
-            before = await count_replies(node)
-            if (node, rate) == (self.new, self.new_rate):
-                return None
-            if rate != self.new_rate:
-                await self._check_no_other(rate)
-            await Emit(Progress(1, STEPS, f"writing to {hexadecimal(node.node)}"))
-            if node is not self.new or before.reads_back not in (None, node.node):
-                await write_node_id(node, self.new.node)
-            if rate != self.new_rate:
-                await set_bit_rate(node, self.new_rate)
-            written = await count_replies(node)
-            await Emit(Progress(2, STEPS, "saving"))
-            await save(node)
-            return Place(node, rate, written.reads_back)
+async def _find(nodes: Iterable[Node], rates: Iterable[int]) -> Place:
+    """The id and rate, of the old and the new ones, at which the servo answers now."""
+    nodes, rates = dict.fromkeys(nodes), dict.fromkeys(rates)
+    for rate in rates:
+        found = [node for node in nodes if await _at(rate, answers_alone(node))]
+        if len(found) == 2:
+            raise id_taken(*found)
+        if found:
+            return Place(found[0], rate)
+    old, *_ = nodes
+    raise NoReply(
+        f"no servo answers as {' or '.join(hexadecimal(node.node) for node in nodes)}",
+        expected=f"one servo at {' or '.join(map(str, rates))} bit/s",
+        cause="no power, a loose cable, another id, or another bit rate",
+        advice="`motorbus scan BUS` lists the servos",
+        node=old.node,
+    )
 
-    async def _find(self) -> Place:
-        """The id and rate, of the old and the new ones, at which the servo answers now."""
-        nodes = dict.fromkeys((self.old, self.new))
-        rates = dict.fromkeys((self.rate, self.new_rate))
-        for rate in rates:
-            if rate != self.rate:
-                await set_named_rate(self.old.settings, rate)
-            found = [node for node in nodes if await answers_alone(node)]
-            if len(found) == 2:
-                raise id_taken(self.old.node, self.new.node)
-            if found:
-                return Place(found[0], rate)
-        raise NoReply(
-            f"no servo answers as {' or '.join(hexadecimal(node.node) for node in nodes)}",
-            expected=f"one servo at {' or '.join(map(str, rates))} bit/s",
-            cause="no power, a loose cable, another id, or another bit rate",
-            advice="`motorbus scan BUS` lists the servos",
-            node=self.old.node,
+
+async def _write(found: Place, goal: Place) -> None:
+    """Write what is missing, read it back, save."""
+    node, new = found.node, goal.node.node
+    if found.rate != goal.rate:
+        await _check_no_other(found, goal)
+    await Emit(Progress(1, STEPS, f"writing to {hexadecimal(node.node)}"))
+    if node.node != new or await read_id(node) not in (None, new):
+        await write_node_id(node, new)
+    if found.rate != goal.rate:
+        await set_bit_rate(node, goal.rate)
+    await Emit(Progress(2, STEPS, "saving"))
+    await save(node)
+
+
+async def _check_no_other(found: Place, goal: Place) -> None:
+    """A servo at another rate breaks the frames of the others."""
+    answering = await broadcast_ping(found.node.settings)
+    others = sorted(set(answering) - {found.node.node, goal.node.node})
+    if others:
+        raise RequestError(
+            f"the servo is not alone: {', '.join(map(hexadecimal, others))} would stay at {found.rate} bit/s",
+            cause="servos at two rates on one bus break each other's frames",
+            advice="connect it alone; broadcast_write() of bit_rate_code and store changes all at once",
+            node=found.node.node,
         )
 
-    async def _check_no_other(self, rate: int) -> None:
-        """A servo at another rate breaks the frames of the others."""
-        answer = await broadcast_ids(self.old.settings, Priority.POLL)
-        others = sorted({reply.lane for reply in answer.replies} - {self.old.node, self.new.node})
-        if others:
-            raise RequestError(
-                f"the servo is not alone: {', '.join(map(hexadecimal, others))} would stay at {rate} bit/s",
-                cause="servos at two rates on one bus break each other's frames",
-                advice="connect it alone; broadcast_bit_rate() and broadcast_save() change all at once",
-                node=self.old.node,
+
+async def _wait(old: Place, goal: Place, timeout: float) -> None:
+    """Read at the new place until the servo answers there. Raises OutcomeUnknown after `timeout` s."""
+    begun = await Sleep(0)  # the time
+    while not await Exclusive(_at(goal.rate, count_replies(goal.node))):
+        if await Sleep(PERIOD) - begun > timeout:
+            raise OutcomeUnknown(
+                f"{hexadecimal(old.node.node)} was set to {hexadecimal(goal.node.node)} at {goal.rate} bit/s and "
+                f"saved; it did not come back within {timeout:g} s",
+                cause="its supply was not taken away and given back yet, or it went before the flash was written",
+                advice="power-cycle it, then call provision again: it continues from the present state",
+                node=old.node.node,
             )
 
-    async def wait(self, place: Place, timeout: float) -> None:
-        """Read at the old place and the new one in turn until the servo answers at the new one only.
 
-        Another rate is tried only while the servo is silent at the old one. Raises VerificationFailed if it comes back
-        unchanged, OutcomeUnknown after `timeout` s or if a servo answers at both places.
-        """
-        old, new = place.node.node, self.new.node
-        begun = await Sleep(0)  # the time
-        silent = 0
-        while True:
-            now = await self._count_replies(place.node, place.rate)
-            arrived = False
-            if not now.replies or place.rate == self.new_rate:
-                with suppress(RequestError):  # the bus is in use at the old rate
-                    arrived = (await self._count_replies(self.new, self.new_rate)).replies > 0
-            if arrived and not now.replies:
-                return
-            pending = new != old and now.reads_back == new  # it has not restarted
-            forgotten = (
-                new != old and place.reads_back == new and now.reads_back == old
-            )  # it has, without the new id
-            if now.replies and (forgotten or (silent >= SILENT_READS and not pending)):
-                if arrived:
-                    raise self._answers_at_both(old)
-                raise VerificationFailed(
-                    f"{hexadecimal(old)} came back as it was, at {place.rate} bit/s: the change was not saved",
-                    cause="its supply went before its flash was written, or it did not receive the save",
-                    advice="call provision again, and keep its supply on until the power cycle is needed",
-                    node=old,
-                )
-            silent = 0 if now.replies else silent + 1
-            if now.at - begun > timeout:
-                raise OutcomeUnknown(
-                    f"{hexadecimal(self.old.node)} was set to {hexadecimal(new)} at {self.new_rate} bit/s and saved; "
-                    f"it did not come back within {timeout:g} s",
-                    cause="its supply has not been taken away and given back yet",
-                    advice="power-cycle it, then call provision again: it continues from the present state",
-                    node=self.old.node,
-                )
-            await Sleep(PERIOD)
-
-    async def _count_replies(self, node: Node, rate: int) -> ReplyCount:
-        """Read the id once; at another rate than that of the bus with the bus reserved."""
-
-        async def at_other_rate() -> ReplyCount:
-            async with BitrateRestored():
-                await set_named_rate(node.settings, rate)
-                return await count_replies(node)
-
-        return await (count_replies(node) if rate == self.rate else Exclusive(at_other_rate()))
-
-    async def verify(self, place: Place | None) -> str:
-        """Check that one servo answers with the new id, and none with the old one. Returns its firmware version."""
-        new = self.new.node
-        async with BitrateRestored():
-            if self.new_rate != self.rate:
-                await SetBitrate(self.new_rate)
-            old = place.node if place is not None and place.rate == self.new_rate else self.new
-            if old is not self.new and (await count_replies(old)).replies:
-                raise self._answers_at_both(old.node)
-            _, second = await survey(self.new)
-            if second:
-                raise VerificationFailed(
-                    f"two servos answer as {hexadecimal(new)} after the restart: {second}",
-                    cause="a servo that had this id already has joined the bus, or the bus is disturbed",
-                    advice="take one of them off the bus, then provision the other one to a free id",
-                    node=new,
-                )
-            identity = await identify(self.new)
-            found = identity.details["reads_back_id"]
-            if found not in (None, new):
-                raise VerificationFailed(
-                    f"it answers as {hexadecimal(new)} and reads back the id {found}",
-                    cause="another id was written to it since, which the next restart may bring into force",
-                    advice=f"set_node_id({new}) and save(), power-cycle it, then call this again",
-                    node=new,
-                )
-            return identity.firmware
-
-    def _answers_at_both(self, old: int) -> OutcomeUnknown:
-        new = hexadecimal(self.new.node)
-        return OutcomeUnknown(
-            f"{new} answers, and {hexadecimal(old)} does too: which of them is the servo that was provisioned is not "
-            "known",
+async def _verify(old: Place, goal: Place) -> str:
+    """Check that one servo answers with the new id, and none with the old one. Returns its firmware version."""
+    node, new = goal.node, goal.node.node
+    if old.node is not node and old.rate == goal.rate and await count_replies(old.node):
+        raise OutcomeUnknown(
+            f"{hexadecimal(new)} answers, and {hexadecimal(old.node.node)} does too: which of them is the servo that "
+            "was provisioned is not known",
             cause="another servo has joined the bus meanwhile, or this one has not restarted",
             advice="take one of them off the bus, then call provision again: it continues from the present state",
-            node=self.new.node,
+            node=new,
         )
+    if second := await second_servo(node):
+        raise VerificationFailed(
+            f"two servos answer as {hexadecimal(new)} after the restart: {second}",
+            cause="a servo that had this id already has joined the bus, or the bus is disturbed",
+            advice="take one of them off the bus, then provision the other one to a free id",
+            node=new,
+        )
+    identity = await identify(node)
+    found = identity.details["reads_back_id"]
+    if found not in (None, new):
+        raise VerificationFailed(
+            f"it answers as {hexadecimal(new)} and reads back the id {found}",
+            cause="another id was written to it since, which the next restart may bring into force",
+            advice=f"set_node_id({new}) and save(), power-cycle it, then call this again",
+            node=new,
+        )
+    return identity.firmware
+
+
+# -- single commands of the manual -----------------------------------------------------------------------------
+
+
+async def set_node_id(node: Node, new: int) -> None:
+    """Give it another id, 1 to 127. It takes effect after save() and a restart; without a save, a restart discards it.
+
+    Raises RequestError (nothing is written) for an impossible id, two servos with this id, or an id in use; NoReply;
+    VerificationFailed when it reads back neither the old nor the new id. To swap two ids, use a third one.
+    """
+    other = Node(new, node.settings)
+    if not await Exclusive(answers_alone(node)):
+        await ask_presence(node)  # raises NoReply
+    if new != node.node and await count_replies(other):
+        raise id_taken(node, other)
+    await write_node_id(node, new)
+
+
+def id_taken(old: Node, new: Node) -> RequestError:
+    """The error for a new id at which a servo answers."""
+    return RequestError(
+        f"the id {hexadecimal(new.node)} is taken: a servo answers as it beside {hexadecimal(old.node)}",
+        advice="choose a free id, or take that servo off the bus",
+        node=new.node,
+    )
+
+
+async def write_node_id(node: Node, new: int) -> None:
+    """As `set_node_id`, without the checks of both ids."""
+    await Emit(IdChanged(node.node, new))
+    await write_row(node, node.table["node_id"], new, priority=Priority.CONFIGURATION)
+    found = await read_id(node)
+    if found not in (None, new, node.node):  # some servos read back the id in force
+        raise VerificationFailed(
+            f"node {node.node} was set to {new} and reads back {found}",
+            cause="two servos with one id, or another program",
+            advice="do not save; restart it, and the old id is in force again",
+            node=node.node,
+        )
+
+
+def set_bit_rate(node: Node, rate: int) -> Request[None]:
+    """Give it another bit rate (bit/s). It takes effect after save() and a restart; without a save it is discarded.
+
+    Raises RequestError for a rate that no servo has.
+    """
+    row = node.table["bit_rate_code"]
+    return write_row(node, row, bit_rate_code(rate), priority=Priority.CONFIGURATION)

@@ -1,4 +1,4 @@
-"""Requests to one servo: read an object, write one.
+"""Requests to one servo: read an object, write one, save.
 
 A reply is accepted by its index and sub-index, also an acknowledgement. An abort raises DeviceError with the words of
 the manual.
@@ -6,26 +6,18 @@ the manual.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Final, TypeVar
+from collections.abc import Callable
+from typing import Any, Final, TypeVar
 
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.register import Register
-from motorbus.core.request import (
-    Data,
-    Effect,
-    ExactDecoder,
-    Precondition,
-    Priority,
-    Request,
-    Response,
-    TimeoutClass,
-)
+from motorbus.core.request import ANY, Data, Effect, Priority, Request, Response, TimeoutClass
 from motorbus.core.setpoint import Setpoint
 from motorbus.errors import DeviceError, UnexpectedReply
 from motorbus.families.kst import sdo
 from motorbus.families.kst.driver.node import Node
-from motorbus.families.kst.sdo import SdoReply
+from motorbus.families.kst.profiles import SAVE
+from motorbus.families.kst.sdo import Sdo
 
 T = TypeVar("T")
 
@@ -34,83 +26,54 @@ CHANGES_POSITION: Final = frozenset(("mid_point", "negative_limit", "positive_li
 as torque on."""
 UNSIZED_REFUSED: Final = frozenset((0x0504_0001, 0x0607_0010, 0x0607_0012, 0x0607_0013))
 """Abort codes that may mean "state the length"."""
-SDO_HEAD: Final = 4  # specifier, index and sub-index
 ABSENT: Final = frozenset((0x0601_0000, 0x0601_0001, 0x0602_0000, 0x0609_0011))
 """Abort codes of an object that cannot be read."""
 
 
-def upload(
-    node: Node,
-    row: Register,
-    decode: Callable[[Response], T],
-    *,
-    priority: Priority = Priority.POLL,
-    reply_within: TimeoutClass = TimeoutClass.REPLY,
-    reports_position: bool | Callable[[Response], Mapping[int, float]] = False,
-    decode_exact: ExactDecoder[T] | None = None,
-) -> Request[T]:
+def upload(node: Node, row: Register, decode: Callable[[Response], T], **options: Any) -> Request[T]:
     """Read an object; `decode` gets the response, which may be an abort."""
-    return Request(
-        node.settings.upload(node.node, row),
-        (sdo.upload_due(node.node, row.address, row.subindex or 0),),
-        decode,
-        lane=node.node,
-        priority=priority,
-        reply_within=reply_within,
-        repeatable=True,
-        reports_position=reports_position,
-        decode_exact=decode_exact,
+    due = sdo.expected(node.node, "upload", row.address, row.subindex or 0)
+    frame = node.settings.upload(node.node, row)
+    return Request(frame, (due,), decode, lane=node.node, repeatable=True, **options)
+
+
+def read_row(node: Node, row: Register, take: Callable[[int], T]) -> Request[T]:
+    """Read an object; `take` gets its raw value. Raises DeviceError for an abort, UnexpectedReply for another size."""
+    return upload(
+        node, row, lambda answer: take(row.decode(value_bytes(node, row, accepted(node, row, answer))))
     )
 
 
-def read_register(
-    node: Node, row: Register, take: Callable[[int], T], *, reports_position: bool = False
-) -> Request[T]:
-    """Read an object; `take` gets its raw value. Raises DeviceError for an abort, UnexpectedReply for another size."""
-
-    def decode(answer: Response) -> T:
-        return take(row.decode(value_bytes(node, row, accepted(node, row, answer))))
+def read_position(node: Node, take: Callable[[int], T], **options: Any) -> Request[T]:
+    """Read the present position as `read_row`; the bus learns it, and decodes a reply of the usual form at once."""
+    row = node.table["present_position"]
+    head = sdo.encode_upload_reply(node.node, row.address, 0, bytes(row.size)).data[:4]
+    identifier, extended = sdo.REPLY + node.node, node.settings.extended
 
     def positions(answer: Response) -> dict[int, float]:
-        reply = sdo.decode_reply(answer.replies[0].data)
-        if reply is None or reply.kind != "upload" or len(reply.data) < row.size:
-            return {}
-        return {node.node: float(row.to_value(row.decode(reply.data[: row.size])))}
-
-    reply = node.settings.format(
-        sdo.encode_upload_reply(node.node, row.address, row.subindex or 0, bytes(row.size))
-    )
+        raw = position_in(row, answer)
+        return {} if raw is None else {node.node: float(row.to_value(raw))}
 
     def decode_exact(frame: Data, at: float) -> T | None:
-        if type(frame) is not CanFrame or frame.id != reply.id or frame.extended is not reply.extended:
+        if type(frame) is not CanFrame or frame.id != identifier or frame.extended is not extended:
             return None
-        if len(frame.data) != sdo.LENGTH or frame.data[:SDO_HEAD] != reply.data[:SDO_HEAD]:
+        data = frame.data
+        if len(data) != sdo.LENGTH or data[:4] != head:
             return None
         node.at = at
-        return take(row.decode(frame.data[SDO_HEAD : SDO_HEAD + row.size]))
+        return take(row.decode(data[4 : 4 + row.size]))
 
-    return upload(
-        node,
-        row,
-        decode,
-        reports_position=reports_position and positions,
-        decode_exact=decode_exact if reports_position else None,
-    )
+    decode = read_row(node, row, take).decode
+    assert decode is not None
+    return upload(node, row, decode, reports_position=positions, decode_exact=decode_exact, **options)
 
 
-def value_bytes(node: Node, row: Register, reply: SdoReply) -> bytes:
-    """The bytes of this object in a reply. Raises UnexpectedReply for another size, save for an extended sign."""
-    own, more = reply.data[: row.size], reply.data[row.size :]
-    extended = more in (bytes(len(more)), b"\xff" * len(more) if own[-1:] > b"\x7f" else b"")
-    if reply.kind == "upload" and len(own) == row.size and (reply.size is None or extended):
-        return own
-    length = "segments" if reply.kind == "upload-start" else f"{reply.size} bytes"
-    raise UnexpectedReply(
-        f"node {node.node} sends {row.name} in {length}, not in {row.size} bytes",
-        received=reply.data,
-        cause=f"its maker is not that of the profile {node.profile.name}, as in kst:PORT,profile=kst-ext",
-        node=node.node,
-    )
+def position_in(row: Register, answer: Response | None) -> int | None:
+    """The raw position in the replies to a read of it, or None."""
+    for reply in decoded(answer) if answer else ():
+        if reply.kind == "upload" and reply.index == row.address and len(reply.data) >= row.size:
+            return row.decode(reply.data[: row.size])
+    return None
 
 
 def ask_presence(node: Node) -> Request[None]:
@@ -122,14 +85,13 @@ def ask_presence(node: Node) -> Request[None]:
     return upload(node, node.table["node_id"], decode)
 
 
-def write_register(
+def write_row(
     node: Node,
     row: Register,
     raw: int,
     setpoints: tuple[Setpoint, ...] = (),
-    *,
     priority: Priority = Priority.CONTROL,
-    precondition: Precondition | None = None,
+    **options: Any,
 ) -> Request[None]:
     """Write an object. Raises RequestError outside its range, DeviceError for an abort, OutcomeUnknown without a reply.
 
@@ -141,44 +103,80 @@ def write_register(
 
     return Request(
         node.settings.download(node.node, row, raw),
-        (sdo.download_due(node.node, row.address, row.subindex or 0),),
+        (sdo.expected(node.node, "download", row.address, row.subindex or 0),),
         decode,
         lane=node.node,
         priority=priority,
-        effect=Effect.TORQUE if row.name in CHANGES_POSITION else row.effect,
+        effect=effect_of(row),
         setpoints=setpoints,
         repeatable=row.name != "mid_point",
-        precondition=precondition,
+        **options,
     )
 
 
-def accepted(node: Node, row: Register, answer: Response) -> SdoReply:
-    """The decoded reply. Raises DeviceError for an abort."""
-    node.at = answer.at
-    reply = sdo.decode_reply(answer.replies[0].data)
-    assert reply is not None  # a receiver makes no reply of an invalid frame
-    if reply.kind == "abort":
-        raise refused(node, row, reply)
-    return reply
+def effect_of(row: Register) -> Effect:
+    """The effect of a write of this object."""
+    return Effect.TORQUE if row.name in CHANGES_POSITION else row.effect
 
 
-def acknowledged(node: Node, row: Register) -> Callable[[Response], Response]:
-    """A decoder that gives the response itself. It raises DeviceError for an abort."""
+def save(node: Node) -> Request[None]:
+    """Store node id, bit rate, travel limits and function bits; never the target position.
 
-    def decode(answer: Response) -> Response:
-        accepted(node, row, answer)
-        return answer
+    The request holds the lane of the node until flash is written. No reply is expected; an abort raises DeviceError.
+    """
+    row = node.table["store"]
 
-    return decode
+    def decode(answer: Response) -> None:
+        node.at = answer.at
+        for reply in decoded(answer):
+            if reply.kind == "abort" and reply.index in (row.address, 0):
+                raise refused(node, row, reply)
+
+    return Request(
+        node.settings.download(node.node, row, SAVE),
+        ANY,
+        decode,
+        lane=node.node,
+        priority=Priority.CONFIGURATION,
+        effect=row.effect,
+        reply_within=TimeoutClass.STORE,
+    )
 
 
-def decoded(answer: Response) -> list[SdoReply]:
+# -- replies ---------------------------------------------------------------------------------------------------
+
+
+def decoded(answer: Response) -> list[Sdo]:
     """All replies of a response."""
     replies = [sdo.decode_reply(reply.data) for reply in answer.replies]
     return [reply for reply in replies if reply is not None]
 
 
-def refused(node: Node, row: Register, reply: SdoReply) -> DeviceError:
+def accepted(node: Node, row: Register, answer: Response) -> Sdo:
+    """The decoded reply. Raises DeviceError for an abort."""
+    node.at = answer.at
+    (reply,) = decoded(answer)
+    if reply.kind == "abort":
+        raise refused(node, row, reply)
+    return reply
+
+
+def value_bytes(node: Node, row: Register, reply: Sdo) -> bytes:
+    """The bytes of this object in a reply. Raises UnexpectedReply for another size, save for an extended sign."""
+    own, more = reply.data[: row.size], reply.data[row.size :]
+    extended = more in (bytes(len(more)), b"\xff" * len(more) if own[-1:] > b"\x7f" else b"")
+    if reply.kind == "upload" and len(own) == row.size and (reply.size is None or extended):
+        return own
+    length = "segments" if reply.kind == "segments" else f"{reply.size} bytes"
+    raise UnexpectedReply(
+        f"node {node.node} sends {row.name} in {length}, not in {row.size} bytes",
+        received=reply.data,
+        cause=f"its maker is not that of the profile {node.profile.name}, as in kst:PORT,profile=kst-ext",
+        node=node.node,
+    )
+
+
+def refused(node: Node, row: Register, reply: Sdo) -> DeviceError:
     """The error for an abort of a request for this object."""
     code, advice = sdo.meant_code(reply.code), ""
     if code in ABSENT:

@@ -6,14 +6,7 @@ They have no method for torque: these servos have no torque switch and hold when
 from __future__ import annotations
 
 from motorbus.core.device import AsyncDevice, AsyncRunner, BlockingDevice, BlockingRunner, device_method
-from motorbus.families.kst.driver import (
-    access,
-    feedback,
-    identity,
-    motion,
-    provisioning,
-    settings,
-)
+from motorbus.families.kst.driver import access, feedback, identity, motion, provisioning, requests
 from motorbus.families.kst.driver.node import DEFAULT, BusSettings, Node
 
 
@@ -21,7 +14,7 @@ class ServoMethods(Node):
     """The methods of a servo. Values are in rad, A, °C, s and bit/s.
 
     A servo is the `Node` that driver functions take as first argument; the subclasses add the bus. Creating one sends
-    nothing. It has the settings of its bus; `profile` is for a bus with servos of several makers.
+    nothing. It has the settings of its bus.
 
     `set_node_id` and `set_bit_rate` only write. `set_id` and `set_baud`, as in all families, also save, wait for the
     power cycle and verify: they are `provision` with one value.
@@ -32,9 +25,12 @@ class ServoMethods(Node):
     identify = device_method(identity.identify)
     version = device_method(identity.version)
     node_id = device_method(identity.node_id)
-    set_node_id = device_method(identity.set_node_id)
-    bit_rate = device_method(identity.bit_rate)
-    set_bit_rate = device_method(identity.set_bit_rate)
+    set_node_id = device_method(provisioning.set_node_id)
+    set_bit_rate = device_method(provisioning.set_bit_rate)
+    save = device_method(requests.save)
+    provision = device_method(provisioning.provision)
+    set_id = device_method(provisioning.set_id)
+    set_baud = device_method(provisioning.set_baud)
     read = device_method(access.read)
     read_raw = device_method(access.read_raw)
     write = device_method(access.write)
@@ -45,32 +41,25 @@ class ServoMethods(Node):
     temperature = device_method(feedback.temperature)
     move = device_method(motion.move)
     stop = device_method(motion.stop)
-    save = device_method(settings.save)
-    provision = device_method(provisioning.provision)
-    set_id = device_method(provisioning.set_id)
-    set_baud = device_method(provisioning.set_baud)
-    start_reports = device_method(settings.start_reports)
-    stop_reports = device_method(settings.stop_reports)
-    set_mid_point = device_method(settings.set_mid_point)
-    travel_limits = device_method(settings.travel_limits)
-    set_travel_limits = device_method(settings.set_travel_limits)
-    reversed = device_method(settings.reversed_)
-    set_reversed = device_method(settings.set_reversed)
+    set_reports = device_method(motion.set_reports)
+    set_mid_point = device_method(access.set_mid_point)
+    reversed = device_method(access.reversed_)
+    set_reversed = device_method(access.set_reversed)
 
 
 class Servo(ServoMethods, BlockingDevice):
     """One servo on a blocking bus: `Servo(bus, 0x25).position()`."""
 
-    def __init__(self, bus: BlockingRunner, node: int, *, profile: str = "") -> None:
-        ServoMethods.__init__(self, node, _settings(bus, profile))
+    def __init__(self, bus: BlockingRunner, node: int) -> None:
+        ServoMethods.__init__(self, node, settings_of(bus))
         BlockingDevice.__init__(self, bus)
 
 
 class AsyncServo(ServoMethods, AsyncDevice):
     """One servo on an async bus: `await AsyncServo(bus, 0x25).position()`."""
 
-    def __init__(self, bus: AsyncRunner, node: int, *, profile: str = "") -> None:
-        ServoMethods.__init__(self, node, _settings(bus, profile))
+    def __init__(self, bus: AsyncRunner, node: int) -> None:
+        ServoMethods.__init__(self, node, settings_of(bus))
         AsyncDevice.__init__(self, bus)
 
 
@@ -78,8 +67,3 @@ def settings_of(bus: object) -> BusSettings:
     """The settings of this bus; those of the manual for anything else."""
     found = getattr(getattr(bus, "driver", None), "settings", None)
     return found if isinstance(found, BusSettings) else DEFAULT
-
-
-def _settings(bus: object, profile: str) -> BusSettings:
-    found = settings_of(bus)
-    return found.replace(profile=profile) if profile else found

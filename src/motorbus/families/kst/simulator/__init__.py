@@ -1,8 +1,8 @@
 """Simulated KST CAN servos, frame for frame.
 
 Each behaviour has its source in the code: the KST CAN protocol manual, public drivers of such servos, CiA 301, or none
-(`# assumption`). Left out: stall and steady error under load, other emergencies than low voltage, heartbeat, bus-off,
-and a host that is alone on its bus, whose frames no node acknowledges.
+(`# assumption`). Left out: stall and steady error under load, alarms and emergencies, heartbeat, the error states of a
+CAN controller, and a host that is alone on its bus, whose frames no node acknowledges.
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ OPTIONS = (
     *quirk_options(Quirks),
 )
 """Options of a simulated bus, beside its ids."""
-SHORTEST_INTERVAL = 0.1  # ms; a bus of 1 Mbit/s has no room for more frequent reports
 
 
 def simulate(ids: Iterable[int], model: str = "", /, **options: object) -> KstBus:
@@ -44,16 +43,10 @@ def simulate(ids: Iterable[int], model: str = "", /, **options: object) -> KstBu
             f"there is no simulated KST profile {name!r}", expected=f"one of {', '.join(PROFILES)}"
         )
     quirks = switched(Quirks, "kst", options)
-    if not (quirks.firmware.isascii() and quirks.firmware.isprintable() and quirks.firmware):
-        raise _impossible("firmware", quirks.firmware, "one or more printable ASCII characters")
-    if 0 < quirks.reports_ms < SHORTEST_INTERVAL:
-        raise _impossible("reports_ms", quirks.reports_ms, f"0, or {SHORTEST_INTERVAL:g} and more")
     try:
         duplicates = [units.whole(word) for word in quirks.duplicate.split("+") if word]
     except ValueError:
-        raise _impossible("duplicate", quirks.duplicate, "ids as 0x25 or 0x25+0x26") from None
+        raise RequestError(
+            f"option duplicate: {quirks.duplicate!r} is not possible", expected="ids as 0x25 or 0x25+0x26"
+        ) from None
     return KstBus(ids, PROFILES[name], quirks, duplicates)
-
-
-def _impossible(option: str, value: object, expected: str) -> RequestError:
-    return RequestError(f"option {option}: {value!r} is not possible", expected=expected)

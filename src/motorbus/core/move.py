@@ -1,0 +1,144 @@
+"""Move devices to a position, and wait until they are there by their own samples and the clock of the link."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from functools import partial
+from typing import Any, Final, Generic, TypeVar
+
+from motorbus.core.family import State
+from motorbus.core.interrupted import Device, Moving, stopped_if_interrupted
+from motorbus.core.register import is_number, shown
+from motorbus.core.setpoint import Setpoint
+from motorbus.core.steps import Runnable, Sleep, catch, gather
+from motorbus.errors import MotionError, MotorbusError, RequestError, Stalled
+
+PERIOD: Final = 0.02  # s between two samples; one axis that is waited for takes a tenth of a bus at most
+STALL_TIME: Final = 0.5  # s without progress after which a device counts as stalled
+PROGRESS: Final = 0.003  # rad; a smaller change counts as noise
+
+D = TypeVar("D", bound=Device)
+
+
+class MoveLogic(Generic[D]):
+    """How devices of one family move; a subclass gives what differs."""
+
+    tolerance: float = 0.01  # rad
+    slowest: float = 1.0  # rad/s that each device reaches
+
+    @abstractmethod
+    async def check(self, device: D, to: float) -> Setpoint:
+        """The goal (rad) as a setpoint, with the limits of the device. Raises LimitExceeded for an impossible one."""
+
+    @abstractmethod
+    def send(self, device: D, goal: Setpoint) -> Runnable[Any]:
+        """Send the goal."""
+
+    @abstractmethod
+    def sample(self, device: D) -> Runnable[State]:
+        """A sample with its position, and whether it moves where the device reports that."""
+
+    @abstractmethod
+    def stop(self, device: D) -> Runnable[Any]:
+        """Stop it; gives the promise, an Enum, None without torque."""
+
+    async def position(self, device: D) -> float:
+        """Its position (rad)."""
+        return _position(await self.sample(device))
+
+    def timeout(self, distance: float) -> float:
+        """s after which a move over this distance (rad) is late."""
+        return 1.0 + 2.0 * distance / self.slowest
+
+    def stalled(self, device: D, state: State, goal: float) -> MotorbusError:
+        """The error for a device that stands elsewhere than at its goal."""
+        return Stalled(
+            f"node {device.node} stands at {state.position:.4g} rad, not at {goal:.4g} rad",
+            cause="its torque is off, or something holds it",
+            node=device.node,
+        )
+
+
+async def move(
+    logic: MoveLogic[D],
+    goals: Mapping[D, float],
+    *,
+    wait: bool = True,
+    tolerance: float | None = None,
+    timeout: float | None = None,
+) -> None:
+    """Move devices to these goals (rad); return when all are in position, or at once with `wait=False`.
+
+    All goals are checked before the first is sent. In position: within `tolerance` rad and not moving; a device that
+    does not report whether it moves is in position after two such samples in a row. An interrupt of the wait stops all;
+    so does one of several devices that does not take its goal. Raises LimitExceeded; Stalled when a position has not
+    changed for 0.5 s; MotionError after `timeout` s (None: from the distance).
+    """
+    for name, value, unit in (("tolerance", tolerance, "rad"), ("timeout", timeout, "s")):
+        if value is not None and not (is_number(value) and value > 0):
+            raise RequestError(
+                f"{name} {shown(value)} is not a finite number above 0", expected=f"a number in {unit}"
+            )
+    checked = [(device, await logic.check(device, to)) for device, to in goals.items()]
+    arrive = partial(wait_in_position, logic, tolerance=tolerance or logic.tolerance, timeout=timeout)
+
+    async def send() -> None:
+        try:
+            for device, goal in checked:
+                await logic.send(device, goal)
+        except MotorbusError:
+            if len(checked) > 1:
+                await gather(*[catch(logic.stop(device)) for device, _ in checked])
+            raise
+
+    async def send_and_wait() -> None:
+        await send()
+        await gather(*[arrive(device, goal.value) for device, goal in checked])
+
+    if wait:
+        moving = [
+            Moving(device, partial(logic.stop, device), partial(logic.position, device)) for device in goals
+        ]
+        await stopped_if_interrupted(send_and_wait(), *moving)
+    else:
+        for device in goals:
+            device.last_move = None  # an earlier move that is interrupted does not stop this one
+        await send()
+
+
+async def wait_in_position(
+    logic: MoveLogic[D], device: D, goal: float, *, tolerance: float, timeout: float | None
+) -> None:
+    """Return when the device is in position; see `move`."""
+    state = await logic.sample(device)
+    here = mark = _position(state)
+    begun = progressed = state.at
+    longest = logic.timeout(abs(here - goal)) if timeout is None else timeout
+    looks = 0
+    while True:
+        near = abs(here - goal) <= tolerance
+        looks = looks + 1 if near else 0
+        if near and (not state.moving if state.moving is not None else looks >= 2):
+            return
+        if abs(here - mark) >= PROGRESS:
+            mark, progressed = here, state.at
+        elif state.at - progressed > STALL_TIME and not looks:
+            raise logic.stalled(device, state, goal)
+        if state.at - begun > longest:
+            raise MotionError(
+                f"node {device.node} is not in position after {longest:.3g} s: it is at {here:.4g} rad on its way to "
+                f"{goal:.4g} rad",
+                expected=f"within {tolerance:.4g} rad",
+                cause="the velocity is low for this distance, or the device oscillates about its goal",
+                advice="give a longer timeout; it is still moving: stop() ends that",
+                node=device.node,
+            )
+        await Sleep(PERIOD)
+        state = await logic.sample(device)
+        here = _position(state)
+
+
+def _position(state: State) -> float:
+    assert state.position is not None
+    return state.position
