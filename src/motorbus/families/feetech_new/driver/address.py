@@ -15,6 +15,7 @@ from typing import Any, Final, NamedTuple
 from motorbus.core.family import Found, IdChanged
 from motorbus.core.register import RegisterMap
 from motorbus.core.request import Effect, Priority
+from motorbus.core.scan import BitrateRestored
 from motorbus.core.steps import (
     ASKED,
     INTENT,
@@ -26,6 +27,7 @@ from motorbus.core.steps import (
     JournalEntry,
     SetBitrate,
     Sleep,
+    with_cleanup,
 )
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown, RequestError, WireError
 from motorbus.families.feetech_new import protocol
@@ -40,7 +42,6 @@ from motorbus.families.feetech_new.driver.requests import (
     unanswered,
     verified,
 )
-from motorbus.families.feetech_new.registers import TABLES
 from motorbus.families.feetech_new.registers.codes import BAUD_CODES, BAUD_CODES_OF
 
 ID, BAUD = 5, 6  # registers
@@ -53,8 +54,10 @@ AWAKE: Final = 0.1  # s between two rounds: a servo that has just started is dea
 
 
 class Address(NamedTuple):
+    """Where a servo answers."""
+
     id: int
-    rate: int
+    rate: int  # bit/s
 
 
 class AddressChange(NamedTuple):
@@ -63,15 +66,17 @@ class AddressChange(NamedTuple):
     verb: str
     old: Address
     new: Address
-    image: bytes
+    image: bytes = b""
     taken: tuple[Address, ...] = ()
 
     @property
     def cell(self) -> int:
+        """The register that changes."""
         return ID if self.verb == "set_id" else BAUD
 
     @property
     def places(self) -> list[Address]:
+        """Where the servo may be, once the change has begun."""
         torn = [Address(SHIPPED_ID, self.old.rate)]
         if self.cell == BAUD:
             torn = [Address(self.old.id, rate) for rate in SHIPPED_RATES]
@@ -79,7 +84,10 @@ class AddressChange(NamedTuple):
 
     @property
     def table(self) -> RegisterMap:
-        return TABLES[known(self.old.id, self.image).identity.table]  # type: ignore[union-attr]
+        """The register map of the servo."""
+        table = known(self.old.id, self.image).table
+        assert table is not None
+        return table
 
     @property
     def second(self) -> int:
@@ -90,41 +98,46 @@ class AddressChange(NamedTuple):
         return address if self.image[address] == self.old.id else 0
 
     def value(self, place: Address) -> bytes:
+        """What the register holds for this address."""
         return bytes((place.id if self.cell == ID else CODES[place.rate],))
 
     def is_it(self, image: bytes) -> bool:
-        """Same model, firmware and settings. Settings written behind a closed lock go with the supply, so a servo of
-        the same model and firmware at an address that was free before counts as well."""
+        """Whether these registers may be of the same servo: model and firmware.
+
+        Settings written behind a closed lock go with the supply, so settings do not count.
+        """
         return image[:ID] == self.image[:ID]
 
     def facts(self) -> dict[str, object]:
-        old, new = self.old, self.new
+        """For the journal."""
         return {
-            "node": old.id, "rate": old.rate, "new": new.id, "new_rate": new.rate, "registers": self.image.hex(),
+            "node": self.old.id,
+            "rate": self.old.rate,
+            "new": self.new.id,
+            "new_rate": self.new.rate,
+            "registers": self.image.hex(),
             "taken": [list(place) for place in self.taken],
-        }  # fmt: skip
+        }
 
 
 def from_facts(verb: str, facts: Mapping[str, Any]) -> AddressChange:
-    """The change that a journal entry tells of. Raises RequestError for anything else."""
+    """The change of a journal entry. Raises RequestError for anything else."""
     try:
         old, new = Address(facts["node"], facts["rate"]), Address(facts["new"], facts["new_rate"])
         taken = tuple(Address(*place) for place in facts["taken"])
         change = AddressChange(verb, old, new, bytes.fromhex(facts["registers"]), taken)
         if verb not in ("set_id", "set_baud") or len(change.image) != IMAGE:
             raise ValueError(verb)
-        change.value(old), change.value(new), change.table
+        change.value(old), change.value(new), known(old.id, change.image)
     except (KeyError, TypeError, ValueError) as error:
-        raise RequestError(
-            f"no facts of a set_id() or set_baud(): {error!r}", advice="nothing was sent"
-        ) from error
+        raise RequestError(f"no facts of a set_id() or set_baud(): {error!r}") from error
     return change
 
 
 async def set_id(node: Node, new: int) -> Found:
     """Give this servo the id `new` (0 to 253) for good; it goes limp. Errors as `set_baud`."""
     rate = await SetBitrate(0)
-    return await change_address(node, "set_id", Address(checked_id(new), rate))
+    return await _change(node, "set_id", Address(checked_id(new), rate))
 
 
 async def set_baud(node: Node, rate: int) -> Found:
@@ -134,14 +147,14 @@ async def set_baud(node: Node, rate: int) -> Found:
     the old id, an unfinished change on this bus; OutcomeUnknown or VerificationFailed with a note what became of it.
     """
     if rate not in CODES:
-        raise RequestError(f"{rate} bit/s is no rate of these servos", expected=", ".join(map(str, CODES)))
+        raise node.refusal(f"cannot have {rate} bit/s", expected=", ".join(map(str, CODES)))
     table = await writable(node)
     if CODES[rate] not in BAUD_CODES_OF[table.name]:
-        raise RequestError(f"servos of the map {table.name} have no code for {rate} bit/s", node=node.node)
-    return await change_address(node, "set_baud", Address(node.node, rate))
+        raise node.refusal(f"has the map {table.name}, which has no code for {rate} bit/s")
+    return await _change(node, "set_baud", Address(node.node, rate))
 
 
-async def change_address(node: Node, verb: str, new: Address) -> Found:
+async def _change(node: Node, verb: str, new: Address) -> Found:
     await Emit(JournalEntry(verb, ASKED, {}))
     table = await writable(node)
     assert node.identity is not None
@@ -150,20 +163,17 @@ async def change_address(node: Node, verb: str, new: Address) -> Found:
     if old == new:
         await Exclusive(close_lock(node, table["lock"].address))
     else:
-        await Exclusive(_plan_and_move(node, AddressChange(verb, old, new, b"")))
+        await Exclusive(_plan_and_move(node, AddressChange(verb, old, new)))
     return found
 
 
 async def _plan_and_move(node: Node, change: AddressChange) -> None:
     change = change._replace(image=await check_alone(node))
-    move = _Move(change)
-    async with _Rate(change.old.rate):
+    async with BitrateRestored():
         taken = [place for place in change.places if place != change.old and await look(place)]
         if change.new in taken:
-            raise RequestError(
-                f"the id {change.new.id} is taken at {change.new.rate} bit/s", advice="nothing was written"
-            )
-    move.change = change._replace(taken=tuple(taken))
+            raise node.refusal(f"cannot move: the id {change.new.id} is taken at {change.new.rate} bit/s")
+    move = _Move(change._replace(taken=tuple(taken)))
     try:
         async with move:
             await move_to(move.change, change.old, change.new)
@@ -171,15 +181,7 @@ async def _plan_and_move(node: Node, change: AddressChange) -> None:
         if move.end != "new":
             raise
     finally:
-        node.forget_settings()
-
-
-class _Rate(Guard):
-    def __init__(self, rate: int) -> None:
-        self.rate = rate
-
-    async def leave(self, error: BaseException | None) -> None:
-        await SetBitrate(self.rate)
+        node.forget_settings(written=True)
 
 
 class _Move(Guard):
@@ -187,7 +189,7 @@ class _Move(Guard):
 
     def __init__(self, change: AddressChange) -> None:
         self.change = change
-        self.end = ""
+        self.end = ""  # "new" or "old"
 
     async def enter(self) -> None:
         change = self.change
@@ -196,11 +198,14 @@ class _Move(Guard):
         await Emit(JournalEntry(change.verb, INTENT, change.facts()))
 
     async def leave(self, error: BaseException | None) -> None:
-        async with _Rate(self.change.old.rate):
-            self.end = "new" if error is None else await settle(self.change)
-        if error is not None:
+        change = self.change
+        if error is None:
+            await SetBitrate(change.old.rate)
+            self.end = "new"
+        else:
+            self.end = await with_cleanup(settle(change), lambda: SetBitrate(change.old.rate))
             error.add_note(f"the servo is at its {self.end} address, locked")
-        await Emit(JournalEntry(self.change.verb, OUTCOME, {"outcome": self.end, "node": self.change.old.id}))
+        await Emit(JournalEntry(change.verb, OUTCOME, {"outcome": self.end, "node": change.old.id}))
 
 
 async def recover(node: Node, change: str, facts: Mapping[str, Any]) -> str:
@@ -211,10 +216,9 @@ async def recover(node: Node, change: str, facts: Mapping[str, Any]) -> str:
     move = from_facts(change, facts)
 
     async def work() -> str:
-        async with _Rate(await SetBitrate(0)):
-            await Emit(
-                JournalEntry(move.verb, "recovering", {**move.facts(), REACHED: list(facts.get(REACHED, ()))})
-            )
+        async with BitrateRestored():
+            reached = {**move.facts(), REACHED: list(facts.get(REACHED, ()))}
+            await Emit(JournalEntry(move.verb, "recovering", reached))
             end = await settle(move)
         await Emit(JournalEntry(move.verb, OUTCOME, {"outcome": end, "node": move.old.id}))
         return end
@@ -222,7 +226,7 @@ async def recover(node: Node, change: str, facts: Mapping[str, Any]) -> str:
     try:
         return await Exclusive(work())
     finally:
-        node.forget_settings()
+        node.forget_settings(written=True)
 
 
 async def settle(change: AddressChange) -> str:
@@ -239,26 +243,23 @@ async def settle(change: AddressChange) -> str:
                 last = error
                 break
         await Sleep(AWAKE)
-    raise last or NoReply(
-        f"the servo that was {change.old.id} is at neither address", advice="scan all rates"
-    )
+    what = f"the servo that was {change.old.id} is at neither address"
+    raise last or NoReply(what, advice="scan all rates")
 
 
 async def move_to(change: AddressChange, here: Address, there: Address) -> None:
     """Unlock, torque off, write the cell, see the servo at `there` unchanged and still unlocked, lock it."""
     await SetBitrate(here.rate)
-    node = known(here.id, change.image)
-    unlocked = Unlocked(node, change.table)
+    unlocked = Unlocked(known(here.id, change.image), change.table)
     await unlocked.enter()
-    request = protocol.write(here.id, change.cell, change.value(there))
-    await unanswered(request, Effect.IDENTITY, priority=Priority.CONFIGURATION)
+    wire = protocol.write(here.id, change.cell, change.value(there))
+    await unanswered(wire, Effect.IDENTITY, priority=Priority.CONFIGURATION)
     await Sleep(STORE_TIME)
     unlocked.node = node = known(there.id, change.image)
     image = await look(there)
     if not change.is_it(image) or image[change.cell : change.cell + 1] != change.value(there):
-        raise OutcomeUnknown(
-            f"node {change.old.id} is not seen unchanged at id {there.id}, {there.rate} bit/s"
-        )
+        what = f"node {change.old.id} is not seen unchanged at id {there.id}, {there.rate} bit/s"
+        raise OutcomeUnknown(what, node=change.old.id)
     if change.second:  # or it would obey its former id
         block = Block(change.second, bytes((there.id,)), Effect.PERSISTENT)
         await confirmed(node, block, timeout=STORE)

@@ -19,7 +19,7 @@ from motorbus.core.family import State
 from motorbus.core.register import RegisterMap, is_number, shown
 from motorbus.core.request import Effect, Precondition, Priority
 from motorbus.core.setpoint import Setpoint, torque_off, torque_on
-from motorbus.core.steps import Procedure, Runnable, Sleep, catch
+from motorbus.core.steps import Procedure, Sleep, catch
 from motorbus.errors import (
     LimitExceeded,
     MotionError,
@@ -346,6 +346,10 @@ class Motion(core_move.MoveLogic[Node]):
         await read_bound(device, self.current)
         goal = self._block(device, to).goals[0]
         self.tolerance = max(TOLERANCE, COUNTS * count_of(device))
+        if self.velocity:  # a slow move takes its time for two counts
+            self.stall_time = (
+                core_move.STALL_TIME + 2 * max(core_move.PROGRESS, count_of(device)) / self.velocity
+            )
         self.ends[device.node] = goal.value
         return goal
 
@@ -362,9 +366,6 @@ class Motion(core_move.MoveLogic[Node]):
         if turn and state.position is not None:
             return state._replace(position=goal + remainder(state.position - goal, turn))
         return state
-
-    def position(self, device: Node) -> Runnable[float]:
-        return feedback.position(device)
 
     def stop(self, device: Node) -> Procedure[Promise | None]:
         return _stop_move(device)
