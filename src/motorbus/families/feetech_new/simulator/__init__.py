@@ -1,7 +1,7 @@
 """Simulated FEETECH servos, byte for byte: every known model of all six maps.
 
-Each behaviour has its source in the code, or none (`# assumption`). Left out: heat by load, over-current, a supply
-that the servos share, backlash, and a gear that yields to more torque than the motor has.
+Each behaviour has its source in the code, or none (`# assumption`). Left out: heat by load, over-current, a
+supply that the servos share, backlash, and a gear that yields to more torque than the motor has.
 """
 
 from __future__ import annotations
@@ -26,8 +26,9 @@ OPTIONS = options_of(Quirks)
 def simulate(ids: Iterable[int], model: str = "", /, **options: object) -> FeetechBus:
     """A simulated bus with these ids, at rest and limp; a repeated id is two servos.
 
-    `model` is the model of all, or one for each id joined by "+"; "" is sts3215. The options are the fields of
-    `Quirks`; their values may be text. Raises RequestError for an unknown model or option, an invalid value, or no ids.
+    `model` is the model of all, or one for each id joined by "+"; "" is sts3215. The options are the fields
+    of `Quirks`; their values may be text. Raises RequestError for an unknown model or option, an invalid
+    value, or no ids.
     """
     quirks = switched(Quirks, "feetech", options)
     nodes = list(ids)

@@ -1,8 +1,8 @@
 """Simulated servos on one half-duplex wire: who receives which packet, who replies, and when.
 
-A packet with a wrong checksum is ignored. A broadcast is obeyed and not answered, but PING; at status return level 0
-only PING, READ and SYNC READ # assumption are answered (FEETECH serial bus servo protocol manual V1.01, 1.1 and 1.3).
-The wire idles high and each 0 bit pulls it low, so replies that overlap are ANDed. Simplified: by whole bytes.
+A packet with a wrong checksum is ignored. A broadcast is carried out and, but for PING, not answered; at
+status return level 0 only reads are (FEETECH serial bus servo protocol manual V1.01, 1.1 and 1.3). The wire
+idles high and each 0 bit pulls it low, so replies that overlap are ANDed. Simplified: by whole bytes.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _NEXT: Final = attrgetter("overload.next")
 
 
 class Reply(NamedTuple):
-    """Bytes that start at `when` (s); a servo whose `lives` have changed sends them not. Without servo: an echo."""
+    """Bytes that start at `when` (s), if the `lives` of the servo are the same; without servo an echo."""
 
     when: float
     order: int
@@ -47,7 +47,8 @@ class Reply(NamedTuple):
 class FeetechBus:
     """A `core.family.Simulator` of FEETECH servos; `now` is the latest time (s).
 
-    `servos` are those of the ids as given, then second ones; `usual_rate` is the first rate of the first one (bit/s).
+    `servos` are those of the ids as given, then second ones; `usual_rate` is the rate of the first one when
+    it was made (bit/s).
     """
 
     def __init__(self, ids: Iterable[int], models: Iterable[Model], quirks: Quirks) -> None:
@@ -82,7 +83,10 @@ class FeetechBus:
         return found
 
     def duplicate(self, id: int) -> None:
-        """Add a servo as shipped with this id and the rate of the first one. Raises RequestError when there is none."""
+        """Add a servo as shipped, with this id and the rate of the servo that has it.
+
+        Raises RequestError when there is none.
+        """
         if id not in self.nodes:
             raise RequestError(f"no servo has the id {id}", expected=f"one of {sorted(self.nodes)}")
         first = self.nodes[id]
@@ -166,7 +170,7 @@ class FeetechBus:
         parameters = carry_out(servo, packet.code, packet.parameters, at)
         if packet.id == BROADCAST:
             replies = packet.code == Instruction.PING and servo.model.traits.broadcast_ping
-        else:  # no reply to a second id # assumption
+        else:  # a write to a second id is not answered # assumption
             replies = packet.id == id and (packet.code in ALWAYS or servo.memory["status_return_level"] != 0)
         if self.quirks.baud_ack == "new" and rate != servo.baud_rate:
             replies = False
@@ -176,8 +180,8 @@ class FeetechBus:
         return self._reply(servo, own, parameters, at, packet.code)
 
     def _reply(self, servo: Servo, id: int, parameters: bytes, at: float, code: int) -> Reply:
-        """A status packet; it waits until the EEPROM has stored # assumption, but not that to RESET # assumption."""
-        start = at
+        """A status packet, sent when the EEPROM has stored; that to RESET is sent before."""
+        start = at  # a reply to any request waits for the EEPROM # assumption
         if self.quirks.eeprom_commit == "before_ack" and code != Instruction.RESET:
             start = max(at, servo.memory.busy_until)
         start += servo.reply_delay
@@ -187,7 +191,10 @@ class FeetechBus:
         return Reply(start, 0, data, servo, servo.lives)
 
     def _sync_read(self, packet: protocol.Packet, at: float) -> None:
-        """One reply for each id, back to back in the order of the list (FTServo_Linux, FTServo_Python)."""
+        """One reply for each id, back to back in the order of the list (FTServo_Linux, FTServo_Python).
+
+        It is answered at every status return level. # assumption
+        """
         code, (_, length, *ids) = packet.code, packet.parameters
         if length > MAX_PARAMETERS or packet.id != BROADCAST:
             return

@@ -1,7 +1,7 @@
 """What each instruction does to one servo.
 
-An unknown instruction and a wrong number of parameters are not answered: there is no error code for them (FEETECH
-serial bus servo protocol manual V1.01, 1.1 and 1.3).
+An unknown instruction and a wrong number of parameters are not answered: there is no error code for them
+(FEETECH serial bus servo protocol manual V1.01, 1.1 and 1.3).
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ from motorbus.families.feetech_new.simulator.models import Model
 from motorbus.families.feetech_new.simulator.servo import Servo
 
 BOOTLOADER_TIME: Final = 0.8  # s (kuterd/feetech-fw-util)
-RESTORE_TIME: Final = 0.5  # s; servolab waits at most 1 s # assumption
+RESTORE_TIME: Final = (
+    0.5  # s in which it stores and receives nothing; servolab waits at most 1 s # assumption
+)
 CALIBRATING: Final = ("hls", "sts")
 """Maps with 0x0B: FTServo_Python, reOfsCal; dispatcher of STS3215 firmware 3.10 (kuterd/feetech-fw-util)."""
 
@@ -23,7 +25,7 @@ def carry_out(servo: Servo, code: int, parameters: bytes, at: float) -> bytes | 
     if code in servo.lacks:
         return None
     if code in (Instruction.WRITE, Instruction.REG_WRITE) and len(parameters) == 1:
-        return b""  # acknowledged without data # assumption
+        return b""  # a write without data is acknowledged # assumption
     if not suits(code, parameters):
         return None
     match code:
@@ -35,7 +37,7 @@ def carry_out(servo: Servo, code: int, parameters: bytes, at: float) -> bytes | 
         case Instruction.WRITE:
             servo.write(parameters[0], parameters[1:])
             return b""
-        case Instruction.REG_WRITE:  # a second one replaces the first # assumption
+        case Instruction.REG_WRITE:  # a second REG WRITE replaces the first # assumption
             servo.pending = parameters[0], parameters[1:]
             return b""
         case Instruction.ACTION:
@@ -45,7 +47,7 @@ def carry_out(servo: Servo, code: int, parameters: bytes, at: float) -> bytes | 
             return b""
         case Instruction.RESET:
             return _restore(servo, at) if servo.quirks.factory_restore else None
-        case Instruction.BOOTLOADER:  # no reply; the motor is limp meanwhile # assumption
+        case Instruction.BOOTLOADER:  # 0x08 is not answered, and the motor is limp meanwhile # assumption
             servo.restart()
             servo.deaf_until = at + BOOTLOADER_TIME
         case Instruction.CLEAR_TURNS if _clears_turns(servo.model):
@@ -59,7 +61,8 @@ def carry_out(servo: Servo, code: int, parameters: bytes, at: float) -> bytes | 
 
 
 def _restore(servo: Servo, at: float) -> bytes:
-    """All as shipped but the ids # assumption (servolab, STS3215 with firmware 3.10: the id stays); then a restart."""
+    """All as shipped but the id (servolab, STS3215 with firmware 3.10), then a restart."""
+    # The second id stays as well. # assumption
     servo.memory.restore_factory(("id", "second_id"), RESTORE_TIME)
     servo.restart()
     servo.deaf_until = at + RESTORE_TIME

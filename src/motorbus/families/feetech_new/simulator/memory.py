@@ -1,9 +1,8 @@
 """Registers of one simulated servo: live bytes, which are read and obeyed, and the EEPROM.
 
-A write with the lock closed is obeyed and lost at power-off (feetech-cli, measured on STS3215). A servo reports no
-refused write, so what cannot be written is dropped. EEPROM cells are stored one after the other: what is stored when
-the supply goes stays, what waits is lost, and the cell in work is torn. 20 ms for a write is measured (public recovery
-tool for STS3215); that its cells share them equally is not # assumption
+A write with the lock closed takes effect and is lost at power-off (feetech-cli, measured on STS3215). A servo
+reports no refused write, so what cannot be written is dropped. EEPROM cells are stored one after the other:
+what is stored when the supply goes stays, what waits is lost, and the cell in work is torn.
 """
 
 from __future__ import annotations
@@ -17,7 +16,9 @@ from motorbus.core.register import Register, RegisterMap, Storage
 
 SIZE: Final = 256
 ERASED: Final = 0xFF
-_KEPT: Final = "max_acceleration"  # lerobot writes this row of the maker; kept until power-off # assumption
+_KEPT: Final = (
+    "max_acceleration"  # lerobot writes it, though it is factory data: kept until power-off # assumption
+)
 
 
 class Cell(NamedTuple):
@@ -104,6 +105,7 @@ class Memory:
 
     def store(self, addresses: Iterable[int], time: float) -> None:
         """Store the live values of these cells after those that wait, in `time` s altogether."""
+        # All cells take equally long, and closing the lock cuts none. # assumption
         cells = list(addresses)
         begin = max(self._now(), self.busy_until)
         if cells and not self._waiting:

@@ -1,7 +1,7 @@
 """The models that can be simulated: every known number in each of its maps.
 
-A value that no source gives is an assumption: all of `shipped`, the voltages, and the motors of SMS, SCS and HLS.
-STS motor: memory table V3.6 of the STS3215 (50 rpm without load, 150 mA); its current register ends at about 3.25 A.
+STS motor: memory table V3.6 of the STS3215 (50 rpm without load, 150 mA); its current register ends at about
+3.25 A.
 """
 
 from __future__ import annotations
@@ -33,8 +33,10 @@ DEFAULT: Final = "sts3215"
 class Kind(NamedTuple):
     """What all servos of one map have in common: firmware that they report, supply (V), motor (counts/s, A).
 
-    `shipped` are the raw values of the rows without a published default.
+    `shipped` are raw values of rows without a published default.
     """
+
+    # Voltages, shipped values and the motors of SMS, SCS and HLS have no source. # assumption
 
     table: RegisterMap
     firmware: tuple[int, int]
@@ -45,7 +47,7 @@ class Kind(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Model:
-    """A model in one of its maps; `angle` is rad for a count of its position, `stored` what was stored since."""
+    """A model in one of its maps; `angle` is rad per count, `stored` raw values stored since."""
 
     name: str  # in lower case
     number: tuple[int, int]
@@ -167,7 +169,7 @@ def model(name: str, firmware: str = "") -> Model:
 
 
 def models(names: str, firmwares: str, count: int) -> list[Model]:
-    """The models of so many servos; names and firmwares are joined by "+" or ",", one for all or one for each.
+    """The models of so many servos; names and firmwares are joined by "+" or ",", one or as many as servos.
 
     Raises RequestError as `model`, and for another number of names or firmwares.
     """

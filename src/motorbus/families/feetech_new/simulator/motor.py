@@ -1,8 +1,8 @@
 """The movement of one motor: what its registers order, as far as torque, load and obstacles allow.
 
-All places are counts of the encoder, without end in both directions. At full duty a motor either turns at its top speed
-or gives its stall torque, and linearly in between; so a torque limit and a load are speed limits too. A movement is
-worked out when it begins and is a function of time from then on.
+All places are counts of the encoder, without end in both directions. At full duty a motor either turns at its
+top speed or gives its stall torque, and linearly in between; so a torque limit and a load are speed limits
+too. A movement is worked out when it begins and is a function of time from then on.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from motorbus.core.plant import Drive, Motion, Phase, move, rest, run
 from motorbus.families.feetech_new.traits import Mode
 
 FEEBLE: Final = 0.01
-"""A share of the stall torque below this does not overcome the friction of the gear. # assumption"""
+"""Share of the stall torque that the friction of the gear takes. # assumption"""
 FULL_ACCELERATION: Final = 25_400.0
 """Counts/s² where the register is 0 or missing: what its highest value gives. # assumption"""
 TO_A_PLACE: Final = (Mode.POSITION, Mode.STEP)
@@ -23,7 +23,7 @@ TO_A_PLACE: Final = (Mode.POSITION, Mode.STEP)
 class Order(NamedTuple):
     """What registers and world ask of a motor.
 
-    `mode`          None: unknown, it rests # assumption
+    `mode`          None for a code that no source explains
     `goal`          a place; in velocity mode counts/s; in PWM and current mode a share, signed
     `speed`         counts/s of the way to a place; 0: standstill, inf: as fast as possible
     `time`          s of the way to a place if `speed` is 0; 0: not used
@@ -44,7 +44,7 @@ class Order(NamedTuple):
 
 
 class Course(NamedTuple):
-    """A movement, what it costs, and the share of the torque that presses in vain at its end (None: none does)."""
+    """A movement, the load that it bears, and the torque that presses in vain at its end (None: none)."""
 
     motion: Motion
     load: float = 0.0
@@ -56,13 +56,13 @@ class Course(NamedTuple):
 
 
 def limp(motion: Motion, at: float) -> Course:
-    """At rest: the friction of the gear holds it, whatever the load. # assumption"""
+    """Without torque the gear holds the shaft against every load. # assumption"""
     return Course(rest(at, motion.position(at)))
 
 
 def follow(order: Order, motion: Motion, at: float, drive: Drive) -> Course:
     """The course that an order starts from the present state of this movement."""
-    if order.torque < FEEBLE or order.mode is None:
+    if order.torque < FEEBLE or order.mode is None:  # an unknown mode rests # assumption
         return limp(motion, at)
     load = max(-order.torque, min(order.torque, order.load))
     strength, goal = order.torque, order.goal

@@ -1,8 +1,8 @@
 """What makes a servo report alarms and release its torque: overload, supply, temperature.
 
-Overload: more than register 36 (SCS: 39) for the time of register 35 (SCS: 38), then the torque falls to register 34
-(SCS: 37). HLS servos have no such registers. Over-current is left out. An alarm that the unload mask (19) does not name
-changes nothing else. Source: STS3215 memory table V3.6, SCS memory table 1902.
+Overload: more than register 36 (SCS: 39) for the time of register 35 (SCS: 38), then the torque falls to
+register 34 (SCS: 37). HLS servos have no such registers. Over-current is left out. An alarm that the unload
+mask (19) does not name changes nothing else. Source: STS3215 memory table V3.6, SCS memory table 1902.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Overload:
         """Take the course that the motor follows from this moment (s) on."""
         limit, duration = self._value("overload_torque"), self._value("overload_time")
         begin, until = inf, inf
-        if limit and duration:  # 0 protects from nothing # assumption
+        if limit and duration:  # an overload torque or time of 0 protects from nothing # assumption
             lasts = abs(course.torque(inf)) > limit
             if abs(course.load) > limit:
                 begin, until = at, inf if lasts else course.motion.done_at

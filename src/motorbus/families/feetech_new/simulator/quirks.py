@@ -1,6 +1,7 @@
 """Options of the simulated FEETECH servos: behaviour in which sources differ, and faults that users meet.
 
-`feetech:sim,ids=1-3,id_ack=new` sets one. All else that no source settles is a constant in the code, `# assumption`.
+`feetech:sim,ids=1-3,id_ack=new` sets one. All else that no source settles is a constant in the code, `#
+assumption`.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ class Quirks:
     id_ack: str = switch("old",
         "a WRITE of the id is acknowledged from the old id or from the new one",
         "old", "new",
-        source="lerobot, rustypot and sts-suite take the old id only; fanhao375/microduck-replica#28: the new id")
+        source="lerobot, rustypot, sts-suite take the old id only; fanhao375/microduck-replica#28: the new")
     baud_ack: str = switch("old",
         "a WRITE of the baud rate is acknowledged at the old rate, or at the new one and so not received",
         "old", "new",

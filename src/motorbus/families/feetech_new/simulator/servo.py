@@ -28,7 +28,7 @@ from motorbus.families.feetech_new.simulator.protection import HEAT, LATCHED, OV
 from motorbus.families.feetech_new.simulator.quirks import Quirks
 from motorbus.families.feetech_new.traits import Mode
 
-AMBIENT: Final = 30.0  # °C # assumption
+AMBIENT: Final = 30.0  # °C of a servo, whatever it does # assumption
 LEAST_SMS_DELAY: Final = 50  # FEETECH page on SMS servos: smaller values of register 7 act as 50
 HAND_SPEED: Final = 1.0  # rad/s of a limp shaft that is pushed # assumption
 LONGEST_PUSH: Final = 10 * tau
@@ -44,7 +44,7 @@ LOADED: Final = {
 }
 """RAM row -> EEPROM row from which it is loaded at power-up."""
 REVERSES: Final = {"sts": 0x80, "smbl": 0x80, "hls": 0x80, "scs": 0x01, "scs2": 0x01}
-"""Map -> bit of `phase` that reverses position feedback, and the drive with it # assumption"""
+"""Map -> bit of `phase` that reverses position feedback, and the drive with it. # assumption"""
 _COUNTING: Final = {"operating_mode", "homing_offset", "phase", "angular_resolution"}
 _LIMITS: Final = {"min_position_limit", "max_position_limit"}
 T = TypeVar("T")
@@ -104,7 +104,7 @@ class Servo(PoweredDevice):
         self._reversed = False
         position = model.traits.turn // 2 if quirks.position < 0 else quirks.position
         self.course = Course(rest(now(), position))
-        # As shipped the second id is the first: it then changes nothing. # assumption
+        # The second id of an HLS is shipped as its first one. # assumption
         for name, raw in {"id": id, "second_id": id, **model.stored}.items():
             if name in model.table:
                 self.memory[name] = raw
@@ -146,7 +146,10 @@ class Servo(PoweredDevice):
         self._start(Course(rest(self._now(), place)))
 
     def block_shaft(self, between: tuple[float, float] | None = None) -> None:
-        """Block the shaft here, or between two positions (rad). Raises RequestError when it is outside of them."""
+        """Block the shaft here, or between two positions (rad).
+
+        Raises RequestError when it is outside of them.
+        """
         here = round(self.motion.position(self._now()))
         present = self.raw_position * self.model.angle
         low, high = sorted(here + self._counts(angle - present) for angle in between or (present, present))
@@ -158,7 +161,7 @@ class Servo(PoweredDevice):
         self.blocked = low, high
 
     def push_shaft(self, angle: float) -> None:
-        """Turn the shaft by hand by an angle (rad): a limp one at 1 rad/s, one with torque at once; it returns."""
+        """Turn the shaft by hand by an angle (rad): a limp one at 1 rad/s, another one at once; it returns."""
         if abs(angle) > LONGEST_PUSH:
             raise RequestError(f"{units.show(angle, 'position')} is too far", expected="at most 10 turns")
         now = self._now()
@@ -174,7 +177,7 @@ class Servo(PoweredDevice):
             self._start(Course(move(now, here, goal, speed=speed, acceleration=10 * speed)))
 
     def load_shaft(self, share: float) -> None:
-        """Load the shaft with this share of the stall torque, -1 to 1; positive pushes to smaller positions."""
+        """Load the shaft with this share of the stall torque, -1 to 1; positive: to smaller positions."""
         if not -1.0 <= share <= 1.0:
             raise RequestError(f"{share:.0%} is not possible", expected="-100% to 100%")
         self.load = share
@@ -192,7 +195,7 @@ class Servo(PoweredDevice):
         self._start(limp(self.motion, self._now()))
 
     def power_on(self) -> None:
-        """The supply comes; a torn id or baud rate that no servo can have is as shipped. # assumption"""
+        """The supply comes. An impossible id or baud rate is replaced by the shipped one. # assumption"""
         self.restart()
         for name, possible in (("id", range(MAX_ID + 1)), ("baud_rate", BAUD_CODES)):
             if self.memory[name] not in possible:
@@ -224,13 +227,14 @@ class Servo(PoweredDevice):
         return self.memory["id"]
 
     def obeys(self, id: int) -> bool:
-        """Whether it carries out writes to this id: its own and that of HLS's row second_id (HLS memory table)."""
+        """Whether it carries out writes to this id; an HLS has a second one (HLS memory table)."""
         names = [name for name in ("id", "second_id") if name in self.model.table]
         return any(self.memory[name] == id for name in names)
 
     @property
     def baud_rate(self) -> int | None:
-        """Bit/s; None for a code that means nothing: it receives nothing. Codes 8 to 11 are rates. # assumption"""
+        """Bit/s; None for an unknown code: it receives nothing."""
+        # The codes 8 to 11 are rates in all maps. # assumption
         return BAUD_CODES.get(self.memory["baud_rate"])
 
     @property
@@ -257,7 +261,8 @@ class Servo(PoweredDevice):
 
     @property
     def _resolution(self) -> int:
-        """Encoder counts for one count of a position (memory table V3.6); in single-turn mode too. # assumption"""
+        """Encoder counts for one count of a position (memory table V3.6)."""
+        # It multiplies in single-turn mode too. # assumption
         if "angular_resolution" not in self.model.table:
             return 1
         return self.memory["angular_resolution"] or 1
@@ -315,7 +320,7 @@ class Servo(PoweredDevice):
         self.move()
 
     def position(self, at: float) -> int:
-        """The present position in counts, as its register has it: within one turn unless phase bit 4 is set."""
+        """The present position in counts, as its register has it: within one turn without phase bit 4."""
         counts = round((round(self.motion.position(at)) - self.zero) / self._resolution)
         return counts if self._traits.tells_turns(self.memory["phase"]) else counts % self._traits.turn
 
@@ -338,7 +343,7 @@ class Servo(PoweredDevice):
         match mode:
             case Mode.POSITION:
                 goal = self._place(now)
-            case Mode.STEP:  # counted from the last goal # assumption
+            case Mode.STEP:  # a step counts from the last goal, where it is on its way # assumption
                 goal = self._last_goal(now)
                 if step:
                     goal = round(goal) + memory["goal_position"] * self._resolution
@@ -346,14 +351,15 @@ class Servo(PoweredDevice):
                 goal = velocity
             case Mode.CURRENT:
                 goal = self._current
-            case Mode.PWM if traits.duty:  # HLS: the row is not published, so nothing moves
+            case Mode.PWM if traits.duty:  # of HLS the row is not published: nothing moves # assumption
                 goal = max(-1.0, min(1.0, memory.decode(traits.duty_row(table)) / 1000))
-                goal *= -1 if table.name == "sts" else 1  # servolab, measured on STS3215
+                # STS: to smaller angles (servolab, measured); other maps: to larger ones. # assumption
+                goal *= -1 if table.name == "sts" else 1
         return Order(
             mode=mode,
             goal=goal,
             speed=abs(velocity) or (inf if traits.zero_is_maximum(phase) else 0.0),
-            # Of maps with modes no firmware is known to use it (memory tables of SCS and STS3215).
+            # Only SCS use it; of STS3215 "some firmware" (memory table V3.6), here none. # assumption
             time=0.0 if traits.modes else memory[traits.time] / 1000,
             acceleration=acceleration or FULL_ACCELERATION,
             torque=self.available,
@@ -362,10 +368,8 @@ class Servo(PoweredDevice):
         )
 
     def _place(self, now: float) -> float:
-        """The place of goal_position, clamped to the limits. # assumption
-
-        Within one turn the way does not cross the seam (STS_servos#7).
-        """
+        """The place of goal_position; within one turn the way does not cross the seam (STS_servos#7)."""
+        # A goal beyond the limits is clamped. # assumption
         goal, (low, high) = self.memory["goal_position"], self._limits
         if low == high == 0 and self._traits.many_turns:
             farthest = int(FARTHEST * self._traits.turn) - 1
@@ -389,7 +393,7 @@ class Servo(PoweredDevice):
         self.set_zero()
 
     def set_zero(self) -> None:
-        """Put zero where the homing offset says, in position mode only (feetech-cli, servolab, on STS3215)."""
+        """Apply the homing offset, in position mode only (feetech-cli, servolab, on STS3215)."""
         now, memory, turn = self._now(), self.memory, self._traits.turn
         reverses = REVERSES.get(self.model.table.name, 0)
         if self._reversed is not bool(memory["phase"] & reverses):
@@ -417,7 +421,7 @@ class Servo(PoweredDevice):
         names = memory.write(address, data, locked=self.locked, strict=strict)
         switched = "torque_enable" in names
         if switched and memory["torque_enable"] == MIDDLE and traits.modes and traits.calibrates == "offset":
-            memory["torque_enable"] = torque  # 128 is a command and no state # assumption
+            memory["torque_enable"] = torque  # 128 is a command and does not stay # assumption
             self.calibrate(traits.turn // 2)
             return
         if switched and not memory["torque_enable"] and quirks.overload_clears == "torque_off":
@@ -432,15 +436,15 @@ class Servo(PoweredDevice):
             self.move(step=ordered)
 
     def calibrate(self, counts: int) -> None:
-        """Give the present pose this position by the homing offset, cut to what the register can express; then hold.
+        """Give the present pose this position by the homing offset, cut to the range of its row; then hold.
 
-        At one pose an STS is one count beside (lerobot#3370). It is stored only with the lock open. # assumption
+        At one pose an STS is one count beside (lerobot#3370).
         """
         memory, turn, row = self.memory, self._traits.turn, self.model.table["homing_offset"]
         difference = round(self.motion.position(self._now())) - counts * self._resolution
         offset = round(((difference + turn // 2) % turn - turn // 2) / self._resolution)
         memory["homing_offset"] = max(row.low, min(row.high, offset))
-        if not self.locked:
+        if not self.locked:  # the offset of a calibration is stored only with the lock open # assumption
             memory.store_row("homing_offset")
         self.set_zero()
         self._hold()
