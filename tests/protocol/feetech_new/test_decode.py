@@ -107,9 +107,9 @@ def test_values_are_shown_as_their_row_says(address: int, data: str, name: str, 
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("FF FF 01 04 00 18 05", "length 4 means 8 bytes but only 7 are there"),
-        ("FF FF 01 FF 00 FC", "length 255 means 259 bytes but only 6 are there"),
-        ("FF FF 01 03 00 18 05 DD", "length 3 means 7 bytes but 8 are there, and checksum 05 is wrong"),
+        ("FF FF 01 04 00 18 05", "length 4 means 8 bytes but 7 are there"),
+        ("FF FF 01 FF 00 FC", "length 255 means 259 bytes but 6 are there"),
+        ("FF FF 01 03 00 18 05", "checksum 05 is wrong, should be E3"),
         ("FF FF 01 01 00 FD", "length 1 is impossible"),
         ("FF FF FF 02 01 FD", "id 255 is impossible"),
         ("FF FF 01", "cut off after 3 bytes"),

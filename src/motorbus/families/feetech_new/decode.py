@@ -8,7 +8,8 @@ servos they are those of STS, with the remark "by the STS map" where the six map
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+import re
+from collections.abc import Callable, Mapping
 from functools import partial
 from types import MappingProxyType
 from typing import Final, NamedTuple
@@ -28,6 +29,7 @@ FOREIGN: Final[Mapping[bytes, str]] = {
     b"\x55\x55": "a packet of LX or Hiwonder servos, which no FEETECH servo answers",
 }
 """First bytes of packets of other makers -> text."""
+BEGIN: Final = re.compile(rb"(?<!\xff)(?=\xff\xff)")  # of a header; the last two FF of a run are the header
 
 
 def decode(data: bytes, maps: Mapping[int, str] = MappingProxyType({}), usual: str = "") -> list[Explanation]:
@@ -38,15 +40,13 @@ def decode(data: bytes, maps: Mapping[int, str] = MappingProxyType({}), usual: s
     talk = _Talk({id: TABLES[name] for id, name in maps.items() if name in TABLES}, TABLES.get(usual))
     parser = protocol.parser()
     found: list[Explanation] = []
-    noise = b""
-    for piece, fault in [*parser.feed(data), *parser.feed(b"", end=True), (b"", "")]:
-        if fault:
-            noise += piece
-            continue
-        found += [_invalid(part) for part in _cut(noise)]
-        noise = b""
-        if piece:
+    for piece, fault in [*parser.feed(data), *parser.feed(b"", end=True)]:
+        if not fault:
             found.append(talk.explain(piece))
+        elif fault == "checksum":
+            found.append(_invalid(piece))
+        else:
+            found += [_invalid(part) for part in BEGIN.split(piece) if part]
     return found
 
 
@@ -276,69 +276,35 @@ def _word(data: bytes) -> str:
 # -- invalid bytes ---------------------------------------------------------------------------------------------
 
 
-def _cut(data: bytes) -> Iterator[bytes]:
-    """Bytes without a valid packet, cut before each header that is outside the length of the packet before."""
-    start = data.find(HEADER)
-    before = data if start < 0 else data[:start]
-    if before:
-        yield before
-    while 0 <= start < len(data):
-        after = start
-        while data[after : after + 1] == HEADER[:1]:
-            after += 1
-        if (
-            len(data) > start + 3
-            and data[start + 2] <= BROADCAST
-            and start + data[start + 3] + 4 <= len(data)
-        ):
-            after = max(after, start + data[start + 3] + 4)
-        end = data.find(HEADER, after)
-        yield data[start : end if end > 0 else len(data)]
-        start = end
-
-
 def _invalid(data: bytes) -> Explanation:
+    """Explain bytes that are no valid packet; they contain at most one header, at their beginning."""
     foreign = next((text for head, text in FOREIGN.items() if data.startswith(head)), "")
+    fault = foreign or _fault(data)
     if foreign or data[:2] != HEADER or set(data) == {0xFF}:
         fields = Fields(data)
         fields.take_rest("stray", foreign or counted(len(data)))
-        return Explanation(data, "no packet", tuple(fields.parts), foreign or _stray(data))
+        return Explanation(data, "no packet", tuple(fields.parts), fault)
     fields = _head(data)
     if len(data) > 4:
         either = f"{protocol.instruction_name(data[4])}, or " if data[4] in RULES else ""
         fields.take(1, "instruction or error", f"{either}alarm {', '.join(alarms(data[4])) or 'none'}")
-    size = data[3] + 4 if len(data) > 3 else 0
-    if 6 <= size <= len(data):
-        _unnamed(fields, size - 6)
-        fields.take(1, "checksum", _verdict(data[:size]))
-        fields.take_rest("surplus", f"{counted(len(data) - size)} more than the length says")
-    else:
-        _unnamed(fields, len(fields.rest))
-    return Explanation(data, "broken packet", tuple(fields.parts), _fault(data))
-
-
-def _stray(data: bytes) -> str:
-    if set(data) == {0xFF}:
-        return "FF without a packet: the header is the last two FF before an id"
-    return "no packet begins here: there is no FF FF"
+    is_whole = len(data) > 5 and len(data) == data[3] + 4
+    _unnamed(fields, len(fields.rest) - is_whole)
+    fields.take_rest("checksum", f"wrong, should be {protocol.checksum(data[2:-1]):02X}")
+    return Explanation(data, "broken packet", tuple(fields.parts), fault)
 
 
 def _fault(data: bytes) -> str:
+    if set(data) == {0xFF}:
+        return "FF without a packet: the header is the last two FF before an id"
+    if data[:2] != HEADER:
+        return "no packet begins here: there is no FF FF"
     if data[2:3] == HEADER[:1]:
         return "id 255 is impossible: FF FF FF is a header with one FF too many"
     if len(data) < 4:
-        return f"cut off after {counted(len(data))}: a packet has at least 6"
+        return f"cut off after {counted(len(data))}: a packet has at least {protocol.OVERHEAD}"
     if data[3] < 2:
         return f"length {data[3]} is impossible: it counts at least instruction and checksum, 2"
-    size = data[3] + 4
-    if len(data) < size:
-        return f"length {data[3]} means {size} bytes but only {len(data)} are there"
-    wrong = f"checksum {data[size - 1]:02X} is {_verdict(data[:size])}"
-    if len(data) > size:
-        return f"length {data[3]} means {size} bytes but {len(data)} are there, and {wrong}"
-    return wrong
-
-
-def _verdict(packet: bytes) -> str:
-    right = protocol.checksum(packet[2:-1])
-    return "right" if packet[-1] == right else f"wrong, should be {right:02X}"
+    if len(data) != data[3] + 4:
+        return f"length {data[3]} means {data[3] + 4} bytes but {len(data)} are there"
+    return f"checksum {data[-1]:02X} is wrong, should be {protocol.checksum(data[2:-1]):02X}"
