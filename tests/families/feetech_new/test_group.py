@@ -52,7 +52,7 @@ class TestSyncRead:
             assert isinstance(found.errors[9], NoReply)
             assert found.alarms == {1: (), 2: ("voltage",), 3: ()}
 
-    def test_a_board_without_sync_read_is_read_alone_and_told_once(self) -> None:
+    def test_a_board_without_sync_read_is_read_alone_and_reported_once(self) -> None:
         with world(ids="1-3") as (bus, _, simulation):
             simulation[2].lacks = {Instruction.SYNC_READ}
             group = [Servo(bus, id) for id in (1, 2, 3)]
@@ -238,7 +238,7 @@ class TestServoGroup:
             with traffic(bus) as sent, pytest.raises(LimitExceeded):
                 bus.run(request)
             assert sent == []
-            for wrong in ([1.0, 2.0], [1.0, nan, 1.0], [1.0, 99.0, 1.0], [1.0, "2", 1.0]):
+            for wrong in ([1.0, 2.0], [1.0, nan, 1.0], [1.0, 1e308, 1.0], [1.0, 99.0, 1.0], [1.0, "2", 1.0]):
                 with pytest.raises((RequestError, LimitExceeded)):
                     _ = write(wrong)
 

@@ -28,7 +28,7 @@ def test_a_stop_lets_all_go(name: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "mode"), MODES)
-def test_a_held_servo_stays_where_it_is_or_is_let_go_where_no_order_holds_it(name: str, mode: Mode) -> None:
+def test_a_held_servo_stays_where_it_is_or_is_limp_where_no_order_holds_it(name: str, mode: Mode) -> None:
     options = {"ids": "1-2", "model": MODELS[name]}
     with (
         motorbus.simulate("feetech", **options) as simulation,
@@ -61,7 +61,7 @@ def test_a_limp_servo_stays_limp() -> None:
         assert simulation[1].memory["torque_enable"] == 0
 
 
-def test_unknown_ids_beside_the_held_ones_are_let_go_too() -> None:
+def test_unknown_ids_beside_the_held_ones_are_made_limp_too() -> None:
     driver = FAMILY.open(estop_hold="1-3+7")
     stop: Stop = driver.stop({})
     limp = b"".join(

@@ -35,7 +35,7 @@ class TestFactoryRestore:
             found = Servo(bus, 3).factory_restore()
             assert (found.node, found.rate, bus.rate) == (3, 1_000_000, 500_000)
 
-    def test_a_servo_without_the_instruction_is_told_apart_from_a_silent_one(self) -> None:
+    def test_a_servo_without_the_instruction_differs_from_a_silent_one(self) -> None:
         with world() as (_, servo, simulation):
             simulation[1].lacks = {Instruction.RESET}
             with pytest.raises(OutcomeUnknown):
@@ -68,7 +68,7 @@ class TestClearTurns:
             assert servo.clear_turns() == pytest.approx(15.0 % 6.2832, abs=0.06)
             assert simulation[1].memory["torque_enable"] == 0
 
-    def test_an_sts_that_ignores_it_is_told(self) -> None:
+    def test_an_sts_that_ignores_it_is_named(self) -> None:
         with world() as (_, servo, simulation):
             simulation[1].lacks = {Instruction.CLEAR_TURNS}
             servo.set_multi_turn(True)

@@ -83,7 +83,7 @@ def test_a_mode_that_the_map_lacks_is_refused(name: str) -> None:
         assert writes(sent) == []
 
 
-def test_an_scs_becomes_a_servo_again_by_limits_that_somebody_knows() -> None:
+def test_an_scs_becomes_a_servo_again_by_known_limits() -> None:
     with world("scs") as (_, servo, _simulation):
         before = servo.read("limits")
         servo.set_mode("pwm")

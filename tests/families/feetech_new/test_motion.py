@@ -85,7 +85,7 @@ def test_stop_promises_what_the_mode_can_do(name: str, mode: Mode) -> None:
             assert servo.stop() is HELD[mode]
 
 
-def test_stop_reads_the_settings_anew() -> None:
+def test_stop_reads_the_settings_first() -> None:
     with world() as (bus, servo, _):
         servo.enable_torque()
         Servo(bus, 1).set_mode("velocity")  # as another program would

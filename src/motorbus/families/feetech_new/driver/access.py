@@ -161,7 +161,7 @@ def _check_value(node: Node, row: Register, raw: int) -> None:
     """Raise RequestError for a value that only another method can write safely."""
     mode = node.known_mode
     if row.name == "lock" and raw == 0:
-        what = "would keep every later write for good with an open lock"
+        what = "would make every later write permanent with an open lock"
         raise node.refusal(what, "write() opens it by itself")
     if row.name == "torque_enable" and raw != 0 and not row.choices.get(raw, "").startswith("off"):
         raise node.refusal("could jump to an old goal by a plain torque on", "use enable_torque()")
@@ -283,7 +283,7 @@ async def hand_over(node: Node, block: Block) -> None:
 async def action(node: Node) -> None:
     """ACTION: carry out the last REG WRITE of this servo. Never sent twice.
 
-    Raises RequestError if it was stopped, let go or given other settings since; OutcomeUnknown without acknowledgement.
+    Raises RequestError if it was stopped, limp or given other settings since; OutcomeUnknown without acknowledgement.
     """
     await writable(node)
     check_waiting([node])
@@ -322,7 +322,7 @@ def _released(nodes: Sequence[Node]) -> Block:
 
 
 def check_waiting(nodes: Sequence[Node]) -> None:
-    """Raise RequestError if one of these was stopped, let go or given other settings since its REG WRITE."""
+    """Raise RequestError if one of these was stopped, limp or given other settings since its REG WRITE."""
     if error := _stale(nodes, lambda _: 0):
         raise error
 
@@ -335,7 +335,7 @@ def _stale(nodes: Sequence[Node], stops: Stops) -> MotorbusError | None:
         if pending.settings is not node.settings:
             return outdated(node)
         if pending.epoch != node.epoch or stops(node.node) > pending.stops:
-            return node.refusal("was stopped or let go after its REG WRITE", "reg_write() it again")
+            return node.refusal("was stopped or made limp after its REG WRITE", "reg_write() it again")
     return None
 
 

@@ -135,13 +135,13 @@ def from_facts(verb: str, facts: Mapping[str, Any]) -> AddressChange:
 
 
 async def set_id(node: Node, new: int) -> Found:
-    """Give this servo the id `new` (0 to 253) for good; it goes limp. Errors as `set_baud`."""
+    """Give this servo the id `new` (0 to 253) permanently; it goes limp. Errors as `set_baud`."""
     rate = await SetBitrate(0)
     return await _change(node, "set_id", Address(checked_id(new), rate))
 
 
 async def set_baud(node: Node, rate: int) -> Found:
-    """Let this servo speak at `rate` bit/s for good; it goes limp. The bus keeps its own rate.
+    """Let this servo speak at `rate` bit/s permanently; it goes limp. The bus keeps its own rate.
 
     Raises RequestError (nothing was written) for a rate that its map lacks, an address that answers, two servos with
     the old id, an unfinished change on this bus; OutcomeUnknown or VerificationFailed with a note what became of it.

@@ -42,7 +42,7 @@ DELAYS: Final = {
 COLLISION: Final = 0.8  # s in which all servos have answered a broadcast PING at 1 Mbit/s (rustypot)
 ADAPTER: Final = 0.016  # s; latency timer of an FTDI adapter as shipped (ROBOTIS-GIT/DynamixelSDK#330)
 SCHEDULING: Final = 0.005  # s that a loaded host may run late between two bytes
-AT_ONCE: Final = 60  # servos that one frame of a stop lets go: 128 bytes
+AT_ONCE: Final = 60  # servos that one frame of a stop makes limp: 128 bytes
 ID: Final = 5
 PROBES: Final = (3, 9, 10, 12, 13, 14, *range(16, 27))
 """Bytes that a probe reads from register 5 on: not 2, the length of its echo, and no length in common use."""
@@ -180,7 +180,7 @@ def stop_request(node: int, block: Block) -> Request[Response]:
 
 
 def hold_request(node: int, answer: Response | None) -> Request[Response]:
-    """Hold a servo that has just told registers 0 to 57; read them of any other."""
+    """Hold a servo that has just sent registers 0 to 57; read them of any other."""
     for reply in answer.replies if answer is not None else ():
         if reply.data[2] == node and len(reply.data) == protocol.OVERHEAD + HELD:
             return stop_request(node, held_block(node, reply.data[DATA : DATA + HELD]))

@@ -18,7 +18,7 @@ from motorbus.errors import DeviceError, MotorbusError, VerificationFailed
 from motorbus.families.feetech_new import protocol
 from motorbus.families.feetech_new.driver.eeprom import Unlocked, store
 from motorbus.families.feetech_new.driver.goals import check_mode
-from motorbus.families.feetech_new.driver.identity import check_alone, learn, read_anew
+from motorbus.families.feetech_new.driver.identity import check_alone, learn, read_settings
 from motorbus.families.feetech_new.driver.modes import limits_block, raw_limits
 from motorbus.families.feetech_new.driver.node import Node
 from motorbus.families.feetech_new.driver.requests import (
@@ -70,7 +70,7 @@ class Zero(NamedTuple):
 
 async def zero(node: Node) -> Zero:
     """Where this servo has its zero; reads only. Raises RequestError where its map has no homing offset."""
-    table = await read_anew(node)
+    table = await read_settings(node)
     row = _offset_row(node, table)
     pose = await _read_pose(node, row)
     position = float(node.value(table["present_position"], pose.position))
@@ -78,7 +78,7 @@ async def zero(node: Node) -> Zero:
 
 
 async def calibrate(node: Node, to: float | None = None) -> Calibration:
-    """Make the present pose read `to` rad (None: the middle of the turn), for good; the servo goes limp and stays so.
+    """Make the present pose read `to` rad (None: the middle of the turn) permanently; the servo goes limp.
 
     Hold the shaft still. The limits keep their values and mean other poses afterwards. Raises RequestError, with
     nothing changed, without a homing offset, in another mode, with counted turns, another resolution, or an impossible
@@ -86,7 +86,7 @@ async def calibrate(node: Node, to: float | None = None) -> Calibration:
     """
     if to is not None and not is_number(to):
         raise node.refusal(f"cannot be at {shown(to)}", expected="a number of rad")
-    table = await read_anew(node)
+    table = await read_settings(node)
     offset, position = _offset_row(node, table), table["present_position"]
     check_mode(node, Mode.POSITION)
     settings = node.settings
@@ -155,7 +155,7 @@ def _plan(node: Node, row: Register, pose: Pose, goal: int) -> Pose:
     if not 0 <= pose.position < turn:
         raise node.refusal(
             f"tells the raw position {pose.position}, not within one turn of {turn} counts: it counts turns",
-            "clear_turns() or a power cycle; set_multi_turn(False) for good",
+            "clear_turns() or a power cycle; set_multi_turn(False)",
         )
     encoder = (pose.position + pose.offset) % turn
     offset = encoder - goal
@@ -228,14 +228,14 @@ async def _read_pose(node: Node, row: Register) -> Pose:
 
 
 async def set_multi_turn(node: Node, on: bool, limits: tuple[float, float] | None = None) -> None:
-    """Count goals and position over many turns, for good, or within one; the servo goes limp and stays so.
+    """Count goals and position over many turns, permanently, or within one; the servo goes limp and stays so.
 
     On: both position limits become 0, and bit 4 of its own phase register is set. Off: the bit is cleared and `limits`
     (rad) hold again. It forgets its turns at power-off: home it after every power-up. Raises RequestError for maps of
     one turn (SMCL, SCS), in another mode, for impossible limits, and off without limits. Source: FEETECH notes on
     special bytes; STS3215 memory table V3.6; lerobot#3373.
     """
-    table = await read_anew(node)
+    table = await read_settings(node)
     if not node.traits.many_turns:
         maps = ", ".join(name for name in TABLES if TRAITS[name].many_turns)
         raise node.refusal(f"has the map {table.name}, which counts within one turn", expected=maps)
@@ -252,4 +252,4 @@ async def set_multi_turn(node: Node, on: bool, limits: tuple[float, float] | Non
     bounds = limits_block(node, table, (0, 0) if on or wished is None else raw_limits(node, table, wished))
     # Never limits of 0 without the bit: then no position would tell the turn.
     await store(node, table, [phase, bounds] if on else [bounds, phase])
-    await read_anew(node)
+    await read_settings(node)

@@ -1,7 +1,7 @@
 """Why a servo does not move: its settings and its alarms, with the figures behind them. Reads only.
 
 A 7.4 V servo on a 12 V supply sets its voltage alarm in every packet, which looks like line trouble (lerobot#1010). All
-settings told here are acknowledged by a servo that never moves. The EEPROM lock is none of them (feetech-cli).
+settings named here are acknowledged by a servo that never moves. The EEPROM lock is none of them (feetech-cli).
 Source: FEETECH SDK hls.py; HLS memory table; STS3215 memory table V3.6.
 """
 
@@ -13,7 +13,7 @@ from typing import Final, TypeAlias
 from motorbus.core.family import State
 from motorbus.families.feetech_new.driver import feedback
 from motorbus.families.feetech_new.driver.goals import shown_mode
-from motorbus.families.feetech_new.driver.identity import known, read_anew
+from motorbus.families.feetech_new.driver.identity import known, read_settings
 from motorbus.families.feetech_new.driver.node import Node
 from motorbus.families.feetech_new.driver.requests import read_block
 from motorbus.families.feetech_new.traits import Mode
@@ -41,7 +41,7 @@ async def why_not_moving(node: Node) -> tuple[str, ...]:
 
     Raises DeviceError for an unknown map. No register tells of an obstacle or a heavy load.
     """
-    await read_anew(node)
+    await read_settings(node)
     raw = await _read_all(node)
     state = await feedback.telemetry(node)
     found = [text for holds, text in _rules(node, raw) if holds]

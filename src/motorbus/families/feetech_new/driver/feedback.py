@@ -135,10 +135,4 @@ async def _identify_then(node: Node, read: Callable[[Node], Runnable[T]]) -> T:
 def _unknown(node: Node, what: str) -> DeviceError:
     if not node.is_writable:
         return unknown_map(node, f"cannot tell its {what} in a unit")
-    assert node.identity is not None
-    return DeviceError(
-        f"node {node.node} is {node.identity.model}: its {what} has no known unit",
-        expected=f"a servo whose map has it; {node.identity.table} does not",
-        advice="read_raw() gives the raw value where there is one",
-        node=node.node,
-    )
+    return DeviceError(f"node {node.node}: its {what} has no known unit", advice="read_raw()", node=node.node)

@@ -23,6 +23,7 @@ from motorbus.families.feetech_new.traits import Mode
 DUTY: Final = 0.001  # of one count. Source: STS3215 memory table V3.6; SCS memory table 1902
 NO_LOAD: Final = 3400  # counts/s of an STS3215 without load. Source: STS3215 memory table V3.6
 COUNT: Final = tau / 4096  # rad; a count of an STS3215
+FAR: Final = 1e6  # rad, beyond any position
 ROUNDING: Final = 1e-6  # units of a velocity
 QUANTITY: Final = {Mode.VELOCITY: "velocity", Mode.PWM: "load", Mode.CURRENT: "current"}
 
@@ -38,7 +39,7 @@ def position_goal(node: Node, to: float) -> tuple[int, Setpoint]:
     check_mode(node, Mode.POSITION)
     low, high = checked_limits(node)
     row = node.row("goal_position")
-    raw = node.raw(row, to) if is_number(to) else row.high + 1
+    raw = node.raw(row, to) if is_number(to) and abs(to) < FAR else row.high + 1
     if not row.low <= raw <= row.high:
         raise LimitExceeded(
             f"node {node.node}: {shown(to)} rad is no possible goal",

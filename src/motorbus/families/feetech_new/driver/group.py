@@ -36,7 +36,7 @@ from motorbus.families.feetech_new.driver.access import (
     rows_of,
     spans,
 )
-from motorbus.families.feetech_new.driver.goals import position_goal
+from motorbus.families.feetech_new.driver.goals import FAR, position_goal
 from motorbus.families.feetech_new.driver.identity import learn, unknown_map
 from motorbus.families.feetech_new.driver.motion import LIMP, disable_torque
 from motorbus.families.feetech_new.driver.node import IMAGE, Node, as_nodes
@@ -151,7 +151,7 @@ async def collect(
 
 async def _sync_blocks(nodes: Sequence[Node], address: int, count: int) -> dict[int, bytes]:
     def decode(answer: Response) -> dict[int, bytes]:
-        return {id: data[:count] for id, data in _heard(nodes, answer)}
+        return {id: data[:count] for id, data in _replies(nodes, answer)}
 
     found = await catch(sync_request(nodes, address, count, decode))
     return {} if isinstance(found, MotorbusError) else found
@@ -179,12 +179,12 @@ def sync_request(
     )
 
 
-def _heard(nodes: Sequence[Node], answer: Response) -> Iterator[tuple[int, bytes]]:
+def _replies(nodes: Sequence[Node], answer: Response) -> Iterator[tuple[int, bytes]]:
     """Id and data of each reply."""
     by_id = {node.node: node for node in nodes}
     for reply in answer.replies:
         frame = reply.data
-        by_id[frame[2]].heard(frame[4], answer.at)
+        by_id[frame[2]].note_reply(frame[4], answer.at)
         yield frame[2], frame[DATA:-1]
 
 
@@ -195,7 +195,7 @@ def positions_request(nodes: Sequence[Node]) -> Request[Positions]:
 
     def decode(answer: Response) -> Positions:
         values = {}
-        for id, data in _heard(nodes, answer):
+        for id, data in _replies(nodes, answer):
             row = rows[id]
             values[id] = float(by_id[id].value(row, row.decode(data[: row.size])))
         return Positions(values, answer.missing, answer.at)
@@ -283,7 +283,7 @@ async def _prepared(values: Mapping[One, Mapping[str, Value]], what: str) -> tup
         raise next(iter(errors.values()))
     if what == "SYNC WRITE" and len({frozenset(orders) for orders in values.values()}) > 1:
         raise RequestError(
-            "SYNC WRITE carries the same registers for every servo", advice="write() them one by one"
+            "SYNC WRITE takes the same registers for every servo", advice="write() them singly"
         )
     return nodes, [ram_block(node, orders, what) for node, orders in zip(nodes, values.values(), strict=True)]
 
@@ -351,10 +351,10 @@ class GoalWriter:
         Raises RequestError for another number of goals, LimitExceeded for what no register holds.
         """
         if len(goals) != len(self._cells):
-            raise RequestError(f"{len(goals)} goals for {len(self._cells)} servos", advice="nothing was sent")
+            raise RequestError(f"{len(goals)} goals for {len(self._cells)} servos")
         body, raws = bytearray(self._head), []
         for goal, (id, scale, low, high, big) in zip(goals, self._cells, strict=True):
-            raw = round(goal / scale) if is_number(goal) else -1
+            raw = round(goal / scale) if is_number(goal) and abs(goal) < FAR else -1
             if not low <= raw <= high:
                 return self._checked(goals)
             body += bytes((id, raw >> 8, raw & 0xFF) if big else (id, raw & 0xFF, raw >> 8))
@@ -415,7 +415,7 @@ class ServoGroup:
 
         def decode(answer: Response) -> dict[int, dict[str, Value]]:
             values = {}
-            for id, data in _heard(self.servos, answer):
+            for id, data in _replies(self.servos, answer):
                 raws = decode_span(Span(address, size, tuple(rows[id])), data)
                 values[id] = {row.name: by_id[id].value(row, raws[row.name]) for row in rows[id]}
             return values

@@ -81,7 +81,7 @@ def identify(node: Node) -> Request[Identity]:
 
 
 async def known(node: Node) -> RegisterMap:
-    """Its register map; it is read unless its settings are known and it was heard in the last second."""
+    """Its register map; it is read unless its settings are known and it has answered in the last second."""
     if node.table is None or node.settings is None or await Sleep(0) - node.at > SILENCE:
         await identify(node)
     assert node.table is not None
@@ -95,7 +95,7 @@ async def writable(node: Node) -> RegisterMap:
     return table
 
 
-async def read_anew(node: Node) -> RegisterMap:
+async def read_settings(node: Node) -> RegisterMap:
     """As `writable`, with settings that are read now: another program may have changed them."""
     await identify(node)
     return await writable(node)
@@ -162,7 +162,7 @@ def unknown_map(node: Node, refusal: str) -> DeviceError:
         f"motorbus {refusal}",
         expected=f"a servo with one of the maps {', '.join(sorted(TABLES))}",
         cause="the same address means different things in different maps",
-        advice="read() gives the registers that all maps share, disable_torque() works; nothing was written",
+        advice="read() gives the registers that all maps share; disable_torque() works",
         node=node.node,
     )
 
@@ -182,6 +182,6 @@ async def check_alone(node: Node) -> bytes:
         f"two servos seem to have the id {node.node}: of {ALONE} replies {garbled} were garbled, "
         f"{len(images)} different",
         cause="new servos all have the id 1; noise and a loose cable look alike",
-        advice="connect one servo at a time; nothing was written",
+        advice="connect one servo at a time",
         node=node.node,
     )

@@ -20,7 +20,7 @@ from motorbus.errors import (
 from motorbus.families.feetech_new import protocol
 from motorbus.families.feetech_new.driver import feedback
 from motorbus.families.feetech_new.driver.diagnosis import alarms
-from motorbus.families.feetech_new.driver.identity import identify, ping, read_anew, writable
+from motorbus.families.feetech_new.driver.identity import identify, ping, read_settings, writable
 from motorbus.families.feetech_new.driver.motion import disable_torque, enable_torque
 from motorbus.families.feetech_new.driver.node import Node
 from motorbus.families.feetech_new.driver.requests import (
@@ -74,19 +74,14 @@ async def _restore(node: Node, shipped: tuple[int, ...]) -> Found:
         await Sleep(DEAF)
         place = next(iter([place for place in free if await _answers(*place)]), None)
         if place is None:
-            raise NoReply(
-                f"node {node.node} does not answer after its factory values were restored",
-                cause="it may have the id or rate of another servo now, or take longer to start",
-                advice="scan all ids at all rates",
-                node=node.node,
-            )
+            what = f"node {node.node} does not answer after its factory values were restored"
+            cause = "it has the id or rate of another servo now, or takes longer to start"
+            raise NoReply(what, cause=cause, advice="scan all ids at all rates", node=node.node)
         if isinstance(doubt, MotorbusError) and place == own:
-            raise OutcomeUnknown(
-                f"node {node.node} has not acknowledged the order to restore its factory values",
-                cause="its model lacks this order, or the acknowledgement was lost",
-                advice="read a register that you had changed",
-                node=node.node,
-            ) from doubt
+            what = f"node {node.node} has not acknowledged the order to restore its factory values"
+            cause = "its model lacks this order, or the acknowledgement was lost"
+            fix = "read a register that you had changed"
+            raise OutcomeUnknown(what, cause=cause, advice=fix, node=node.node) from doubt
         await SetBitrate(place[1])
         return Found(*place, await identify(Node(place[0], node.facts)))
 
@@ -109,7 +104,7 @@ async def clear_turns(node: Node) -> float:
     silent (an STS3215 with firmware 3.10 does), VerificationFailed if it still counts. Source: FEETECH SDK, hls.py
     (reset); servolab. 0x06, RESET in some SDKs, is `factory_restore`.
     """
-    table = await read_anew(node)
+    table = await read_settings(node)
     if not node.traits.clear_turns:
         raise node.refusal(f"has the map {table.name}, which counts no turns", expected="sts, smbl or hls")
     return await Exclusive(_clear_turns(node))
@@ -133,12 +128,9 @@ async def _clear_turns(node: Node) -> float:
             node=node.node,
         ) from doubt
     if not 0 <= here < turn:
-        raise VerificationFailed(
-            f"node {node.node} still tells the raw position {here}",
-            expected=f"0 to {turn - 1}",
-            advice="a power cycle forgets the turns; it is limp now",
-            node=node.node,
-        )
+        what = f"node {node.node} still tells the raw position {here}; it is limp now"
+        fix = "a power cycle forgets the turns"
+        raise VerificationFailed(what, expected=f"0 to {turn - 1}", advice=fix, node=node.node)
     return float(node.value(row, here))
 
 

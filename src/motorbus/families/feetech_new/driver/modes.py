@@ -19,7 +19,7 @@ from motorbus.core.steps import Sleep, with_cleanup
 from motorbus.errors import LimitExceeded, RequestError
 from motorbus.families.feetech_new.driver import feedback, goals
 from motorbus.families.feetech_new.driver.eeprom import store
-from motorbus.families.feetech_new.driver.identity import read_anew, writable
+from motorbus.families.feetech_new.driver.identity import read_settings, writable
 from motorbus.families.feetech_new.driver.motion import (
     COUNTS,
     TOLERANCE,
@@ -38,19 +38,19 @@ from motorbus.families.feetech_new.traits import Mode
 
 async def mode(node: Node) -> Mode:
     """Its mode, read now. Raises DeviceError for an unknown map, RequestError for an unknown mode."""
-    await read_anew(node)
+    await read_settings(node)
     return goals.checked_mode(node)
 
 
 async def set_mode(node: Node, mode: Mode | str, *, limits: tuple[float, float] | None = None) -> None:
-    """Put the servo into a mode for good; it is limp afterwards, and `enable_torque` begins at rest.
+    """Put the servo into a mode permanently; it is limp afterwards, and `enable_torque` begins at rest.
 
     On SCS PWM mode is both limits 0, and position mode needs `limits` (rad), unless this object set them to 0. An HLS
     that leaves current mode gets its protection current as bound. Raises RequestError for a mode or limits that its map
     lacks, and errors of `store`.
     """
     wanted = _checked_mode(mode)
-    table = await read_anew(node)
+    table = await read_settings(node)
     if wanted not in node.traits.has:
         has = " or ".join(one.value for one in node.traits.has)
         raise node.refusal(f"has no {wanted.value} mode", expected=has)
@@ -65,7 +65,7 @@ async def set_mode(node: Node, mode: Mode | str, *, limits: tuple[float, float] 
         )  # else its last current bounds the next mode
     if not await store(node, table, blocks):
         await disable_torque(node)
-    await read_anew(node)
+    await read_settings(node)
     if wanted in (Mode.VELOCITY, Mode.PWM, Mode.CURRENT):
         await ordered(node, goals.rest_block(node))
 
@@ -128,7 +128,8 @@ async def set_velocity(
     _check_number(node, velocity, "velocity in rad/s")
     await writable(node)
     goals.check_mode(node, Mode.VELOCITY)
-    goals.bound_bytes(node, current) if current is not None else None
+    if current is not None:
+        goals.bound_bytes(node, current)  # raises before anything is read
     await read_bound(node, current)
     row = node.row("goal_velocity")
     raw = node.raw(row, velocity)
@@ -174,11 +175,8 @@ async def set_current(node: Node, current: float) -> None:
     raw = node.raw(row, current)
     low, high = float(row.to_value(row.low)), float(row.to_value(row.high))
     if not row.low <= raw <= row.high:
-        raise LimitExceeded(
-            f"node {node.node}: {current} A is no goal current",
-            expected=f"{low:.4g} to {high:.4g} A",
-            node=node.node,
-        )
+        what = f"node {node.node} cannot push with {current} A"
+        raise LimitExceeded(what, expected=f"{low:.4g} to {high:.4g} A", node=node.node)
     goal = Setpoint(node.node, "current", float(row.to_value(raw)), low, high)
     await ordered(node, Block(row.address, row.encode(raw), row.effect, (goal,)))
 
@@ -235,8 +233,8 @@ async def step(
 ) -> None:
     """Go `by` rad from here, over the end of a turn too. In step mode of STS and SMBL.
 
-    Torque goes on. Never sent twice: OutcomeUnknown if it was not acknowledged. An interrupt of the wait does not stop
-    it, for no goal of step mode holds: disable_torque() does. Bounds, tolerance and errors as in `move`.
+    Torque is switched on. Never sent twice: OutcomeUnknown if it was not acknowledged. An interrupt of the wait
+    does not stop it, for no goal of step mode holds: disable_torque() does. Bounds, tolerance, errors as in `move`.
     """
     if not is_number(by):
         raise LimitExceeded(f"node {node.node}: {shown(by)} is no angle", node=node.node)
@@ -259,6 +257,6 @@ async def send_step(node: Node, block: Block) -> None:
 def _check_number(node: Node, value: float, what: str) -> None:
     """Raise RequestError for no number, LimitExceeded for one that is not finite."""
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise RequestError(f"{shown(value)} is no {what}", advice="nothing was sent", node=node.node)
+        raise node.refusal(f"cannot take {shown(value)}", expected=what)
     if not is_number(value):
-        raise LimitExceeded(f"node {node.node}: {shown(value)} is no {what}", node=node.node)
+        raise LimitExceeded(f"node {node.node} cannot take {shown(value)}", expected=what, node=node.node)

@@ -29,7 +29,7 @@ from motorbus.errors import (
     VerificationFailed,
 )
 from motorbus.families.feetech_new.driver import diagnosis, feedback, goals
-from motorbus.families.feetech_new.driver.identity import known, read_anew, writable
+from motorbus.families.feetech_new.driver.identity import known, read_settings, writable
 from motorbus.families.feetech_new.driver.node import MANY_TURNS, Node, Settings
 from motorbus.families.feetech_new.driver.requests import (
     DOUBTS,
@@ -62,7 +62,7 @@ class Promise(Enum):
         "goal := present position accepted, outside its limits: it may move to the nearer limit; only torque off "
         "ends that"
     )
-    LIMP = "it is limp, where torque could move it: nothing was sent"
+    LIMP = "it is limp, where torque could move it: no order was sent"
     ZERO_VELOCITY_ACCEPTED = "goal velocity := 0 accepted: it decelerates; standstill was not verified"
     ZERO_DUTY_ACCEPTED = "duty := 0 accepted: it runs out without holding; standstill was not verified"
     ZERO_CURRENT_ACCEPTED = "current := 0 accepted: it runs out without holding; standstill was not verified"
@@ -119,7 +119,7 @@ async def torque_on_unless(node: Node, unless: Precondition | None, *, jump: flo
     """`enable_torque`, with a reason not to send the packet that switches torque on."""
     if not (is_number(jump) and jump >= 0):
         raise node.refusal(f"cannot jump by {shown(jump)}", expected="a number of rad from 0 on")
-    await read_anew(node)
+    await read_settings(node)
     mode = goals.checked_mode(node)
     if mode is Mode.STEP:  # torque alone moves nothing there
         block = Block(TORQUE_ENABLE, ON, Effect.TORQUE, (torque_on(node.node),))
@@ -170,12 +170,9 @@ def _within_limits(node: Node, raw: int, jump: float) -> int:
     there = min(max(here, low), high)
     if abs(here - there) <= jump + row.scale / 2:
         return node.raw(row, there)
-    raise LimitExceeded(
-        f"node {node.node} stands at {here:.4g} rad, outside its limits {low:.4g} to {high:.4g} rad: with torque on "
-        f"it would jump to {there:.4g} rad",
-        advice=f"turn it inside by hand, or enable_torque(jump={abs(here - there) + 0.001:.3f})",
-        node=node.node,
-    )
+    what = f"node {node.node} stands at {here:.4g} rad, outside its limits {low:.4g} to {high:.4g} rad"
+    fix = f"turn it inside by hand, or enable_torque(jump={abs(here - there) + 0.001:.3f})"
+    raise LimitExceeded(f"{what}: it would jump to {there:.4g} rad", advice=fix, node=node.node)
 
 
 def _check_turn_is_known(node: Node, raw: int, jump: float = 0.0) -> None:
@@ -271,12 +268,12 @@ def _check_same(node: Node, settings: Settings | None) -> None:
 async def stop(node: Node) -> Promise:
     """Decelerate and hold: the goal becomes the present position; velocity, duty or current 0 in their modes.
 
-    Mode and limits are read anew. A limp STS begins to hold. A servo that is limp outside its limits is left alone
+    Mode and limits are read first. A limp STS begins to hold. A servo that is limp outside its limits is left alone
     (`LIMP`); one with torque there is on its way to the nearer limit (`OUTSIDE_ACCEPTED`). Raises RequestError where
     only torque off ends a movement: step mode, PWM mode of HLS, an unknown mode, and where `enable_torque` raises it.
     """
     node.epoch += 1
-    await read_anew(node)
+    await read_settings(node)
     for attempt in range(TRIES):
         try:
             return await _stop(node)
@@ -340,8 +337,6 @@ class Motion(core_move.MoveLogic[Node]):
     ends: dict[int, float] = field(default_factory=dict)
 
     async def check(self, device: Node, to: float) -> Setpoint:
-        if not is_number(to):
-            raise LimitExceeded(f"node {device.node}: {shown(to)} is no position", node=device.node)
         await writable(device)
         await read_bound(device, self.current)
         goal = self._block(device, to).goals[0]
@@ -379,7 +374,7 @@ class Motion(core_move.MoveLogic[Node]):
         return goals.motion_block(node, to, self.velocity, self.acceleration, self.current)
 
     def _turn(self, node: Node) -> float:
-        """rad after which a position begins anew, where goals do not; else 0."""
+        """rad after which a position starts at 0 again, where goals do not; else 0."""
         settings = node.settings
         if settings is None or settings.tells_turns or not settings.many_turns:
             return 0.0
@@ -404,9 +399,9 @@ async def move(
 ) -> None:
     """Move to `to` rad, at most at `velocity` rad/s and `acceleration` rad/s² (None: the servo's maximum).
 
-    Torque goes on. On HLS `current` (A) bounds the current; None keeps what is set. Returns when the servo is within
-    `tolerance` rad (None: 0.05, or ten counts where these are more) and not moving, at once with `wait=False`. An
-    interrupt of the wait stops it. Raises LimitExceeded, RequestError in another mode and for a bound without a
+    Torque is switched on. On HLS `current` (A) bounds the current; None keeps what is set. Returns when the servo is
+    within `tolerance` rad (None: 0.05, or ten counts where these are more) and not moving, at once with `wait=False`.
+    An interrupt of the wait stops it. Raises LimitExceeded, RequestError in another mode and for a bound without a
     register, Stalled, MotionError after `timeout` s (None: from distance and velocity) or if its torque is off at once.
     """
     logic = Motion(velocity, acceleration, current)
@@ -446,7 +441,7 @@ async def cap_torque(node: Node, fraction: float) -> None:
         raise node.refusal(f"cannot limit its torque to {shown(fraction)}", expected="0 to 1")
     table = await writable(node)
     if not node.traits.limit:
-        raise node.refusal("keeps its torque limit in EEPROM", "write(max_torque=…) sets it for good")
+        raise node.refusal("keeps its torque limit in EEPROM", "write(max_torque=…) sets it")
     row = table[node.traits.limit]
     if fraction and not await read_block(node, row.address, row.size, row.decode):
         await _calm(node)
@@ -457,7 +452,7 @@ async def cap_torque(node: Node, fraction: float) -> None:
 
 async def _calm(node: Node) -> None:
     """Make a servo with torque and without force stay where it is when it gets its force back."""
-    await read_anew(node)
+    await read_settings(node)
     if node.known_mode is Mode.STEP or await is_limp(node):
         return
     if goals.checked_mode(node) is not Mode.POSITION:
@@ -465,11 +460,8 @@ async def _calm(node: Node) -> None:
         return
     block = await _hold_here(node)
     if _is_outside(node, block):
-        raise LimitExceeded(
-            f"node {node.node} stands outside its limits: with its force back it would move to the nearer one",
-            advice="disable_torque() first, then enable_torque(jump=…); nothing was sent",
-            node=node.node,
-        )
+        what = f"node {node.node} stands outside its limits and would move to the nearer one"
+        raise LimitExceeded(what, advice="disable_torque(), then enable_torque(jump=…)", node=node.node)
     await ordered(node, block)
 
 
@@ -478,7 +470,7 @@ async def cap_current(node: Node, current: float) -> None:
 
     Raises RequestError for another servo, or in a mode where the register is no bound.
     """
-    await read_anew(node)
+    await read_settings(node)
     data = goals.bound_bytes(node, current)
     if node.known_mode not in (Mode.POSITION, Mode.VELOCITY):
         what = f"is in operating mode {goals.shown_mode(node)}, where its goal torque bounds nothing"

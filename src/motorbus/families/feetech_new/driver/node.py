@@ -61,7 +61,7 @@ class Settings(NamedTuple):
     tells_current: bool = True
 
     def without_offset(self, raw: int) -> int:
-        """A present position (counts) without the homing offset, within a turn where it is told within one."""
+        """A present position (counts) without the homing offset, within a turn where it lies within one."""
         if self.tells_turns or not 0 <= raw < self.turn:
             return raw - self.shift
         return (raw - self.shift) % self.turn
@@ -131,7 +131,7 @@ class Node:
         """Its register map is known."""
         return self.identity is not None and bool(self.identity.table)
 
-    def heard(self, error: int, at: float) -> None:
+    def note_reply(self, error: int, at: float) -> None:
         """A reply with this error byte arrived. An alarm never makes a reply a failure."""
         self.alarm = alarms(error, self.table.name if self.table else "sts") if error else ()
         self.at = at
@@ -178,9 +178,7 @@ class Node:
     def raw(self, row: Register, value: Value) -> int:
         """Value in the unit of the row -> raw value. Raises RequestError if it is not a finite number."""
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise RequestError(
-                f"{row.name}: {shown(value)} is not a number", advice="nothing was sent", node=self.node
-            )
+            raise self.refusal(f"cannot take {row.name} {shown(value)}", expected="a number")
         factor = self.settings.factors.get(row.name, 1) if self.settings else 1
         return row.to_raw(value / factor if factor != 1 and is_number(value) else value)
 
@@ -237,9 +235,7 @@ def as_nodes(ids: Iterable[int | Node]) -> list[Node]:
     try:
         nodes = [one if isinstance(one, Node) else Node(one) for one in ids]
     except TypeError:
-        raise RequestError(f"{shown(ids)} is not a list of servos", advice="nothing was sent") from None
+        raise RequestError(f"{shown(ids)} is not a list of servos") from None
     if len({node.node for node in nodes}) == len(nodes) > 0:
         return nodes
-    raise RequestError(
-        "an id is named twice" if nodes else "no servo is named", advice="name each servo once"
-    )
+    raise RequestError("an id is named twice" if nodes else "no servo is named")

@@ -77,7 +77,7 @@ def read_block(
 
     def decode(answer: Response) -> T:
         frame = answer.replies[0].data
-        node.heard(frame[4], answer.at)
+        node.note_reply(frame[4], answer.at)
         return take(frame[DATA : DATA + count])
 
     def decode_exact(data: bytes, at: float) -> T | None:
@@ -144,7 +144,7 @@ def acknowledged(
 
     def decode(answer: Response) -> None:
         for reply in answer.replies:
-            node.heard(reply.data[4], answer.at)
+            node.note_reply(reply.data[4], answer.at)
         if deferred is not None:
             deferred.done = True
 

@@ -26,7 +26,7 @@ from motorbus.families.feetech_new.driver.group import (
     positions_request,
     prepare_all,
 )
-from motorbus.families.feetech_new.driver.identity import read_anew
+from motorbus.families.feetech_new.driver.identity import read_settings
 from motorbus.families.feetech_new.driver.motion import enable_torque
 from motorbus.families.feetech_new.driver.node import Node, as_nodes
 from motorbus.families.feetech_new.driver.requests import PRESENT, confirmed
@@ -107,7 +107,7 @@ class ServoStream:
 
 
 async def _start(node: Node, speed: float | None) -> None:
-    await read_anew(node)
+    await read_settings(node)
     position_goal(node, 0.0)  # in another mode a velocity would be an order to turn
     await enable_torque(node)
     position_goal(node, 0.0)
