@@ -7,11 +7,12 @@ are read one by one. Replies of one request take at most 4 ms, for a stop waits 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from operator import gt, lt, mul, truediv
 from struct import Struct
 from typing import Any, Final, NamedTuple, TypeVar
 
 from motorbus.core.family import Positions
-from motorbus.core.register import Register, RegisterMap, Value, is_number
+from motorbus.core.register import Register, RegisterMap, Value
 from motorbus.core.request import (
     ExactDecoder,
     Expected,
@@ -36,7 +37,7 @@ from motorbus.families.feetech_new.driver.access import (
     rows_of,
     spans,
 )
-from motorbus.families.feetech_new.driver.goals import FAR, position_goal
+from motorbus.families.feetech_new.driver.goals import position_goal
 from motorbus.families.feetech_new.driver.identity import learn, unknown_map
 from motorbus.families.feetech_new.driver.motion import LIMP, disable_torque
 from motorbus.families.feetech_new.driver.node import IMAGE, Node, as_nodes
@@ -54,8 +55,10 @@ T = TypeVar("T")
 One = TypeVar("One", bound=int | Node)
 
 AIR: Final = 0.004  # s of replies of one request
+SOUND: Final = 0xFD  # low byte of the sum of a whole valid packet, header and checksum included
 BITS: Final = 10  # of a byte on the wire
 MOST_IDS: Final = 251
+NUMBERS: Final = frozenset((float, int))
 
 
 class GroupResult(NamedTuple):
@@ -213,34 +216,36 @@ def exact_positions(nodes: Sequence[Node], rows: Sequence[Register]) -> ExactDec
     order = "<" if rows[0].order == "little" else ">"
     unpack = Struct(order + "5xHx" * len(nodes)).unpack
     made = [(node, node.settings) for node in nodes]
-    scales = [(node.node, float(node.value(row, 1))) for node, row in zip(nodes, rows, strict=True)]
+    ids = [node.node for node in nodes]
+    scales = [float(node.value(row, 1)) for node, row in zip(nodes, rows, strict=True)]
 
     def take(data: bytes, at: float) -> Positions | None:
-        values = {}
-        for (id, scale), raw in zip(scales, unpack(data), strict=True):
-            if raw >= 0x8000:  # negative
-                return None
-            values[id] = raw * scale
+        raws = unpack(data)
+        if max(raws) >= 0x8000:  # negative
+            return None
+        values = dict(zip(ids, map(mul, raws, scales)))  # noqa: B905 - as many
         for node, settings in made:
             if node.settings is not settings:
                 return None
             node.at, node.alarm = at, ()
         return Positions(values, (), at)
 
-    return exact_decoder([node.node for node in nodes], 2, take)
+    return exact_decoder(ids, 2, take)
 
 
 def exact_decoder(ids: Sequence[int], count: int, take: ExactDecoder[T]) -> ExactDecoder[T]:
     """Decode a SYNC READ if its bytes are all replies, in order, with valid checksums and no alarm."""
     size = protocol.OVERHEAD + count
     heads = [protocol.HEADER + bytes((id, count + 2, 0)) for id in ids]
-    total, starts = size * len(ids), range(0, size * len(ids), size)
+    total = size * len(ids)
+    parts = [(slice(at, at + size), head) for at, head in zip(range(0, total, size), heads, strict=True)]
 
     def decode(data: Any, at: float) -> T | None:
         if len(data) != total:
             return None
-        for start, head in zip(starts, heads, strict=True):
-            if data[start : start + DATA] != head or sum(data[start + 2 : start + size]) & 0xFF != 0xFF:
+        for part, head in parts:
+            frame = data[part]
+            if not frame.startswith(head) or sum(frame) & 0xFF != SOUND:
                 return None
         return take(data, at)
 
@@ -337,8 +342,15 @@ class GoalWriter:
         self._made: Final = [(node, node.settings) for node in nodes]
         self._nodes: Final = nodes
         self._rows: Final = rows
-        self._cells: Final = [_cell(node, row) for node, row in zip(nodes, rows, strict=True)]
-        self._head: Final = bytes((protocol.BROADCAST, 4 + 3 * len(nodes), 0x83, rows[0].address, 2))
+        cells = [_cell(node, row) for node, row in zip(nodes, rows, strict=True)]
+        self._scales, self._lows, self._highs = zip(*cells, strict=True)
+        orders = {row.order for row in rows}
+        self._pack: Final = Struct(("<" if orders == {"little"} else ">") + "BH" * len(nodes)).pack
+        self._ids: Final = [node.node for node in nodes]
+        self._is_mixed: Final = len(orders) > 1
+        head = bytes((protocol.BROADCAST, 4 + 3 * len(nodes), 0x83, rows[0].address, 2))
+        self._head: Final = protocol.HEADER + head
+        self._sum: Final = sum(head)
         self._group: Final = SetpointGroup([node.node for node in nodes], self._setpoints, unchanged(nodes))
 
     def holds(self) -> bool:
@@ -350,17 +362,18 @@ class GoalWriter:
 
         Raises RequestError for another number of goals, LimitExceeded for what no register holds.
         """
-        if len(goals) != len(self._cells):
-            raise RequestError(f"{len(goals)} goals for {len(self._cells)} servos")
-        body, raws = bytearray(self._head), []
-        for goal, (id, scale, low, high, big) in zip(goals, self._cells, strict=True):
-            raw = round(goal / scale) if is_number(goal) and abs(goal) < FAR else -1
-            if not low <= raw <= high:
-                return self._checked(goals)
-            body += bytes((id, raw >> 8, raw & 0xFF) if big else (id, raw & 0xFF, raw >> 8))
-            raws.append(raw)
-        wire = protocol.HEADER + body + bytes((protocol.checksum(bytes(body)),))
-        return SetpointWrite(bytes(wire), self._group, raws)
+        if len(goals) != len(self._nodes):
+            raise RequestError(f"{len(goals)} goals for {len(self._nodes)} servos")
+        if self._is_mixed or not NUMBERS.issuperset(map(type, goals)):
+            return self._checked(goals)
+        try:
+            raws = list(map(round, map(truediv, goals, self._scales)))
+        except (ValueError, OverflowError):  # not finite
+            return self._checked(goals)
+        if any(map(lt, raws, self._lows)) or any(map(gt, raws, self._highs)):
+            return self._checked(goals)
+        body = self._pack(*[part for pair in zip(self._ids, raws) for part in pair])  # noqa: B905 - as many
+        return SetpointWrite(self._head + body + bytes((~(self._sum + sum(body)) & 0xFF,)), self._group, raws)
 
     def _setpoints(self, raws: Sequence[int]) -> tuple[Setpoint, ...]:
         return tuple(
@@ -378,13 +391,13 @@ class GoalWriter:
         return request
 
 
-def _cell(node: Node, row: Register) -> tuple[int, float, int, int, bool]:
-    """Id, unit (rad), lowest and highest raw goal within the limits whose code is the number itself, byte order."""
+def _cell(node: Node, row: Register) -> tuple[float, int, int]:
+    """The unit (rad), lowest and highest raw goal within the limits whose code is the number itself."""
     scale, (low, high) = float(node.value(row, 1)), node.limits or (0.0, 0.0)
     least, most = max(0, row.low, round(low / scale)), min(row.high, round(high / scale))
     least += node.value(row, least) < low
     most -= node.value(row, most) > high
-    return node.node, scale, least, most, row.order == "big"
+    return scale, least, most
 
 
 class ServoGroup:
