@@ -344,10 +344,9 @@ class GoalWriter:
         self._rows: Final = rows
         cells = [_cell(node, row) for node, row in zip(nodes, rows, strict=True)]
         self._scales, self._lows, self._highs = zip(*cells, strict=True)
-        orders = {row.order for row in rows}
-        self._pack: Final = Struct(("<" if orders == {"little"} else ">") + "BH" * len(nodes)).pack
+        self._pack: Final = Struct("<" + "BH" * len(nodes)).pack
+        self._big: Final = [number for number, row in enumerate(rows) if row.order == "big"]
         self._ids: Final = [node.node for node in nodes]
-        self._is_mixed: Final = len(orders) > 1
         head = bytes((protocol.BROADCAST, 4 + 3 * len(nodes), 0x83, rows[0].address, 2))
         self._head: Final = protocol.HEADER + head
         self._sum: Final = sum(head)
@@ -364,7 +363,7 @@ class GoalWriter:
         """
         if len(goals) != len(self._nodes):
             raise RequestError(f"{len(goals)} goals for {len(self._nodes)} servos")
-        if self._is_mixed or not NUMBERS.issuperset(map(type, goals)):
+        if not NUMBERS.issuperset(map(type, goals)):
             return self._checked(goals)
         try:
             raws = list(map(round, map(truediv, goals, self._scales)))
@@ -372,7 +371,10 @@ class GoalWriter:
             return self._checked(goals)
         if any(map(lt, raws, self._lows)) or any(map(gt, raws, self._highs)):
             return self._checked(goals)
-        body = self._pack(*[part for pair in zip(self._ids, raws) for part in pair])  # noqa: B905 - as many
+        codes = raws.copy()
+        for number in self._big:
+            codes[number] = (raws[number] & 0xFF) << 8 | raws[number] >> 8
+        body = self._pack(*[part for pair in zip(self._ids, codes) for part in pair])  # noqa: B905 - as many
         return SetpointWrite(self._head + body + bytes((~(self._sum + sum(body)) & 0xFF,)), self._group, raws)
 
     def _setpoints(self, raws: Sequence[int]) -> tuple[Setpoint, ...]:
