@@ -306,6 +306,22 @@ def test_offset_counts_in_position_mode_only_and_wraps() -> None:
     assert host.wait(3.0).read(1, PRESENT) == 3000
 
 
+def test_position_begins_within_one_turn_when_the_offset_changes() -> None:
+    host = Host(position=100)
+    host.write(1, PHASE, 12 + 16)  # positions over many turns
+    host.write(1, OFFSET, *word(500, sign_bit=11))
+    assert host.read(1, PRESENT) == 100 - 500 + 4096
+
+
+def test_offset_of_scs2_ends_where_both_limits_0_make_a_motor_of_it() -> None:
+    host = Host((1,), "scs2", position=300)
+    row = host.servo.model.table["homing_offset"]
+    host.write(1, row.address, *row.encode(100))
+    assert host.servo.raw_position == 200
+    host.write(1, 9, 0, 0, 0, 0)
+    assert host.servo.raw_position == 300
+
+
 def test_128_makes_the_present_pose_the_middle() -> None:
     host = Host(position=3000)
     assert host.write(1, TORQUE, 128) == ACK
