@@ -95,7 +95,7 @@ def test_an_order_that_waited_for_the_bus_does_not_leave_after_a_torque_off(
             errors.append(error)
 
     arm.bus.exchange(arm.batch(3.0))
-    with arm.bus.lock:
+    with arm.bus.turn:
         waiting = started(call)
         time.sleep(0.1)
         if stop == "torque off":
@@ -116,7 +116,7 @@ def test_a_handler_that_raises_while_a_call_waits_for_the_bus_loses_nothing(
     servo = feetech.Servo(arm.bus, 1)
 
     def hold() -> None:
-        with arm.bus.lock:
+        with arm.bus.turn:
             held.set()
             time.sleep(0.5)
 
@@ -208,4 +208,4 @@ def test_an_emergency_stop_ends_the_calls_of_a_loop_that_is_closed() -> None:
         loop.run_until_complete(begin())
         loop.close()
         assert bus.estop().acknowledged == (1,)
-        bus._hang_up()
+        bus._close_port()

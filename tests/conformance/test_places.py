@@ -18,7 +18,7 @@ NODE = IDS[0]
 def test_the_bus_keeps_what_told_a_position_and_how_to_read_it(leader: Family, one: str) -> None:
     with world(leader) as found:
         told = _told(found, one)
-        with found.bus.lock:
+        with found.bus.turn:
             request, answer = found.bus.positions[NODE]
         assert callable(request.reports_position)
         place = request.reports_position(answer)[NODE]

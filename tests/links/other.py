@@ -10,6 +10,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 SOURCE = Path(__file__).parents[2] / "src"
+HOLD_OPEN = """
+import os, sys
+held = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
+print("ready", flush=True)
+sys.stdin.read()
+"""
 
 
 def environment() -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""A small RFC 2217 server. It agrees to every option, acknowledges every setting, and sends all bytes back."""
+"""A small RFC 2217 server. It agrees to every option, acknowledges every setting, and keeps what it receives."""
 
 from __future__ import annotations
 
@@ -32,17 +32,23 @@ class Server:
                 if byte[0] == IAC:
                     self.command(stream.read(1)[0], stream)
                 else:
-                    self.say(byte)
+                    self.received += byte
 
     def say(self, data: bytes) -> None:
         assert self.client is not None
-        self.received += data
         self.client.sendall(data.replace(b"\xff", b"\xff\xff"))
+
+    def take(self) -> bytes:
+        """What the client has sent since the last call."""
+        size = len(self.received)
+        data = bytes(self.received[:size])
+        del self.received[:size]
+        return data
 
     def command(self, code: int, stream: socket.SocketIO) -> None:
         assert self.client is not None
         if code == IAC:
-            self.say(b"\xff")
+            self.received += b"\xff"
         elif code == SB:
             self.setting(stream)
         elif code in ANSWER:

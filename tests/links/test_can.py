@@ -1,10 +1,12 @@
-"""CAN links over python-can: slcan on a terminal and on TCP, a socketcand server, and the virtual bus."""
+"""CAN links over python-can: slcan on a terminal, a socketcand server, a serial back end, and the virtual bus."""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import socket
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -14,19 +16,9 @@ import pytest
 
 from motorbus.core.can_frame import ERROR_FLAG, CanFrame
 from motorbus.errors import LinkError, LinkFull, LinkLost, PortBusy, PortNotFound, RequestError
-from motorbus.link.can import BUS_OFF, CanLink, kernel_queue
-from tests.links.can_peer import (
-    LONG_PING,
-    PING,
-    PONG,
-    Peer,
-    on_terminal,
-    open_can,
-    remote,
-    slcan_server,
-    socketcand_server,
-    some,
-)
+from motorbus.link.can import kernel_queue
+from motorbus.simulation.pty import PtyMaster
+from tests.links.can_peer import LONG_PING, PING, PONG, CanLink, Peer, on_terminal, open_can, remote, some
 
 
 @contextlib.contextmanager
@@ -51,9 +43,7 @@ def virtual_bus() -> Iterator[Peer]:
 
 
 TRANSPORTS: dict[str, Callable[[], AbstractContextManager[Peer]]] = {
-    "slcan on a terminal": on_terminal,
-    "slcan on TCP": slcan_server,
-    "socketcand": socketcand_server,
+    "slcan": on_terminal,
     "virtual": virtual_bus,
 }
 
@@ -66,7 +56,7 @@ def peer(request: pytest.FixtureRequest) -> Iterator[Peer]:
 
 @pytest.fixture
 def link(peer: Peer) -> Iterator[CanLink]:
-    link = open_can(peer)
+    link = open_can(peer, 1_000_000)
     yield link
     link.close()
 
@@ -106,9 +96,8 @@ def test_close_during_a_read(link: CanLink) -> None:
     assert len(ended) == 1
 
 
-@pytest.mark.parametrize("transport", ["slcan on a terminal", "slcan on TCP", "socketcand"])
-def test_one_owner_at_a_time(transport: str) -> None:
-    with TRANSPORTS[transport]() as peer:
+def test_one_owner_at_a_time() -> None:
+    with on_terminal() as peer:
         link = open_can(peer)
         with pytest.raises(PortBusy, match="this very program") as caught:
             open_can(peer)
@@ -117,24 +106,18 @@ def test_one_owner_at_a_time(transport: str) -> None:
         open_can(peer).close()
 
 
-@pytest.mark.parametrize("transport", ["slcan on a terminal", "slcan on TCP", "virtual"])
-def test_the_rate_is_changed(transport: str) -> None:
-    with TRANSPORTS[transport]() as peer:
-        link = open_can(peer, 1_000_000)
-        assert link.rate == 1_000_000
-        link.tune(125_000)
+def test_rate_and_mode_are_changed(link: CanLink, peer: Peer) -> None:
+    link.tune(125_000)
+    link.write(PING)
+    assert (link.rate, some(link)) == (125_000, [PONG])
+    assert peer.adapter is None or peer.adapter.bitrate == 125_000
+    link.tune(0, listen_only=True)
+    assert (link.rate, link.listen_only) == (125_000, True)
+    with pytest.raises(LinkError, match="only listens"):
         link.write(PING)
-        assert (link.rate, some(link)) == (125_000, [PONG])
-        if transport != "virtual":
-            assert peer.adapter.bitrate == 125_000
-        link.tune(0, listen_only=True)
-        assert (link.rate, link.listen_only) == (125_000, True)
-        with pytest.raises(LinkError, match="only listens"):
-            link.write(PING)
-        link.tune(125_000)
-        link.write(PING)
-        assert some(link) == [PONG]
-        link.close()
+    link.tune(125_000)
+    link.write(PING)
+    assert some(link) == [PONG]
 
 
 def test_remote_error_and_fd_frames() -> None:
@@ -153,12 +136,8 @@ def test_remote_error_and_fd_frames() -> None:
         link.write(remote(9, 2, extended=True))
         received = other.recv(30)
         assert received is not None
-        assert (received.is_remote_frame, received.dlc, received.arbitration_id, received.is_extended_id) == (
-            True,
-            2,
-            9,
-            True,
-        )
+        found = (received.is_remote_frame, received.dlc, received.arbitration_id, received.is_extended_id)
+        assert found == (True, 2, 9, True)
     link.close()
 
 
@@ -166,11 +145,12 @@ def test_remote_error_and_fd_frames() -> None:
     ("url", "error", "words"),
     [
         ("can://slcan/dev/no-such-adapter", PortNotFound, "there is no such port"),
-        ("can://socketcand/127.0.0.1", RequestError, "HOST:PORT/CHANNEL"),
+        ("can://slcan", RequestError, "does not name an interface and its channel"),
+        ("can://socketcand/127.0.0.1", RequestError, "does not name an interface and its channel"),
+        ("can:///can0", RequestError, "does not name an interface"),
+        ("can://slcam/dev/ttyACM0", RequestError, r"has no interface 'slcam'\n.*did you mean slcan"),
         ("can://pcan/PCAN_USBBUS1", LinkError, "driver of pcan is missing"),
         ("can://gs_usb/0", LinkError, r'pip install "python-can\[gs-usb\]"'),
-        ("can://slcam/dev/ttyACM0", RequestError, "has no interface 'slcam'"),
-        ("can:///can0", RequestError, "the interface is missing"),
     ],
 )
 def test_channels_that_cannot_be_opened(url: str, error: type[Exception], words: str) -> None:
@@ -187,15 +167,46 @@ def test_a_missing_python_can_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         open_can("can://virtual/test")
 
 
-def test_d13_bus_off_is_a_lost_link() -> None:
-    with socketcand_server() as peer:
-        link = open_can(peer)
+def test_d13_a_socketcand_server_and_bus_off() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def serve() -> None:
+            far = server.accept()[0]
+            far.sendall(b"< hi >")
+            for answer in (b"< ok >", b"< ok >", b"< frame 626 1.0 01 >", b"< error 40 1.0 >"):
+                received.append(far.recv(100))
+                far.sendall(answer)
+            far.recv(100)
+            far.close()
+
+        received: list[bytes] = []
+        thread = threading.Thread(target=serve)
+        thread.start()
+        link = open_can(f"can://socketcand/127.0.0.1:{server.getsockname()[1]}/can0")
         link.write(PING)
-        assert some(link) == [PONG]
-        peer.say(CanFrame(ERROR_FLAG | BUS_OFF, bytes(8)))
+        assert some(link) == [CanFrame(0x626, b"\1")]
+        link.write(PING)
         with pytest.raises(LinkLost, match="is off the bus"):
             link.read(link.now() + 30)
         link.close()
+        thread.join(30)
+    assert received[0] == b"< open can0 >"
+    assert b"send 625 8" in received[2]
+
+
+def test_f2_a_serial_back_end_hands_over_what_is_there(master: PtyMaster) -> None:
+    """Its recv(0) waits 0.1 s for its port where no frame is there."""
+    link = open_can(f"can://seeedstudio{master.slave_name}")
+    assert [warning for warning in link.warnings if "seeedstudio waits up to 100 ms" in warning]
+    assert link.latency >= 0.1
+    waits = []
+    for _ in range(5):
+        master.write(bytes.fromhex("AA C1 26 06 01 55"))
+        begin = time.monotonic()
+        assert some(link) == [CanFrame(0x626, b"\1")]
+        waits.append(time.monotonic() - begin)
+    assert min(waits) < 0.08
+    link.close()
 
 
 def test_a_full_queue_is_no_loss(tmp_path: Path) -> None:

@@ -28,16 +28,10 @@ def mode(path: Path) -> int:
     return stat.S_IMODE(path.stat().st_mode)
 
 
-# -- names ------------------------------------------------------------------------------------------------------
-
-
 def test_one_device_has_one_name_whatever_leads_to_it(tmp_path: Path) -> None:
     (tmp_path / "device").touch()
     (tmp_path / "by-id").symlink_to(tmp_path / "device")
     assert PortLock(str(tmp_path / "by-id")).path == PortLock(str(tmp_path / "device")).path
-
-
-# -- the lock ---------------------------------------------------------------------------------------------------
 
 
 def test_the_file_is_private_and_tells_its_owner() -> None:
@@ -46,6 +40,11 @@ def test_the_file_is_private_and_tells_its_owner() -> None:
         owner = held.owner()
         assert owner == (os.getpid(), program_name(), PORT)
         assert PortLock(PORT).owner() == owner
+    held.release()
+    assert not held.path.exists()
+    assert held.owner() is None
+    with PortLock(PORT):
+        pass
 
 
 def test_l13_the_error_names_the_process_of_the_owner() -> None:
@@ -54,16 +53,6 @@ def test_l13_the_error_names_the_process_of_the_owner() -> None:
             PortLock(PORT).acquire()
         assert caught.value.owner == process.pid
         assert [owner.port for owner in holders()] == [PORT]
-
-
-def test_released_it_is_free_and_leaves_nothing() -> None:
-    held = PortLock(PORT).acquire()
-    held.release()
-    held.release()
-    assert not held.path.exists()
-    assert held.owner() is None
-    with PortLock(PORT):
-        pass
 
 
 def test_l13_the_lock_of_a_killed_process_is_reclaimed() -> None:
@@ -76,17 +65,13 @@ def test_l13_the_lock_of_a_killed_process_is_reclaimed() -> None:
             assert mine.owner() == (os.getpid(), program_name(), PORT)
 
 
-def test_holders_lists_the_living_only() -> None:
-    with PortLock(PORT), PortLock("socket://bridge:4000"):
-        PortLock("/dev/ttyACM8").path.write_text('{"pid": 999999999, "program": "x", "port": "y"}')
-        assert sorted(owner.port for owner in holders()) == [PORT, "socket://bridge:4000"]
-    assert holders() == []
-
-
-def test_two_that_look_at_a_lock_do_not_see_each_other() -> None:
+def test_a_file_that_is_left_over_is_no_owner() -> None:
     port = PortLock("/dev/ttyACM8")
     port.path.write_text('{"pid": 999999999, "program": "x", "port": "y"}')
-    with port.path.open("rb") as looked_at:
+    with PortLock(PORT), PortLock("socket://bridge:4000"):
+        assert sorted(owner.port for owner in holders()) == [PORT, "socket://bridge:4000"]
+    assert holders() == []
+    with port.path.open("rb") as looked_at:  # two that look at a lock do not see each other
         fcntl.flock(looked_at, fcntl.LOCK_SH)
         assert port.owner() is None
         assert not is_simulated("/dev/ttyACM8")
@@ -109,12 +94,11 @@ def test_a_forked_child_leaves_the_lock_to_its_parent() -> None:
     assert run(FORK).strip() == "True"
 
 
-def test_the_state_folder_is_closed_to_others(state_home: Path) -> None:
+def test_d9_the_state_folder_is_private_and_a_link_of_another_user_changes_no_mode(
+    state_home: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     (state_home / "motorbus").mkdir(mode=0o755)
     assert mode(state_folder()) == 0o700
-
-
-def test_d9_a_link_of_another_user_changes_no_mode(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     mine = tmp_path / "mine"
     mine.mkdir(mode=0o755)
     (tmp_path / "motorbus").symlink_to(mine)

@@ -11,18 +11,10 @@ import serialx
 from motorbus.errors import PortBusy, PortNotFound
 from motorbus.link.lock import holders
 from motorbus.link.serial import SerialLink, ports
-from motorbus.link.stream import wait_any
 from motorbus.simulation.pty import PtyMaster
-from tests.links.other import other_process, run
+from tests.links.other import HOLD_OPEN, other_process, run
 from tests.links.usb import usb_port
 
-PING = bytes.fromhex("ff ff 01 02 01 fb")
-HOLD_OPEN = """
-import os, sys
-held = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
-print("ready", flush=True)
-sys.stdin.read()
-"""
 HOLD_LINK = """
 import sys
 from motorbus.link.serial import SerialLink
@@ -39,18 +31,6 @@ def link(master: PtyMaster) -> Iterator[SerialLink]:
     opened.close()
 
 
-def received(master: PtyMaster, count: int) -> bytes:
-    """That many bytes at the simulator's end."""
-    text = b""
-    while len(text) < count:
-        assert wait_any((master.fileno(),), 30)
-        text += master.read()
-    return text
-
-
-# -- bytes ------------------------------------------------------------------------------------------------------
-
-
 def test_bytes_from_before_the_open_are_not_read(master: PtyMaster) -> None:
     master.write(b"stale")
     link = SerialLink(master.slave_name, rate=1_000_000)
@@ -58,29 +38,15 @@ def test_bytes_from_before_the_open_are_not_read(master: PtyMaster) -> None:
     link.close()
 
 
-# -- in use -----------------------------------------------------------------------------------------------------
-
-
-def test_another_motorbus_process_is_named_under_any_name_of_the_port(
-    master: PtyMaster, tmp_path: Path
-) -> None:
+@pytest.mark.parametrize("code", [HOLD_LINK, HOLD_OPEN], ids=["motorbus", "another program"])
+def test_the_process_that_holds_the_port_is_named(code: str, master: PtyMaster, tmp_path: Path) -> None:
     (tmp_path / "arm").symlink_to(master.slave_name)
-    with other_process(HOLD_LINK, master.slave_name) as process:
-        with pytest.raises(PortBusy, match=f"process {process.pid}") as caught:
+    with other_process(code, master.slave_name) as process:
+        with pytest.raises(PortBusy, match=rf"process {process.pid} \(python") as caught:
             SerialLink(str(tmp_path / "arm"), rate=1_000_000)
         assert caught.value.owner == process.pid
-        assert [owner.pid for owner in holders()] == [process.pid]
-
-
-def test_another_program_is_named(master: PtyMaster) -> None:
-    with other_process(HOLD_OPEN, master.slave_name) as process:
-        with pytest.raises(PortBusy, match=rf"process {process.pid} \(python") as caught:
-            SerialLink(master.slave_name, rate=1_000_000)
-        assert caught.value.owner == process.pid
+        assert [owner.pid for owner in holders()] == ([process.pid] if code is HOLD_LINK else [])
     SerialLink(master.slave_name, rate=1_000_000).close()
-
-
-# -- refused ----------------------------------------------------------------------------------------------------
 
 
 def test_the_error_for_a_missing_port_lists_the_ports(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -123,34 +89,22 @@ def test_no_permission_says_how_to_get_it(master: PtyMaster) -> None:
     assert "uaccess" in text
 
 
-# -- rates ------------------------------------------------------------------------------------------------------
-
-
-def test_the_rate_can_be_changed_and_bytes_still_pass(link: SerialLink, master: PtyMaster) -> None:
-    for rate in (76_800, 128_000, 1_000_000):
+def test_the_rate_can_be_changed_and_bytes_on_their_way_keep_theirs(
+    link: SerialLink, master: PtyMaster
+) -> None:
+    for rate in (76_800, 128_000, 9600):
         link.tune(rate)
         assert (link.rate, master.rate()) == (rate, rate)
-        link.write(PING)
-        assert received(master, 6) == PING
-
-
-def test_bytes_on_their_way_keep_their_rate(link: SerialLink) -> None:
-    link.tune(9600)
     begin = link.now()
     link.write(bytes(48))
     link.tune(1_000_000)
     assert link.now() - begin >= 480 / 9600
-
-
-# -- what is loaded ---------------------------------------------------------------------------------------------
+    assert master.read() == bytes(48)
 
 
 def test_importing_it_loads_no_serial_library() -> None:
     code = "import sys, motorbus.link.serial as s; print({'serialx', 'termios', 'fcntl', 'tty'} & set(sys.modules))"
     assert run(code) == "set()\n"
-
-
-# -- the list of ports -----------------------------------------------------------------------------------------
 
 
 PLAIN = usb_port(device="/dev/ttyS0", resolved_device="/dev/ttyS0", vid=None, pid=None, product=None)

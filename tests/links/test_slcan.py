@@ -1,26 +1,115 @@
-"""Open, tune and close an slcan adapter on a pseudo-terminal, one that refuses commands, and one that never replies."""
+"""slcan: text that is whole, damaged or cut, and adapters that refuse commands or never reply."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from motorbus.core.can_frame import CanFrame
 from motorbus.errors import LinkError, LinkLost, RequestError
 from motorbus.link import slcan
-from tests.links.can_peer import PING, PONG, Mute, Picky, on_terminal, open_can, some
+from motorbus.link.slcan import SlcanCodec
+from motorbus.simulation.slcan import SlcanAdapter
+from tests.links.can_peer import LONG_PING, PING, PONG, Mute, Picky, on_terminal, open_can, remote, some
 
 pytestmark = pytest.mark.usefixtures("long_timeouts")
+SOME = b"t62584002600000000000\r"
+
+# -- text -------------------------------------------------------------------------------------------------------
+
+
+@st.composite
+def frames(draw: st.DrawFn) -> CanFrame:
+    extended = draw(st.booleans())
+    id = draw(st.integers(0, 0x1FFFFFFF if extended else 0x7FF))
+    if draw(st.booleans()):
+        return remote(id, draw(st.integers(0, 8)), extended=extended)
+    return CanFrame(id, draw(st.binary(max_size=8)), extended)
+
+
+@pytest.mark.parametrize(
+    ("frame", "line"),
+    [
+        (PING, SOME),
+        (LONG_PING, b"T00000625101\r"),
+        (CanFrame(0, b""), b"t0000\r"),
+        (remote(0x12, 3), b"r0123\r"),
+        (remote(0x12, extended=True), b"R000000120\r"),
+    ],
+)
+def test_lines_of_slcan(frame: CanFrame, line: bytes) -> None:
+    assert SlcanCodec().encode(frame) == line
+    assert SlcanCodec().feed(line) == [frame]
+
+
+@given(frame=frames(), cut=st.integers(0, 40))
+def test_what_an_slcan_adapter_writes_is_read(frame: CanFrame, cut: int) -> None:
+    adapter, reader = SlcanAdapter(), SlcanCodec()
+    adapter.feed(b"S6\rO\r")
+    text = adapter.deliver(frame, 1.0)
+    assert reader.feed(text[:cut]) + reader.feed(text[cut:]) == [frame]
+    assert adapter.feed(SlcanCodec().encode(frame)) == [frame]
+
+
+@given(data=st.binary(max_size=80))
+def test_no_data_makes_a_decoder_raise(data: bytes) -> None:
+    reader = SlcanCodec()
+    reader.feed(data)
+    assert reader.feed(b"\r" + SOME)[-1:], "the next good frame is read"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"t6257400260000000",  # too short for seven
+        b"t62574002600000000000",  # one byte too many
+        b"t8258" + b"0" * 16,  # twelve bits
+        b"t625840026000000000x0",
+        b"\xff\xfe",
+        b"t62584002600000000000t62584002600000000000",
+    ],
+)
+def test_a_line_that_is_no_frame_is_counted(line: bytes) -> None:
+    reader = SlcanCodec()
+    assert reader.feed(line + b"\r" + SOME) == [PING]
+    assert reader.damaged == 1
+
+
+def test_replies_are_no_frames_and_the_first_counts() -> None:
+    reader = SlcanCodec()
+    assert reader.feed(b"\rz\rZ\rV1013\rNSIMU\rF00\rA\r") == []
+    assert (reader.damaged, reader.reply) == (0, True)
+    other = SlcanCodec()
+    other.feed(b"\a\n\r")
+    assert (other.refused, other.reply) == (1, False)
+    other.forget()
+    assert other.reply is None
+
+
+def test_timestamps_are_known_by_two_in_a_row() -> None:
+    reader = SlcanCodec()
+    stamped = SOME[:-1] + b"1F3A\r"
+    assert reader.feed(stamped) == []
+    assert reader.feed(stamped * 2) == [PING, PING]
+    assert reader.feed(SOME) == []
+    assert reader.feed(stamped) == [PING]
+    assert reader.damaged == 2
+
+
+# -- adapters ---------------------------------------------------------------------------------------------------
 
 
 def test_the_commands_at_open_and_close() -> None:
     adapter = Picky()
+    adapter.open = True  # a killed program left the channel open on a busy bus
     with on_terminal(adapter) as peer:
+        peer.say(PONG, PONG, PONG)
         link = open_can(peer, 250_000)
         assert adapter.commands == [b"C", b"S5", b"O"]
         assert (adapter.bitrate, adapter.open, link.trouble()) == (250_000, True, "")
-        link.write(PING)
-        assert some(link) == [PONG]
         link.close()
     assert adapter.commands[-1] == b"C"
 
@@ -34,26 +123,19 @@ def test_an_adapter_that_never_replies_to_commands_can_be_used(monkeypatch: pyte
         link.close()
 
 
-def test_a_refused_rate_leaves_the_channel_closed() -> None:
-    adapter = Picky(b"S6")
-    with on_terminal(adapter) as peer:
-        with pytest.raises(LinkError, match=r"refuses 500000 bit/s \(S6\)"):
-            open_can(peer, 500_000)
-        assert adapter.commands[:2] == [b"C", b"S6"]
-        assert not adapter.open
-        open_can(peer, 250_000).close()
-
-
 @pytest.mark.parametrize(
     ("options", "command", "words"),
     [
+        ({}, b"S6", r"refuses 500000 bit/s \(S6\)"),
         ({}, b"O", "refuses to open its channel"),
         ({"listen_only": "yes"}, b"L", "cannot only listen"),
     ],
 )
-def test_an_adapter_that_refuses_to_open(options: dict[str, Any], command: bytes, words: str) -> None:
-    with on_terminal(Picky(command)) as peer, pytest.raises(LinkError, match=words):
-        open_can(peer, **options)
+def test_an_adapter_that_refuses(options: dict[str, Any], command: bytes, words: str) -> None:
+    adapter = Picky(command)
+    with on_terminal(adapter) as peer, pytest.raises(LinkError, match=words):
+        open_can(peer, 500_000, **options)
+    assert not adapter.open
 
 
 def test_a_rate_that_is_refused_later_changes_nothing() -> None:
@@ -65,17 +147,6 @@ def test_a_rate_that_is_refused_later_changes_nothing() -> None:
         assert (link.rate, adapter.bitrate) == (500_000, 500_000)
         link.write(PING)
         assert some(link) == [PONG]
-        link.close()
-
-
-def test_frames_that_arrive_during_open_are_no_replies() -> None:
-    """A killed program left the channel open on a busy bus."""
-    adapter = Picky()
-    adapter.open = True
-    with on_terminal(adapter) as peer:
-        peer.say(PONG, PONG, PONG)
-        link = open_can(peer)
-        assert adapter.open
         link.close()
 
 
@@ -102,8 +173,17 @@ def test_an_unplugged_adapter_is_a_lost_link() -> None:
     link.close()
 
 
-@pytest.mark.parametrize(("at", "options"), [("@abc", {}), ("", {"tty_baudrate": "fast"}), ("@0", {})])
-def test_a_rate_that_is_no_number_is_refused_in_words(at: str, options: dict[str, Any]) -> None:
-    with on_terminal() as peer, pytest.raises(RequestError, match="not a rate of the serial line") as caught:
-        open_can(f"{peer.url}{at}", **options)
-    assert "tty_baudrate=1000000" in str(caught.value)
+def test_s7_means_two_rates_so_it_is_not_used() -> None:
+    with on_terminal() as peer:
+        with pytest.raises(LinkError, match="no bit rate of 750000"):
+            open_can(peer, 750_000)
+        assert not peer.adapter.open
+        link = open_can(peer, 800_000)
+        assert (link.rate, peer.adapter.bitrate) == (800_000, 800_000)
+        link.close()
+
+
+@pytest.mark.parametrize("baud", ["@abc", "@0"])
+def test_a_rate_that_is_no_number_is_refused_in_words(baud: str) -> None:
+    with on_terminal() as peer, pytest.raises(RequestError, match="not a rate of the serial line"):
+        open_can(f"{peer.url}{baud}")

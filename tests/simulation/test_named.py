@@ -151,7 +151,7 @@ def test_an_impossible_clock_model_and_option() -> None:
 def channel(monkeypatch: pytest.MonkeyPatch) -> QueueLink:
     """What opens, whatever channel is asked for."""
     link = QueueLink()
-    monkeypatch.setattr("motorbus.link.can.CanLink", lambda port, **options: link)
+    monkeypatch.setattr("motorbus.link.url.open_can", lambda port, **options: link)
     return link
 
 

@@ -108,7 +108,7 @@ def test_a_bus_that_may_have_real_devices_suffers_nothing(monkeypatch: pytest.Mo
         opened.append(port)
         return QueueLink(name=port, no_wire=False)
 
-    monkeypatch.setattr("motorbus.link.can.CanLink", open_link)
+    monkeypatch.setattr("motorbus.link.url.open_can", open_link)
     real = "can://socketcan/can0"
     with Simulation(families.load("kst"), (37,), faults="1%: drop") as sim:
         for line in (sim.line, NoisyLine(1)):

@@ -93,7 +93,7 @@ def test_a_channel_is_opened_as_a_host_would(monkeypatch: pytest.MonkeyPatch) ->
         asked.append((port, options))
         return QueueLink()
 
-    monkeypatch.setattr("motorbus.link.can.CanLink", open_link)
+    monkeypatch.setattr("motorbus.link.url.open_can", open_link)
     with closing(join("can://virtual/here", 250_000, 500_000, fd=False)):
         pass
     expected = {"rate": 250_000, "default_rate": 500_000, "options": {"fd": False}, "shared": True}

@@ -12,7 +12,8 @@ import signal
 from collections import deque
 from collections.abc import Callable, Coroutine, Iterable, Mapping
 from functools import partial
-from threading import Condition, Thread
+from queue import SimpleQueue
+from threading import Thread
 from typing import Any, Final, Self, TypeVar
 from weakref import WeakKeyDictionary
 
@@ -49,15 +50,15 @@ class AsyncBus(BaseBus):
         """Let the worker of this bus run the procedure."""
         if self.link.virtual:
             self.check_thread()
-            worker: _Worker | _Pump = _Pump.of_loop()
+            worker: _Worker | _LoopWorker = _LoopWorker.of_loop()
         else:
-            worker = self._worker = self._worker or _Worker(self.settled)
-        call = Call(self, procedure, report)
+            worker = self._worker = self._worker or _Worker()
+        call = Call(self, procedure, report, worker.wake)
         worker.add(call)
         return call
 
     def _drop(self) -> None:
-        self._hang_up()
+        self._close_port()
         if self._worker is not None:
             self._worker.end()
 
@@ -83,38 +84,37 @@ class Owned:
 
 
 class Call:
-    """A procedure that a worker runs; `ended` is set in the loop. `requests` are for the worker: errors to cancel it
-    with, None to drop it.
+    """A procedure that a worker runs; `ended` is set in the loop.
+
+    `cancellations` are errors with which the worker cancels it, None to end it where it stands.
     """
 
-    def __init__(self, bus: AsyncBus, procedure: Runnable[Any], report: Notify | None) -> None:
+    def __init__(
+        self, bus: AsyncBus, procedure: Runnable[Any], report: Notify | None, wake: Callable[[], None]
+    ) -> None:
         self.bus = bus
+        self.wake = wake
         self.loop = asyncio.get_running_loop()
         self.ended: asyncio.Future[None] = self.loop.create_future()
-        self.requests: deque[BaseException | None] = deque()
+        self.cancellations: deque[BaseException | None] = deque()
         observer = report or bus.report
         if observer is not None and not bus.link.virtual:
             observer = partial(_call_in, self.loop, observer)
         self.tree: Tree[Any] = Tree(
-            bus.engine, procedure, now=bus.link.now, report=bus.event_sink(observer), wake=self.wake
+            bus.engine, procedure, now=bus.link.now, report=bus.event_sink(observer), wake=wake
         )
 
-    def wake(self) -> None:
-        """Let the worker look at it."""
-        with self.bus.settled:
-            self.bus.settled.notify_all()
-
-    def ask(self, request: BaseException | None) -> None:
+    def request_end(self, request: BaseException | None) -> None:
         """Cancel the procedure with this error; None: end it where it stands."""
-        self.requests.append(request)
+        self.cancellations.append(request)
         self.wake()
 
-    def obey(self) -> None:
+    def end_as_requested(self) -> None:
         """Carry out what was asked; the caller has the turn."""
         if self.loop.is_closed() and self.tree.cancellation is None:
             self.tree.cancel(asyncio.CancelledError())
-        while self.requests:
-            error = self.requests.popleft()
+        while self.cancellations:
+            error = self.cancellations.popleft()
             if error is not None:
                 self.tree.cancel(error)
             elif not self.tree.finished:
@@ -138,10 +138,10 @@ async def _finish(calls: Iterable[Call]) -> None:
                     error = next(filter(None, (call.tree.foreign_error() for call in ended)), None)
             if error is not None:
                 for call in calls:
-                    call.ask(error)
+                    call.request_end(error)
     except BaseException:  # the coroutine was closed: nothing is sent any more
         for call in calls:
-            call.ask(None)
+            call.request_end(None)
         raise
     if cancellation is not None and all(call.tree.cancellation is None for call in calls):
         raise cancellation  # all had ended before
@@ -162,8 +162,8 @@ async def run_on(procedures: Mapping[AsyncBus, Runnable[Any]]) -> dict[AsyncBus,
 class _Worker:
     """A thread that runs the procedures of one bus, which it keeps alive only while it has some."""
 
-    def __init__(self, settled: Condition) -> None:
-        self._settled = settled
+    def __init__(self) -> None:
+        self._wakes: SimpleQueue[None] = SimpleQueue()
         self._inbox: deque[Call] = deque()
         self._ended = False
         Thread(target=self._work, name="motorbus asyncio", daemon=True).start()
@@ -171,26 +171,30 @@ class _Worker:
     def add(self, call: Call) -> None:
         """Run this procedure, beside those that run."""
         self._inbox.append(call)
-        call.wake()
+        self.wake()
+
+    def wake(self) -> None:
+        """Let the thread look at its procedures; from any thread."""
+        if self._wakes.empty():
+            self._wakes.put(None)
 
     def end(self) -> None:
         """Let the thread end when its procedures have."""
-        with self._settled:
-            self._ended = True
-            self._settled.notify_all()
+        self._ended = True
+        self.wake()
 
     def _work(self) -> None:
         while True:
-            with self._settled:
-                self._settled.wait_for(lambda: self._inbox or self._ended)
+            while not (self._inbox or self._ended):
+                self._wakes.get()
             if not self._inbox:
                 return
-            _serve(self._inbox)
+            _serve(self._inbox, self._wakes)
 
 
-def _serve(inbox: deque[Call]) -> None:
+def _serve(inbox: deque[Call], wakes: SimpleQueue[None]) -> None:
     """Run procedures of one bus until all have ended; the last of them is reported when nothing here holds the bus."""
-    part: Part | None = Part(inbox[0].bus, inbox)
+    part: Part | None = Part(inbox[0].bus, inbox, wakes)
     calls: list[Call] = []
     while part is not None:
         ended = _advance(part, inbox, calls)
@@ -215,6 +219,7 @@ def _advance(
         for call in calls:
             call.tree.drop()
             call.tree.cancellation = error
+        part.finished = True
     ended = [call for call in calls if call.tree.finished]
     calls[:] = [call for call in calls if not call.tree.finished]
     part.trees = [call.tree for call in calls]
@@ -227,17 +232,17 @@ def _set_result(future: asyncio.Future[None]) -> None:
         future.set_result(None)
 
 
-class _Pump:
+class _LoopWorker:
     """A task of the loop that runs the procedures of all its buses in virtual time."""
 
-    _of: Final[WeakKeyDictionary[asyncio.AbstractEventLoop, _Pump]] = WeakKeyDictionary()
+    _of: Final[WeakKeyDictionary[asyncio.AbstractEventLoop, _LoopWorker]] = WeakKeyDictionary()
 
     def __init__(self) -> None:
         self._calls: list[Call] = []
         self._task: asyncio.Task[None] | None = None
 
     @classmethod
-    def of_loop(cls) -> _Pump:
+    def of_loop(cls) -> _LoopWorker:
         """That of the running loop."""
         return cls._of.setdefault(asyncio.get_running_loop(), cls())
 
@@ -246,6 +251,9 @@ class _Pump:
         self._calls.append(call)
         if self._task is None:
             self._task = call.loop.create_task(self._work())
+
+    def wake(self) -> None:
+        """It looks at its procedures in every turn of the loop."""
 
     async def _work(self) -> None:
         parts: dict[BaseBus, Part] = {}
@@ -265,7 +273,7 @@ class _Pump:
                 _set_result(call.ended)
             self._calls.clear()
             for part in parts.values():
-                part.trees = []
+                part.finished = True
                 part.release_turn()
 
     def _step(self, parts: dict[BaseBus, Part]) -> None:

@@ -30,9 +30,9 @@ class Attempt(Step["Attempt | None"]):
         "data",
         "deadline",
         "direct",
-        "dues",
         "error",
         "excluded",
+        "expected",
         "fault",
         "in_flight",
         "is_probe",
@@ -67,9 +67,9 @@ class Attempt(Step["Attempt | None"]):
         self.is_probed = (
             is_probed  # a probe has shown that there is no echo, so a reply may equal what was sent
         )
-        self.dues: tuple[Expected, ...] = () if request.expected is ANY else request.expected
-        self.nodes = tuple([due.node for due in self.dues])
-        self.size = sum([due.length for due in self.dues])  # bytes of all replies
+        self.expected: tuple[Expected, ...] = () if request.expected is ANY else request.expected
+        self.nodes = tuple([due.node for due in self.expected])
+        self.size = sum([due.length for due in self.expected])  # bytes of all replies
         self.timing: object = None
         """Identifies the rate and latency for which `air` and `budget` hold."""
         self.air = 0.0  # s on the wire
@@ -119,7 +119,7 @@ class Attempt(Step["Attempt | None"]):
     def _split(self) -> tuple[Reply, ...]:
         content = self.data.data if isinstance(self.data, CanFrame) else self.data
         replies, start = [], 0
-        for due in self.dues:
+        for due in self.expected:
             replies.append(Reply(self.request.lane, due.key, content[start : start + due.length]))
             start += due.length
         return tuple(replies)
@@ -131,7 +131,7 @@ class Attempt(Step["Attempt | None"]):
         if self.request.expected is ANY:
             self.replies[len(self.replies)] = reply
             return True
-        for index, due in enumerate(self.dues):
+        for index, due in enumerate(self.expected):
             if due.accepts(reply.key, len(reply.data)) and index not in self.replies:
                 self.replies[index] = reply
                 self.check_complete()
@@ -141,27 +141,27 @@ class Attempt(Step["Attempt | None"]):
     def check_complete(self) -> None:
         """A group does not wait for excluded nodes."""
         self.complete = self.request.expected is not ANY and all(
-            index in self.replies or due.node in self.excluded for index, due in enumerate(self.dues)
+            index in self.replies or due.node in self.excluded for index, due in enumerate(self.expected)
         )
 
     def is_excluded(self, reply: Reply) -> bool:
         """An excluded node sent this reply: it came in spite of not being waited for."""
         size = len(reply.data)
-        return any(due.node in self.excluded and due.accepts(reply.key, size) for due in self.dues)
+        return any(due.node in self.excluded and due.accepts(reply.key, size) for due in self.expected)
 
     def take_noise(self, fault: str, data: bytes) -> None:
         """Noise before the first reply does no harm; behind a reply that reply may be shifted by a byte."""
         if self.complete:
             self.surplus = True
-        elif self.replies and self.dues:
+        elif self.replies and self.expected:
             self.exclude(self.replies[max(self.replies)])
         self.noise.append((fault, data[:64]))
         del self.noise[:-NOISE_KEPT]
 
     def exclude(self, reply: Reply) -> None:
         """The node of this reply sent something unexpected: a group loses that node, a single request fails."""
-        if len(self.dues) > 1:
-            self.excluded += tuple(due.node for due in self.dues if due.key == reply.key)
+        if len(self.expected) > 1:
+            self.excluded += tuple(due.node for due in self.expected if due.key == reply.key)
             self.check_complete()
         else:
             self.fault = self.fault or "unexpected"
@@ -181,12 +181,14 @@ class Attempt(Step["Attempt | None"]):
         """The replies in the order expected; excluded nodes count as missing."""
         if self.request.expected is ANY:
             return Response(tuple(self.replies.values()), (), at)
-        taken = [i for i, due in enumerate(self.dues) if i in self.replies and due.node not in self.excluded]
-        missing = () if len(taken) == len(self.dues) else self._missing(taken)
+        taken = [
+            i for i, due in enumerate(self.expected) if i in self.replies and due.node not in self.excluded
+        ]
+        missing = () if len(taken) == len(self.expected) else self._missing(taken)
         return Response(tuple([self.replies[index] for index in taken]), missing, at)
 
     def _missing(self, taken: list[int]) -> tuple[int, ...]:
-        return tuple(due.node for index, due in enumerate(self.dues) if index not in taken)
+        return tuple(due.node for index, due in enumerate(self.expected) if index not in taken)
 
     def received(self) -> bytes:
         """All that came, for the error message."""

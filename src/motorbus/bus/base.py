@@ -7,12 +7,11 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 from pathlib import Path
-from threading import Condition
 from typing import Any, Final
 
 from motorbus.bus import failures
 from motorbus.bus.attempt import Attempt
-from motorbus.bus.engine import Engine
+from motorbus.bus.engine import DIRECT, Engine
 from motorbus.bus.interlock import Interlock
 from motorbus.bus.nodes import Reading
 from motorbus.bus.stop import EmergencyStop
@@ -30,8 +29,8 @@ IDLE = 0.25
 """s; the longest wait for data before the caller looks at its procedure again."""
 
 
-DRAIN: Final = 0.005
-"""s for which a late host reads what is there before it takes the rest for late; a link that waits takes longer."""
+DRAIN: Final = 32
+"""Reads by which a late host takes what is there before it takes the rest for late."""
 
 
 class BaseBus:
@@ -76,10 +75,8 @@ class BaseBus:
         """Subscribe to what devices send without a request."""
         self.positions: Mapping[int, Reading] = self.engine.nodes
         """The last request that read a position and its reply, by node."""
-        self.lock = self.turn = Turn()
+        self.turn = Turn()
         """Held while a request is in flight, or the state of this bus is read or changed as a whole."""
-        self.settled = Condition()
-        """Notified when something ends that a sleeping thread waits for."""
         self.stopper = EmergencyStop(self, stop_socket)
         self.engine.interlock = interlock
         self.engine.before_motion = self._start_stopper
@@ -101,7 +98,7 @@ class BaseBus:
             warnings.warn(f"{self!r} was not closed", ResourceWarning, source=self, stacklevel=2)
 
     def _drop(self) -> None:
-        self._hang_up()
+        self._close_port()
 
     @property
     def family(self) -> Family:
@@ -261,12 +258,15 @@ class BaseBus:
             return
         try:
             looked = link.now()
-            overdue = looked >= engine.next_deadline()
-            chunks = link.read(min(until, engine.next_deadline(), looked + IDLE))
-            more = chunks
-            while overdue and more and link.now() < looked + DRAIN:
-                more = link.read(-inf)
+            deadline = engine.next_deadline()
+            overdue = looked >= deadline
+            chunks = link.read(min(until, deadline, looked + IDLE))
+            reads = (
+                0 if not overdue else DRAIN if engine.latency < DIRECT else 1
+            )  # an adapter gives all at once
+            while reads and chunks and (more := link.read(-inf)):
                 chunks = [*chunks, *more]
+                reads -= 1
             engine.feed(chunks, link.now(), looked)
         except LinkError as error:
             self._fail(self._lost(error), trees)
@@ -427,7 +427,7 @@ class BaseBus:
         """Take the latch off. Nothing is sent and nothing moves."""
         self.engine.reset()
 
-    def _hang_up(self) -> None:
+    def _close_port(self) -> None:
         """End the stop thread, then give the port back."""
         self._open = False
         self.stopper.close()

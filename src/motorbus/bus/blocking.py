@@ -34,7 +34,7 @@ class Bus(BaseBus):
         Raises what the procedure raises; a signal is raised when the procedure has cleaned up.
         """
         if isinstance(procedure, Request):
-            return self._carry_out(procedure)[1]  # type: ignore[no-any-return]
+            return self._carry_out(procedure)  # type: ignore[no-any-return]
         return run_here(self, procedure, report)
 
     def exchange(
@@ -46,18 +46,13 @@ class Bus(BaseBus):
         An error of a `tolerated` type becomes the value of its request; any other is raised, and requests behind it
         have not been sent.
         """
-        _check_requests(requests)
-        if len(requests) == 2 and may_join(requests[0]):
-            return list(self._carry_out(requests[1], requests[0], tolerated))
-        return run_here(self, carry_out_batch(requests, tolerated))
+        values = exchange_on({self: requests}, tolerated)[self]
+        if isinstance(values, MotorbusError):
+            raise values
+        return values  # type: ignore[no-any-return]
 
-    def _carry_out(
-        self,
-        request: Request[Any],
-        order: Request[Any] | None = None,
-        tolerated: tuple[type[Exception], ...] = (),
-    ) -> tuple[Any, Any]:
-        """The value of an order without replies that leaves with this request, and the value of this request."""
+    def _carry_out(self, request: Request[T]) -> T:
+        """The value of a single request, which is sent at once where it can be."""
         if STEPPING.active:
             check_outside()
         if self.link.virtual:
@@ -66,27 +61,19 @@ class Bus(BaseBus):
         since = self.engine.nodes.epoch
         signals.depth += 1  # as `with interrupts()`, written out for speed
         try:
-            self.turn.acquire(request.priority if order is None else order.priority)
+            self.turn.acquire(request.priority)
             try:
-                started = self.start(request, order, since)
-                if started is not None:
-                    try:
-                        value = self.finish(started)
-                    except tolerated as error:
-                        value = self._lost(error) if isinstance(error, LinkLost) else error
-                    if value is not PENDING:
-                        return (decode_order(order, started.sent_at) if order else None), value
-                part, tree = self.continue_with(request, order, started, since, tolerated)
+                attempt = self.start(request, None, since)
+                if attempt is not None and (value := self.finish(attempt)) is not PENDING:
+                    return value  # type: ignore[no-any-return]
+                part, tree = self.continue_with(request, attempt, since)
             except LinkLost as error:
                 self._lost(error)
                 raise
             finally:
                 self.turn.release()
             run_parts([part], single=True)
-            values = tree.result()
-            return (
-                values if order is not None and started is None else (decode_order(order, self.now()), values)
-            )
+            return tree.result()
         finally:
             signals.depth -= 1
             if signals.pending is not None and not signals.depth:
@@ -122,7 +109,7 @@ class Bus(BaseBus):
                 engine.check(order, since, since, now)
             except MotorbusError:  # the general path says so
                 return None
-            engine.lead(order, now)
+            engine.begin_order(order, now)
             wire = order.wire + wire
         if request.priority is Priority.STOP:
             engine.note_stop(request)
@@ -171,23 +158,14 @@ class Bus(BaseBus):
         return data
 
     def continue_with(
-        self,
-        request: Request[Any],
-        order: Request[Any] | None,
-        started: Attempt | None,
-        since: int,
-        tolerated: tuple[type[Exception], ...],
-    ) -> tuple[Part, Tree[Any]]:
-        """Carry out what could not be sent at once, or was answered otherwise than by one complete reply, as a task."""
+        self, procedure: Runnable[T], attempt: Attempt | None, since: int
+    ) -> tuple[Part, Tree[T]]:
+        """A task for what was not sent at once, or for a request whose attempt has no whole reply yet."""
         part = Part(self)
-        if started is not None:
-            tree: Tree[Any] = part.add(request, since=since)
-            tree.adopt(started)
+        tree = part.add(procedure, since=since)
+        if attempt is not None:
+            tree.continue_from(attempt)
             self.hand_over()
-        elif order is None:
-            tree = part.add(request, since=since)
-        else:
-            tree = part.add(carry_out_batch((order, request), tolerated), since=since)
         return part, tree
 
     def _reads_first(self, request: Request[Any]) -> bool:
@@ -204,7 +182,7 @@ class Bus(BaseBus):
 
     def close(self) -> None:
         """Give the port back. Nothing is sent: devices keep doing what they were ordered."""
-        self._hang_up()
+        self._close_port()
         if self._defers_signals:
             self._defers_signals = False
             INTERRUPTS.uninstall()
@@ -218,17 +196,9 @@ class Bus(BaseBus):
         self.close()
 
 
-def may_join(order: Request[Any]) -> bool:
+def _may_join(order: Request[Any]) -> bool:
     """This order may leave in one write with the next request; CAN frames are written one by one."""
     return order.expected == () and isinstance(order.wire, bytes)
-
-
-def decode_order(order: Request[Any] | None, at: float) -> Any:
-    """The value of an order without replies; None where there is none."""
-    if order is None:
-        return None
-    answer = Response((), (), at)
-    return answer if order.decode is None else order.decode(answer)
 
 
 async def carry_out_batch(
@@ -287,7 +257,7 @@ class _Batch:
         self.requests = requests
         self.tolerated = tolerated
         self.since = bus.engine.nodes.epoch
-        self.order = requests[0] if len(requests) == 2 and may_join(requests[0]) else None
+        self.order = requests[0] if len(requests) == 2 and _may_join(requests[0]) else None
         self.attempt: Attempt | None = None
         self.part: Part | None = None
         self.tree: Tree[Any] | None = None
@@ -301,17 +271,14 @@ class _Batch:
         if self._holds_turn and (self.order is not None or len(requests) == 1):
             try:
                 self.attempt = bus.start(requests[-1], self.order, self.since)
-            except LinkLost as error:
-                self.value = bus._lost(error)
-                return False
             except LinkError as error:  # a part of it may have been sent
-                self.value = error
+                self.value = bus._lost(error) if isinstance(error, LinkLost) else error
                 return False
             except MotorbusError:  # it is refused: the task says so
                 pass
         if self.attempt is None:
-            self.part = Part(bus)
-            self.tree = self.part.add(carry_out_batch(requests, self.tolerated), since=self.since)
+            batch = carry_out_batch(requests, self.tolerated)
+            self.part, self.tree = bus.continue_with(batch, None, self.since)
             self.release()
         return self.attempt is not None
 
@@ -326,9 +293,7 @@ class _Batch:
         except Exception as error:
             self.value = error
         if self.value is PENDING:
-            self.part, self.tree = bus.continue_with(
-                self.requests[-1], self.order, attempt, self.since, self.tolerated
-            )
+            self.part, self.tree = bus.continue_with(self.requests[-1], attempt, self.since)
 
     def release(self) -> None:
         """Give the turn back."""
@@ -345,7 +310,11 @@ class _Batch:
             if not isinstance(value, MotorbusError):
                 raise value
             return value
-        return [value] if self.order is None else [decode_order(self.order, self.attempt.sent_at), value]
+        order = self.order
+        if order is None:
+            return [value]
+        answer = Response((), (), self.attempt.sent_at)
+        return [answer if order.decode is None else order.decode(answer), value]
 
 
 def _check_requests(requests: Sequence[Any]) -> None:

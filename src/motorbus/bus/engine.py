@@ -157,7 +157,10 @@ class Engine:
 
     def next_deadline(self) -> float:
         """The next moment (s) at which an attempt in flight ends; inf when there is none."""
-        return min([attempt.deadline for attempt in self.in_flight.values()], default=inf)
+        deadline = inf
+        for attempt in self.in_flight.values():
+            deadline = min(deadline, attempt.deadline)
+        return deadline
 
     # -- what may leave ----------------------------------------------------------------------------------------
 
@@ -289,7 +292,7 @@ class Engine:
         if self.trace.subscriptions:
             self.trace.put(TraceRecord(now, "tx", request.wire))
 
-    def lead(self, order: Request[Any], now: float) -> None:
+    def begin_order(self, order: Request[Any], now: float) -> None:
         """Record an order without replies that is written in front of the next request."""
         if order.priority is Priority.STOP:
             self.note_stop(order)
@@ -335,7 +338,7 @@ class Engine:
 
     def _mark_owed(self, attempt: Attempt) -> None:
         """The replies to this attempt may still come."""
-        for due in attempt.dues:
+        for due in attempt.expected:
             self.sync.mark_owed(attempt.request.lane, due, attempt.sent_at + self.quiet_time)
 
     def _share_wire(self, attempt: Attempt) -> None:
@@ -440,7 +443,11 @@ class Engine:
     def _take_unexpected(self, attempt: Attempt | None, reply: Reply, now: float) -> None:
         if self._settle_late(reply) or self._take_for_all(reply):
             return
-        if attempt is not None and not attempt.is_probe and any(due.key == reply.key for due in attempt.dues):
+        if (
+            attempt is not None
+            and not attempt.is_probe
+            and any(due.key == reply.key for due in attempt.expected)
+        ):
             attempt.exclude(reply)
             self.statistics.other["unexpected"] += 1
         else:
@@ -497,27 +504,27 @@ class Engine:
 
     def _end(self, attempt: Attempt, now: float) -> None:
         """End an attempt: accept its replies (of a group, those that came) or set its fault."""
-        request, dues = attempt.request, attempt.dues
-        if (len(dues) == 1 and not attempt.complete) or (dues and (attempt.fault or attempt.surplus)):
+        request, expected = attempt.request, attempt.expected
+        if (len(expected) == 1 and not attempt.complete) or (expected and (attempt.fault or attempt.surplus)):
             attempt.fault = attempt.failure()
         answer = attempt.response(min(now, attempt.deadline))
         if attempt.is_probe and not attempt.fault and not (request.decode and request.decode(answer)):
             attempt.fault = "unexpected"
         del self.in_flight[request.lane]
         attempt.in_flight, attempt.is_used = False, True
-        missing = dues if attempt.fault else ()
+        missing = expected if attempt.fault else ()
         if answer.missing and not attempt.fault:
-            missing = tuple(due for due in dues if due.node in answer.missing)
+            missing = tuple(due for due in expected if due.node in answer.missing)
         for due in missing:
             self._miss(attempt, due, now)
-        if not attempt.fault or not dues:
+        if not attempt.fault or not expected:
             attempt.accepted = answer
             self._accept_response(attempt, answer)
         self.done.append(attempt)
 
     def _miss(self, attempt: Attempt, due: Expected, now: float) -> None:
         """This reply does not count: note the quiet time, or that its node owes it."""
-        came = any(attempt.dues[index] is due for index in attempt.replies)
+        came = any(attempt.expected[index] is due for index in attempt.replies)
         if came or attempt.request.priority is Priority.STOP:
             self.sync.mark_doubted(due.node, 0.0)
             self.sync.of(due.node).quiet_until = now + self.quiet_time
@@ -565,13 +572,13 @@ class Engine:
             known.add(nodes)
         self.statistics.answered(nodes, at - attempt.sent_at)
         expected, count = self._repeats.get(request.lane, ((), 0))
-        if attempt.dues != expected or not self.driver.probe_after:
-            self._repeats[request.lane] = attempt.dues, 1
+        if attempt.expected != expected or not self.driver.probe_after:
+            self._repeats[request.lane] = attempt.expected, 1
         elif count < self.driver.probe_after:
             self._repeats[request.lane] = expected, count + 1
         else:
             self._repeats[request.lane] = expected, 1
-            for due in attempt.dues:
+            for due in attempt.expected:
                 if due.node not in self.sync.out_of_sync:
                     self.sync.mark_owed(request.lane, due, 0.0)
                     break
@@ -587,8 +594,8 @@ class Engine:
 
     def stop_delay(self, now: float) -> float:
         """s that a stop waits for the turn: as long as a reply may be on the wire; from any thread."""
-        flying = tuple(self.in_flight.values())
-        return max((self._remaining(one, now) for one in flying), default=0.0) + STOP_DELAY
+        attempts = tuple(self.in_flight.values())
+        return max((self._remaining(one, now) for one in attempts), default=0.0) + STOP_DELAY
 
     def latch(self, now: float, by: str) -> None:
         """Emergency stop: end sleeps, shorten what is in flight, refuse motion until `reset`.

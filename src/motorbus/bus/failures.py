@@ -70,10 +70,10 @@ def no_answer(
 
     `sent`: the request itself left, not only a probe. `diagnosis` is what the adapter reports, "" for nothing.
     """
-    dues = () if request.expected is ANY else request.expected
-    node = dues[0].node if dues else None
+    expected = () if request.expected is ANY else request.expected
+    node = expected[0].node if expected else None
     kind, cause, advice = FAULTS[fault]
-    unknown = bool(dues) and sent and (request.effect is not Effect.NONE or not request.repeatable)
+    unknown = bool(expected) and sent and (request.effect is not Effect.NONE or not request.repeatable)
     who = f"node {node}" if node is not None else "the bus"
     again = f" ({tries} tries)" if tries > 1 else ""
     summary = {
@@ -88,7 +88,7 @@ def no_answer(
         summary,
         sent=request.wire,
         received=received,
-        expected=f"{dues[0].length} bytes from {who}" if dues else "",
+        expected=f"{expected[0].length} bytes from {who}" if expected else "",
         cause=diagnosis or cause.format(**words),
         advice=advice.format(**words),
         node=node,

@@ -162,7 +162,7 @@ class Nodes(Mapping[int, Reading]):
         """Number of different replies that this node gives to the requests of a stop."""
         requests = self.driver.stop(dict.fromkeys(sorted(self.known))).requests
         gated = [one.expected for one in requests if one.effect in GATED and one.expected is not ANY]
-        return max(1, len({due for dues in gated for due in dues if due.node == node}))
+        return max(1, len({due for expected in gated for due in expected if due.node == node}))
 
 
 def rests(goal: Setpoint) -> bool:

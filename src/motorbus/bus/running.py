@@ -6,6 +6,7 @@ import contextlib
 import time
 from collections.abc import Collection, Mapping, Sequence
 from math import inf
+from queue import Empty, SimpleQueue
 from typing import Any, Final, TypeVar
 
 from motorbus.bus.base import IDLE, BaseBus, check_clocks
@@ -52,16 +53,21 @@ class Part:
     """The procedures of this thread on one bus. `blocked`: another thread had the turn of the bus.
 
     `sends_at` is when (s) more may be sent. `cancellations` are thrown into the trees when this thread has the turn.
-    `calls` are those of a worker, `inbox` its next ones.
+    `calls` are those of a worker, `inbox` its next ones. An entry of `wakes` ends a sleep.
     """
 
-    def __init__(self, bus: BaseBus, inbox: Collection[Any] = ()) -> None:
+    def __init__(
+        self, bus: BaseBus, inbox: Collection[Any] = (), wakes: SimpleQueue[None] | None = None
+    ) -> None:
         bus.check_thread()
         self.bus = bus
         self.inbox = inbox
+        self.wakes: SimpleQueue[None] = wakes or SimpleQueue()
         self.calls: Sequence[Any] = ()
         self.trees: list[Tree[Any]] = []
-        self.is_sleeping = self.holds_turn = self.blocked = False
+        self.finished = True
+        """Every procedure had ended after the last `advance`."""
+        self.holds_turn = self.blocked = False
         self.sends_at = inf
         self.cancellations: list[BaseException] = []
 
@@ -77,18 +83,13 @@ class Part:
             since=since,
         )
         self.trees.append(tree)
+        self.finished = False
         return tree
-
-    @property
-    def finished(self) -> bool:
-        """Every procedure has ended."""
-        return all(tree.finished for tree in self.trees)
 
     def wake(self) -> None:
         """End `_sleep`; from any thread."""
-        if self.is_sleeping:
-            with self.bus.settled:
-                self.bus.settled.notify_all()
+        if self.wakes.empty():
+            self.wakes.put(None)
 
     def advance(self, timeout: float) -> bool:
         """Step the trees and send; True when all have ended.
@@ -104,11 +105,12 @@ class Part:
             for tree in self.trees:
                 tree.cancel(error)
         for call in self.calls:
-            call.obey()
+            call.end_as_requested()
         stepped = self._stepped
         while True:
             for tree in stepped:
                 tree.advance()
+            self.finished = all(tree.finished for tree in self.trees)
             if self.finished:
                 self.release_turn()
                 return True
@@ -131,19 +133,17 @@ class Part:
 
         A tree that waits for a notice keeps it until another thread wants it.
         """
+        if not self.holds_turn:
+            return
         engine = self.bus.engine
-        free = (
-            self.is_idle
-            and engine.exclusive is None
-            and (not engine.notification_handlers or self.bus.turn.wanted)
-        )
-        if self.holds_turn and (free or self.finished or self.bus.waits_for_stop):
+        waits = engine.exclusive is not None or (engine.notification_handlers and not self.bus.turn.wanted)
+        if self.finished or self.bus.waits_for_stop or (not waits and self.is_idle):
             self.holds_turn = False
             self.bus.turn.release()
 
     def next_moment(self) -> float:
         """When (s) a tree can go on by itself, or more may be sent."""
-        return min([self.sends_at, *[tree.next_moment() for tree in self._stepped]])
+        return min(self.sends_at, *[tree.next_moment() for tree in self._stepped])
 
     def wait(self) -> None:
         """Wait for data, a deadline, or the next moment of a tree; without the turn sleep for at most `IDLE`."""
@@ -156,18 +156,15 @@ class Part:
 
     def _sleep(self, seconds: float) -> None:
         """Sleep this long, or until something that a tree waits for has ended."""
-        with self.bus.settled:
-            self.is_sleeping = True
-            try:
-                self.bus.settled.wait_for(self._can_advance, max(0.0, seconds))
-            finally:
-                self.is_sleeping = False
+        if not self._can_advance():
+            with contextlib.suppress(Empty):
+                self.wakes.get(timeout=max(0.0, seconds))
 
     def _can_advance(self) -> bool:
         return (
             bool(self.inbox or self.cancellations)
             or any(tree.ready for tree in self.trees)
-            or any(call.requests for call in self.calls)
+            or any(call.cancellations for call in self.calls)
         )
 
 

@@ -178,17 +178,17 @@ class EmergencyStop:
 
     # -- the thread --------------------------------------------------------------------------------------------
 
-    def _serve(self, ear: socket.socket) -> None:
+    def _serve(self, server: socket.socket) -> None:
         while True:
             try:
-                self._serve_all(ear, _receive(ear))
+                self._serve_all(server, _receive(server))
                 if self._closed:
                     return
             except OSError:  # the client is gone, or the socket was closed
                 if self._closed:
                     return
 
-    def _serve_all(self, ear: socket.socket, received: list[tuple[bytes, Any]]) -> None:
+    def _serve_all(self, server: socket.socket, received: list[tuple[bytes, Any]]) -> None:
         """One stop for all who ask now."""
         clients = [
             (about, address)
@@ -202,7 +202,7 @@ class EmergencyStop:
             for _, address in clients:
                 if address:
                     with contextlib.suppress(OSError):  # the client is gone
-                        ear.sendto(json.dumps(outcome._asdict()).encode(), address)
+                        server.sendto(json.dumps(outcome._asdict()).encode(), address)
 
     def _outcome(self, client: str = "") -> StopOutcome:
         try:
@@ -226,9 +226,9 @@ class EmergencyStop:
         self._sockets = None
 
 
-def _receive(ear: socket.socket) -> list[tuple[bytes, Any]]:
+def _receive(server: socket.socket) -> list[tuple[bytes, Any]]:
     """Wait for a datagram; all that are there, with their senders."""
-    received = [ear.recvfrom(LONGEST)]
-    while received[-1][0] and select.select((ear,), (), (), 0.0)[0]:
-        received.append(ear.recvfrom(LONGEST))
+    received = [server.recvfrom(LONGEST)]
+    while received[-1][0] and select.select((server,), (), (), 0.0)[0]:
+        received.append(server.recvfrom(LONGEST))
     return received

@@ -60,17 +60,17 @@ def open_socket(path: Path | None) -> tuple[socket.socket, socket.socket]:
     Without a path, or where none can be made, no other process reaches it.
     """
     if path is not None and hasattr(socket, "AF_UNIX"):
-        ear, mouth = (socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) for _ in range(2))
+        server, client = (socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) for _ in range(2))
         try:
             path.unlink(missing_ok=True)
-            ear.bind(str(path))
+            server.bind(str(path))
             path.chmod(0o600)
-            mouth.connect(str(path))
+            client.connect(str(path))
         except OSError:  # a full disk must not take the stop away from this process
-            ear.close()
-            mouth.close()
+            server.close()
+            client.close()
         else:
-            return ear, mouth
+            return server, client
     return socket.socketpair()
 
 

@@ -223,7 +223,10 @@ class Tree(Generic[T]):
         """The moment (s) at which `advance` has something to do by itself; inf when there is none."""
         if self.finished:
             return inf
-        return min([self.deadline, *(timer.until for timer in self.timers)])
+        moment = self.deadline
+        for timer in self.timers:
+            moment = min(moment, timer.until)
+        return moment
 
     def result(self) -> T:
         """What the procedure returned; raises its error, or the cancellation."""
@@ -493,7 +496,7 @@ class Tree(Generic[T]):
         else:
             self._decode(task, request, attempt.accepted)
 
-    def adopt(self, attempt: Attempt) -> None:
+    def continue_from(self, attempt: Attempt) -> None:
         """The procedure is a request whose first attempt is on the wire, or has failed."""
         task = self.root
         self.ready.clear()

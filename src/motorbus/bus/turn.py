@@ -72,14 +72,14 @@ class Turn:
                 self._pass_on()
 
     def _wait(self, priority: Priority, timeout: float, thread: int) -> bool:
-        bell = Lock()
-        bell.acquire()
-        waiter = (priority, next(self._serial), monotonic(), bell, thread)
+        wake = Lock()
+        wake.acquire()
+        waiter = (priority, next(self._serial), monotonic(), wake, thread)
         with self._guard:
             heappush(self._waiters, waiter)
             self._pass_on()
         try:
-            if bell.acquire(timeout=timeout):
+            if wake.acquire(timeout=timeout):
                 return True
         except BaseException:  # a signal handler has raised
             if self._withdraw(waiter):

@@ -96,9 +96,9 @@ class DryBus:
         return self._bus.latched
 
     @property
-    def lock(self) -> AbstractContextManager[object]:
+    def turn(self) -> AbstractContextManager[object]:
         """As of the bus itself."""
-        return self._bus.lock
+        return self._bus.turn
 
     @property
     def loss_count(self) -> int:
@@ -168,7 +168,7 @@ class DryBus:
             return self._foreseen(exchange) if self._follows(exchange) else self._told(exchange)
         for question in self._bus.required_reads(exchange):
             self._bus.run(question)
-        with self._bus.lock:
+        with self._bus.turn:
             self.interlock.check(exchange, self._bus.now())
         self._written |= _answering(exchange) or {_EVERYONE}
         if exchange.effect is Effect.IDENTITY:  # from now on it would have another id, or another rate

@@ -11,12 +11,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from enum import Enum
-from typing import TypeAlias, TypeGuard
+from typing import Literal, TypeAlias, TypeGuard
 
 from motorbus.core.request import Effect
 from motorbus.errors import RequestError
 
 Value: TypeAlias = int | float
+ByteOrder: TypeAlias = Literal["little", "big"]
 
 _SHOWN = 40  # maximum characters of a refused value in an error
 
@@ -73,7 +74,7 @@ class Register:
     storage: Storage
     source: str  # of each fact
     subindex: int | None = None
-    order: str = "little"
+    order: ByteOrder = "little"
     coding: Coding = Coding.UNSIGNED
     sign_bit: int | None = None
     unit: str = ""  # "" for a plain number
@@ -108,7 +109,7 @@ class Register:
             code = -raw | 1 << self.sign_bit
         elif self.coding is not Coding.UNSIGNED and raw < 0:
             code = raw & (1 << 8 * self.size) - 1
-        return code.to_bytes(self.size, "little" if self.order == "little" else "big")
+        return code.to_bytes(self.size, self.order)
 
     def out_of_range(self, given: str, *, raw: bool = False) -> RequestError:
         """The error for a value outside the range of the row."""
@@ -125,7 +126,7 @@ class Register:
 
     def decode(self, data: bytes) -> int:
         """Bytes of the right size -> raw value; a negative zero gives 0."""
-        code = int.from_bytes(data, "little" if self.order == "little" else "big")
+        code = int.from_bytes(data, self.order)
         if self.coding is Coding.SIGN_MAGNITUDE and self.sign_bit is not None:
             magnitude = code & (1 << self.sign_bit) - 1
             return -magnitude if code >> self.sign_bit & 1 else magnitude

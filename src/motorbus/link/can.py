@@ -12,7 +12,6 @@ import difflib
 import errno
 import json
 import logging
-import os
 import re
 import subprocess
 import time
@@ -32,30 +31,30 @@ from motorbus.link import usb_adapters
 from motorbus.link.errors import busy, lost
 from motorbus.link.lock import PortLock, opening
 from motorbus.link.serial import NO_DEVICE
-from motorbus.link.slcan import SlcanChannel
 
 BUS_OFF: Final = 0x40  # CAN_ERR_BUSOFF in the identifier of an error frame, linux/can/error.h
 SLICE: Final = 0.02  # s of one wait inside python-can
 AT_ONCE: Final = 0.001  # s; a read that has a frame waits no longer for a second one
-WAITING: Final = 0.005  # s; a back end whose recv(0) takes longer waits for its serial port
-MOST_LOOKS: Final = 64  # for frames that are there when the bus is opened
 SERIAL_WAIT: Final = 0.1  # s; time-out of the serial port in python-can's back ends
-_IDENTIFIER: Final = ERROR_FLAG - 1
-_FULL: Final = (errno.ENOBUFS, errno.EAGAIN)
-_FULL_TEXTS: Final = ("full", "overflow", "could not send message to one or more")
-_FRAME_DESCRIPTOR: Final = ("socketcan", "udp_multicast")
-"""Interfaces whose descriptor is readable exactly when there is a frame."""
-_KERNEL_ERRORS: Final = ("socketcan", "socketcand")
-"""Interfaces whose error frames are those of the Linux kernel."""
+SOCKETCAND_PORT: Final = 29536
+IP_TIME: Final = 2.0  # s; time-out for the program `ip`
+EXAMPLES: Final = "can://slcan/dev/ttyACM0, can://socketcan/can0 or can://socketcand/localhost:29536/can0"
+
 SERIAL_PORTS: Final = ("slcan", "serial", "robotell", "seeedstudio")
 """Interfaces whose channel is a serial port."""
 SHARED: Final = ("virtual", "udp_multicast")
 """Interfaces without bit rate and wire, which any number of programs share."""
-SOCKETCAND_PORT: Final = 29536
-IP_TIME: Final = 2.0  # s; time-out for the program `ip`
-EXAMPLES: Final = "can://slcan/dev/ttyACM0, can://socketcan/can0, can://socketcand/localhost/can0"
+_WAITING: Final = ("serial", "seeedstudio")
+"""Interfaces whose recv(0) waits for their serial port."""
+_FRAME_DESCRIPTOR: Final = ("socketcan", "udp_multicast")
+"""Interfaces whose descriptor is readable exactly when there is a frame."""
+_KERNEL_ERRORS: Final = ("socketcan", "socketcand")
+"""Interfaces whose error frames are those of the Linux kernel."""
+_IDENTIFIER: Final = ERROR_FLAG - 1
+_FULL: Final = (errno.ENOBUFS, errno.EAGAIN)
+_FULL_TEXTS: Final = ("full", "overflow", "could not send message to one or more")
 _SWITCHES: Final[Mapping[object, bool]] = {"yes": True, "on": True, "no": False, "off": False}
-_LISTEN_ONLY: Final[Mapping[str, Mapping[str, Any]]] = {
+LISTEN_ONLY: Final[Mapping[str, Mapping[str, Any]]] = {
     "slcan": {},  # by a command
     "socketcan": {},  # by the kernel
     "virtual": {},
@@ -70,12 +69,18 @@ _LISTEN_ONLY: Final[Mapping[str, Mapping[str, Any]]] = {
 
 
 class CanAddress(NamedTuple):
-    """A CAN channel of this machine; `options` are arguments of `can.Bus` that are part of the address."""
+    """A CAN channel of this machine; `options` are arguments of `can.Bus` that are part of the address.
+
+    `lock_name` is the one name under which the adapter is locked; "" for a shared channel.
+    `device` is the serial port of the adapter on this machine; "" for any other channel.
+    """
 
     name: str
     interface: str
     channel: str
     options: Mapping[str, object]
+    lock_name: str
+    device: str
 
     @property
     def sets_rate(self) -> bool:
@@ -88,53 +93,39 @@ class CanAddress(NamedTuple):
         virtual = self.interface == "socketcan" and self.channel.startswith(("vcan", "vxcan"))
         return virtual or self.interface in SHARED
 
-    @property
-    def device(self) -> str:
-        """The serial port of this machine, for interfaces that use one; else ""."""
-        is_local = self.interface in SERIAL_PORTS and "://" not in self.channel
-        return self.channel.partition("@")[0] if is_local else ""
-
-    @property
-    def lock_name(self) -> str:
-        """The one name under which the adapter is locked; "" for a shared channel."""
-        if self.interface in SHARED:
-            return ""
-        if self.interface in SERIAL_PORTS:
-            return self.device or self.channel.partition("@")[0]
-        server = f"{self.options['host']}:{self.options['port']}/" if self.interface == "socketcand" else ""
-        return f"can://{self.interface}/{server}{self.channel}"
-
 
 def read_address(port: str) -> CanAddress:
-    """The parts of `can://INTERFACE/CHANNEL`. Raises RequestError.
+    """The parts of `can://INTERFACE/CHANNEL`. Raises RequestError, or LinkError without python-can.
 
     The channel of a serial adapter that is neither a URL nor a COM port begins with `/`.
     """
     interface, _, channel = port.partition("://")[2].partition("/")
-    interface, options = interface.lower(), dict[str, object]()
-    if not interface:
-        raise RequestError(
-            f"{port!r}: the interface is missing", expected=f"can://INTERFACE/CHANNEL, as {EXAMPLES}"
-        )
+    interface, device = interface.lower(), ""
+    options: dict[str, object] = {}
+    lock_name = f"can://{interface}/{channel}"
     if interface == "socketcand":
-        host, _, channel = channel.partition("/")
-        host, _, number = host.partition(":")
-        if not channel:
-            raise RequestError(
-                f"{port!r} does not name a channel of a server",
-                expected="can://socketcand/HOST:PORT/CHANNEL, as can://socketcand/localhost:29536/can0",
-            )
+        server, _, channel = channel.partition("/")
+        host, _, number = server.partition(":")
         options = {"host": host, "port": number or SOCKETCAND_PORT}
-    if interface in SERIAL_PORTS:
-        if not channel:
-            raise RequestError(
-                f"{port}: the serial port of the adapter is missing",
-                expected=f"can://{interface}/dev/ttyACM0",
-            )
-        has_name = channel.startswith("/") or "://" in channel or re.fullmatch(r"COM\d+(@\d+)?", channel)
-        if not has_name and os.name != "nt":
+        lock_name = f"can://socketcand/{host}:{options['port']}/{channel}"
+    elif interface in SERIAL_PORTS:
+        if channel and not re.match(r"/|\w+://|(?i:COM)\d", channel):
             channel = f"/{channel}"
-    return CanAddress(port, interface, channel, options)
+        lock_name = channel.partition("@")[0]
+        device = "" if "://" in channel else lock_name
+    if not interface or (not channel and interface in (*SERIAL_PORTS, "socketcand")):
+        raise RequestError(
+            f"{port!r} does not name an interface and its channel",
+            expected=f"can://INTERFACE/CHANNEL, as {EXAMPLES}",
+        )
+    known = python_can(port).VALID_INTERFACES
+    if interface not in known:
+        near = difflib.get_close_matches(interface, known, 1)
+        raise RequestError(
+            f"{port!r}: python-can has no interface {interface!r}",
+            advice=f"did you mean {near[0]}?" if near else f"for example {EXAMPLES}",
+        )
+    return CanAddress(port, interface, channel, options, "" if interface in SHARED else lock_name, device)
 
 
 def python_can(port: str) -> ModuleType:
@@ -150,38 +141,27 @@ def python_can(port: str) -> ModuleType:
     return can
 
 
-def describe(port: str) -> CanAddress:
-    """The parts of an address whose interface exists. Raises RequestError, or LinkError without python-can."""
-    address = read_address(port)
-    known = python_can(port).VALID_INTERFACES
-    if address.interface not in known:
-        near = difflib.get_close_matches(address.interface, known, 1)
-        raise RequestError(
-            f"{port!r}: python-can has no interface {address.interface!r}",
-            advice=f"did you mean {near[0]}?" if near else f"for example {EXAMPLES}",
-        )
-    return address
-
-
 class CanLink:
-    """An open CAN channel. Arguments as for `open_link`. `queue`: frames that it takes at once, 0 if unknown.
+    """An open CAN channel; a subclass opens it in `configure` and closes it in `shut`.
 
-    `options`  `listen_only` (yes, no), and arguments of `can.Bus`; see `SlcanChannel` for those of slcan
-    `shared`   the caller takes part beside a host of this machine, as simulated devices do: SocketCAN is not locked
-
-    `lock_name` names the adapter for its lock and its emergency stop; "" for a shared channel. `no_wire`: no device
-    can be real. `device` is the serial port of the adapter; "" for any other channel. Raises RequestError for an
-    unknown interface or option, PortNotFound, PortBusy, or LinkError: for a bit rate that the adapter does not have, a
-    missing driver, a refusal.
+    `options` are `listen_only` (yes, no) and what the subclass knows. `shared`: the caller takes part beside a host of
+    this machine, as simulated devices do, so SocketCAN is not locked. Other arguments are those of `open_link`.
+    `lock_name`, `device` and `no_wire` are those of `CanAddress`. `queue` is the number of frames that the adapter
+    takes at once, 0 if unknown. Raises RequestError for a bad option, PortNotFound, PortBusy, or LinkError: for a rate
+    or mode that the adapter does not have, a missing driver, a refusal.
     """
 
     paced = False  # adapters do not report when a frame was on the wire
     virtual = False
     simulated = False
+    latency = usb_adapters.DEVICE_LATENCY
+    warnings: tuple[str, ...] = ()
+    queue = 0
+    now = staticmethod(time.monotonic)
 
     def __init__(
         self,
-        port: str,
+        address: CanAddress,
         *,
         rate: int = 0,
         default_rate: int = 0,
@@ -190,188 +170,163 @@ class CanLink:
         lock: PortLock | None = None,
         connect_time: float | None = None,
     ) -> None:
-        self.name = port
-        self._address = address = describe(port)
-        given = {name: _SWITCHES.get(value, value) for name, value in (options or {}).items()}
-        listen_only = given.pop("listen_only", False)
+        self.name = address.name
+        self.address = address
+        self.no_wire, self.lock_name, self.device = address.no_wire, address.lock_name, address.device
+        self.options = {name: _SWITCHES.get(value, value) for name, value in (options or {}).items()}
+        self.connect_time = connect_time
+        listen_only = self.options.pop("listen_only", False)
         if not isinstance(listen_only, bool):
             raise RequestError(f"listen_only={listen_only}: neither yes nor no", expected="yes or no")
-        self.listen_only = listen_only
-        self.no_wire, self.lock_name, self.device = address.no_wire, address.lock_name, address.device
-        self.rate = rate or default_rate
+        self.rate, self.listen_only = rate or default_rate, listen_only
         if self.rate <= 0:
-            raise RequestError(f"{port}: the bit rate is missing", expected="bitrate=500000, for example")
-        warning = self._check_settings(rate, self.listen_only)
-        is_free = not self.lock_name or (shared and address.interface == "socketcan")
-        with nullcontext(PortLock(port)) if is_free else opening(self.lock_name, lock) as self.lock:
-            self._channel = self._open(given, connect_time)
-        self.latency = self._channel.latency
-        self.warnings = self._channel.warnings + warning
-        self.queue = kernel_queue(address.channel) if address.interface == "socketcan" else 0
+            raise RequestError(
+                f"{self.name}: the bit rate is missing", expected="bitrate=500000, for example"
+            )
+        self._check_mode(listen_only)
+        is_kernel = address.interface == "socketcan"
+        if is_kernel:
+            self._check_kernel(rate)
+        is_free = not self.lock_name or (shared and is_kernel)
+        with nullcontext(PortLock(self.name)) if is_free else opening(self.lock_name, lock) as self.lock:
+            self.open_port()
+            try:
+                self.configure(self.rate, listen_only)
+            except BaseException:
+                self.shut()
+                raise
 
-    def _check_settings(self, rate: int, listen_only: bool) -> tuple[str, ...]:
-        """Check rate (bit/s, 0 for any) and mode; a warning when the adapter does not tell its rate.
+    def open_port(self) -> None:
+        """Prepare for `configure`: open the serial port of the adapter, where that is apart from its channel."""
 
-        Raises LinkError when the adapter cannot have them.
-        """
-        address, interface = self._address, self._address.interface
-        if listen_only and interface not in _LISTEN_ONLY:
+    def configure(self, rate: int, listen_only: bool) -> None:
+        """Open the channel again, at this rate in bit/s. Raises LinkError for a rate or mode that it refuses."""
+        raise NotImplementedError
+
+    def shut(self) -> None:
+        """Close the channel. A second call does nothing."""
+        raise NotImplementedError
+
+    def send(self, frame: CanFrame) -> None:
+        """Send a frame; raises as `Link.write` does."""
+        raise NotImplementedError
+
+    def _check_mode(self, listen_only: bool) -> None:
+        interface = self.address.interface
+        if listen_only and interface not in LISTEN_ONLY:
             raise LinkError(
                 f"{self.name}: {interface} cannot only listen: its adapter would acknowledge frames",
-                expected=f"listen_only with one of {', '.join(_LISTEN_ONLY)}",
+                expected=f"listen_only with one of {', '.join(LISTEN_ONLY)}",
                 advice="leave out listen_only where nothing else is on the bus",
             )
-        if interface == "socketcan":
-            actual = kernel_rate(address, rate, listen_only)
-            if actual is None:
-                return (f"the kernel did not tell the bit rate; {self.rate} bit/s is assumed",)
-            self.rate = actual or self.rate
-        elif rate and not address.sets_rate and interface not in SHARED:
-            return (f"the bit rate is set at the server; whether that is {rate} bit/s cannot be checked",)
-        return ()
 
-    def _open(self, options: Mapping[str, object], connect_time: float | None) -> SlcanChannel | BusChannel:
-        address = self._address
-        channel: SlcanChannel | BusChannel
-        if address.interface == "slcan":
-            channel = SlcanChannel(self.name, address.channel, options, connect_time)
-        else:
-            channel = BusChannel(address, options)
-        try:
-            channel.configure(self.rate, self.listen_only)
-        except BaseException:
-            channel.close()
-            raise
-        return channel
-
-    def port_at(self, device: str) -> str:
-        """The address of this adapter at another serial port."""
-        _, at, baud = self._address.channel.partition("@")
-        return f"can://{self._address.interface}/{device.lstrip('/')}{at}{baud}"
-
-    def trouble(self) -> str:
-        """What the adapter has reported since the last call, for the error of a missing reply; "" for nothing."""
-        return self._channel.trouble()
-
-    now = staticmethod(time.monotonic)
+    def _check_kernel(self, rate: int) -> None:
+        """Take over the settings of a SocketCAN interface. Raises LinkError where they are not this rate and mode."""
+        self.queue = kernel_queue(self.address.channel)
+        actual = kernel_rate(self.address, rate, self.listen_only)
+        if actual is None:
+            self.warnings = (f"the kernel did not tell the bit rate; {self.rate} bit/s is assumed",)
+        self.rate = actual or self.rate
 
     def write(self, data: Data) -> None:
         assert isinstance(data, CanFrame)
         if self.listen_only:
             raise LinkError(f"{self.name} only listens and cannot send", sent=data)
-        self._channel.write(data)
-
-    def read(self, until: float) -> list[Data]:
-        """See `Link.read`. Raises LinkLost too when an error frame of the kernel reports bus off."""
-        frames = self._channel.read(until)
-        if frames and self._address.interface in _KERNEL_ERRORS:
-            for frame in frames:
-                if isinstance(frame, CanFrame) and frame.id & ERROR_FLAG and frame.id & BUS_OFF:
-                    raise LinkLost(
-                        f"{self.name} is off the bus: its controller has counted too many errors",
-                        received=frame,
-                        cause="a short circuit, another bit rate on the bus, no terminating resistors, no other node",
-                        advice="check the bus; SocketCAN without restart-ms needs `ip link set can0 type can restart`",
-                    )
-        return frames
+        self.send(data)
 
     def tune(self, rate: int, listen_only: bool = False) -> None:
         before, wanted = (self.rate, self.listen_only), (rate or self.rate, listen_only)
         if wanted == before:
             return
-        if self._check_settings(*wanted):
-            raise LinkError(
-                f"{self.name}: the bit rate cannot be changed to {wanted[0]} bit/s from here",
-                advice="set it where the adapter is: `ip link set` for SocketCAN",
-            )
-        if self._address.sets_rate:
+        self._check_mode(listen_only)
+        if self.address.sets_rate:
             try:
-                self._channel.configure(*wanted)
+                self.configure(*wanted)
             except MotorbusError:
-                self._channel.configure(*before)
+                self.configure(*before)
                 raise
+        elif self.address.interface not in SHARED:
+            raise LinkError(
+                f"{self.name}: its bit rate and mode cannot be changed from here",
+                advice="set them where the adapter is: `ip link set` for SocketCAN",
+            )
         self.rate, self.listen_only = wanted
 
-    def fileno(self) -> int | None:
-        return self._channel.fileno()
+    def trouble(self) -> str:
+        """What the adapter has reported since the last call, for the error of a missing reply; "" for nothing."""
+        return ""
+
+    def port_at(self, device: str) -> str:
+        """The address of this adapter at another serial port."""
+        _, at, baud = self.address.channel.partition("@")
+        return f"can://{self.address.interface}/{device.lstrip('/')}{at}{baud}"
 
     def close(self) -> None:
-        self._channel.close()
+        self.shut()
         self.lock.release()
 
 
-class BusChannel:
-    """A bus of python-can; `configure` opens it. `read` waits in short slices, so that another thread can close it."""
+class PythonCanLink(CanLink):
+    """A channel of python-can; `options` are arguments of `can.Bus`.
 
-    warnings: tuple[str, ...] = ()
+    `read` waits in short slices, so that another thread can close the link.
+    """
 
-    def __init__(self, address: CanAddress, options: Mapping[str, object]) -> None:
-        self.name = address.name
-        is_shared = address.interface in SHARED
-        self.latency = usb_adapters.TERMINAL_LATENCY if is_shared else usb_adapters.DEVICE_LATENCY
-        self._address = address
-        self._settings = {**options, **address.options}
-        self._can: Any = python_can(address.name)
-        self._bus: Any = None
-        self._descriptor: int | None = None
+    _bus: Any = None
+    _descriptor: int | None = None
+
+    def open_port(self) -> None:
+        interface = self.address.interface
+        self._can: Any = python_can(self.name)
         self._access = Lock()
-        self._waits = False
-        """recv(0) waits, so a read takes one frame."""
+        self._waits = interface in _WAITING  # so a read takes one frame
+        if interface in SHARED:
+            self.latency = usb_adapters.TERMINAL_LATENCY
+        if self._waits:
+            self.latency += SERIAL_WAIT
+            wait = f"waits up to {1000 * SERIAL_WAIT:.0f} ms for a frame, so requests are slow"
+            self.warnings = (f"python-can's {interface} {wait}",)
 
     def configure(self, rate: int, listen_only: bool) -> None:
-        """Open the bus again, at this rate in bit/s. Raises LinkError, or RequestError for what it refuses."""
-        self.close()
-        address, settings = self._address, dict(self._settings)
+        self.shut()
+        address = self.address
+        settings = {**self.options, **address.options}
         if address.sets_rate and "f_clock" not in settings:  # a bit timing of python-can
             settings["bitrate"] = rate
         if listen_only:
-            settings.update(_LISTEN_ONLY[address.interface])
+            settings.update(LISTEN_ONLY[address.interface])
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # about adjusted clocks and deprecated names
                 self._bus = self._can.Bus(address.channel or None, address.interface, **settings)
             if address.interface in _FRAME_DESCRIPTOR:
                 self._descriptor = self._bus.fileno()
-            else:
-                self._measure()
         except Exception as error:  # each back end has its own types
             raise open_error(address, error) from error
 
-    def _measure(self) -> None:
-        """Find out whether recv(0) waits; twice, as another program may have had the processor."""
-        waits: list[float] = []
-        with contextlib.suppress(Exception):  # a damaged frame, say
-            for _ in range(MOST_LOOKS):
-                begin = time.monotonic()
-                is_empty = self._bus.recv(0.0) is None
-                seconds = time.monotonic() - begin
-                if is_empty or seconds > WAITING:  # a frame that is there tells nothing
-                    waits.append(seconds)
-                if len(waits) == 2:
-                    break
-        wait = min(waits, default=0.0)
-        if wait > WAITING and not self._waits:
-            wait = max(wait, SERIAL_WAIT)
-            self._waits = True
-            self.latency += wait
-            interface = self._address.interface
-            self.warnings = (
-                f"python-can's {interface} waits up to {1000 * wait:.0f} ms for a frame, so requests are slow",
-            )
-
     def read(self, until: float) -> list[Data]:
-        frames: list[Data] = []
+        """See `Link.read`. Raises LinkLost too when an error frame of the kernel reports bus off."""
+        frames: list[CanFrame] = []
         while not frames:
             pause = max(0.0, min(until - time.monotonic(), SLICE))
             with self._access:
                 frames = self._receive(pause)
             if time.monotonic() >= until:
                 break
-        return frames
+        if self.address.interface in _KERNEL_ERRORS:
+            for frame in frames:
+                if frame.id & ERROR_FLAG and frame.id & BUS_OFF:
+                    raise LinkLost(
+                        f"{self.name} is off the bus: its controller has counted too many errors",
+                        received=frame,
+                        cause="a short circuit, another bit rate on the bus, no terminating resistors, no other node",
+                        advice="check the bus; SocketCAN without restart-ms needs `ip link set can0 type can restart`",
+                    )
+        return [*frames]
 
-    def _receive(self, pause: float) -> list[Data]:
+    def _receive(self, pause: float) -> list[CanFrame]:
         """The frames that are there; waits so long (s) for the first."""
-        frames: list[Data] = []
+        frames: list[CanFrame] = []
         end = inf
         if self._bus is None:
             raise lost(self.name, "it is closed")
@@ -385,7 +340,7 @@ class BusChannel:
             raise lost(self.name, error) from error
         return frames
 
-    def write(self, frame: CanFrame) -> None:
+    def send(self, frame: CanFrame) -> None:
         message = self._can.Message(
             arbitration_id=frame.id & _IDENTIFIER,
             data=bytearray(frame.data),
@@ -407,25 +362,14 @@ class BusChannel:
                 ) from error
             raise lost(self.name, error) from error
 
-    def trouble(self) -> str:
-        return ""
-
     def fileno(self) -> int | None:
         return self._descriptor
 
-    def close(self) -> None:
+    def shut(self) -> None:
         bus, self._bus, self._descriptor = self._bus, None, None
         if bus is not None:
             with self._access, contextlib.suppress(Exception):  # it may be broken already
                 bus.shutdown()
-
-
-def kernel_queue(channel: str, sysfs: Path = Path("/sys")) -> int:
-    """Frames that a SocketCAN interface takes at once; 0 when the system does not tell."""
-    try:
-        return int((sysfs / "class" / "net" / channel / "tx_queue_len").read_text())
-    except (OSError, ValueError):
-        return 0
 
 
 def frame_of(message: Any) -> CanFrame | None:
@@ -437,6 +381,14 @@ def frame_of(message: Any) -> CanFrame | None:
     if message.is_remote_frame:
         return CanFrame(message.arbitration_id | REMOTE_FLAG, bytes(message.dlc), message.is_extended_id)
     return CanFrame(message.arbitration_id, bytes(message.data), message.is_extended_id)
+
+
+def kernel_queue(channel: str, sysfs: Path = Path("/sys")) -> int:
+    """Frames that a SocketCAN interface takes at once; 0 when the system does not tell."""
+    try:
+        return int((sysfs / "class" / "net" / channel / "tx_queue_len").read_text())
+    except (OSError, ValueError):
+        return 0
 
 
 def kernel_rate(address: CanAddress, rate: int, listen_only: bool) -> int | None:

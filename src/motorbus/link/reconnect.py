@@ -1,11 +1,10 @@
 """Reopen a port that was lost: an adapter that was unplugged, a server that ended.
 
 A name such as /dev/ttyUSB0 goes to the first adapter that is plugged in. So an adapter is recognised by its serial
-number; one without is looked for under its old name only, and must have the same vendor and product. A pseudo-terminal
-is found when the symbolic link to it was made again.
+number; one without must have the same name, vendor and product.
 
-No thread waits for the port: each use of the bus tries to reopen it, soon at first and then less often, and fails at
-once in between. The lock of the port is kept until another adapter has its name (decision record 0034).
+No thread waits for the port: each use of the bus tries to reopen it, and fails at once until the next try is due. The
+lock of the port is kept until another adapter has its name (decision record 0034).
 """
 
 from __future__ import annotations
@@ -25,8 +24,7 @@ from motorbus.link.lock import PortLock
 from motorbus.link.serial import list_ports
 from motorbus.link.url import open_link
 
-FIRST_RETRY: Final = 0.05  # s after the first failure; then twice as long each time
-LAST_RETRY: Final = 0.5  # s at most
+RETRY: Final = 0.1  # s between two tries
 CONNECT_TIME: Final = 0.1  # s for a host of the network: the caller has other work
 RETRY_ADVICE: Final = (
     "it is looked for again whenever something is asked for; nothing of before is sent again"
@@ -66,41 +64,21 @@ def find_adapter(name: str, device: str, wanted: Adapter | None, lister: Lister)
     Raises PortNotFound, or AnotherAdapter when another one has taken its place.
     """
     adapters = list_adapters(lister)
+    there = adapters.get(device)
+    if there == wanted and os.path.exists(device):
+        return device
     if wanted is not None and wanted.serial_number:
         for path, adapter in adapters.items():
             if adapter == wanted:
                 return path
-    there = adapters.get(device)
-    if there is not None and there != wanted:
-        raise AnotherAdapter(
-            f"{name} is gone, and there is another in its place: {there}",
-            expected=str(wanted or f"the port {device}"),
-            cause="another adapter was plugged in and got the name of the lost one",
-            advice="plug in the first one, or open the bus again with the right name",
-        )
-    if os.path.exists(device) and (wanted is None or there is not None):
-        return device
-    raise PortNotFound(f"{name}: {wanted or f'the port {device}'} is not there")
-
-
-def link_time(device: str) -> int:
-    """When the last symbolic link from this one to its terminal was made (ns)."""
-    while os.path.islink(target := os.path.join(os.path.dirname(device), os.readlink(device))):
-        device = target
-    return os.lstat(device).st_ctime_ns
-
-
-def find_terminal(name: str, device: str, before: int) -> str:
-    """The address `name` of a pseudo-terminal to which the symbolic link `device` leads, made again since `before`.
-
-    An old link of a killed simulator may lead to a terminal of another program. Raises PortNotFound.
-    """
-    real = os.path.realpath(device)
-    if not (os.path.exists(real) and real.startswith(usb_adapters.PSEUDO_TERMINALS)):
-        raise PortNotFound(f"{device} leads to no pseudo-terminal")
-    if link_time(device) == before:
-        raise PortNotFound(f"{device} has not been made again")
-    return name
+    if there is None or there == wanted:
+        raise PortNotFound(f"{name}: {wanted or f'the port {device}'} is not there")
+    raise AnotherAdapter(
+        f"{name} is gone, and there is another in its place: {there}",
+        expected=str(wanted or f"the port {device}"),
+        cause="another adapter was plugged in and got the name of the lost one",
+        advice="plug in the first one, or open the bus again with the right name",
+    )
 
 
 class Reconnecting:
@@ -113,6 +91,7 @@ class Reconnecting:
 
     virtual = False
     simulated = False
+    now = staticmethod(time.monotonic)
 
     def __init__(self, link: Any, find: Callable[[], str], settings: Mapping[str, Any]) -> None:
         self.name: str = link.name
@@ -120,11 +99,9 @@ class Reconnecting:
         self.on_rename: Callable[[str], object] = str
         self._find = find
         self._settings = settings
-        self._first_rate: int = link.rate
         self._access = Lock()
         self._closed = False
         self._repaired = 0  # losses of the caller that are repaired
-        self._pause = 0.0
         self._retry_at = 0.0
         self._error: BaseException | None = None
         self._use(link)
@@ -135,36 +112,24 @@ class Reconnecting:
             self._lock: PortLock = link.lock
             link.lock = PortLock(link.lock.port)  # closing the link releases nothing
         link.name = self.name
-        self._link: Link = link
+        self._link = link
         self.listen_only = bool(getattr(link, "listen_only", False))
         self.rate: int = link.rate
         self.warnings: tuple[str, ...] = link.warnings
         self.latency: float = link.latency
         self.queue: int = getattr(link, "queue", 0)
-        self.now = link.now  # type: ignore[method-assign]
-        self.read = link.read  # type: ignore[method-assign]
-        self.write = link.write  # type: ignore[method-assign]
+        self.read: Callable[[float], list[Data]] = link.read
+        self.write: Callable[[Data], None] = link.write
+        self.fileno: Callable[[], int | None] = link.fileno
 
     @property
     def lock_name(self) -> str:
         """The name under which the port is locked; "" when it is not."""
         return self._lock.port if self._lock.held else ""
 
-    def now(self) -> float:
-        return time.monotonic()
-
-    def write(self, data: Data) -> None:
-        raise self._loss()
-
-    def read(self, until: float) -> list[Data]:
-        raise self._loss()
-
     def tune(self, rate: int, listen_only: bool = False) -> None:
         self._link.tune(rate, listen_only)
         self.rate, self.listen_only = self._link.rate, listen_only
-
-    def fileno(self) -> int | None:
-        return self._link.fileno()
 
     def trouble(self) -> str:
         """What the adapter has reported since the last call."""
@@ -187,30 +152,26 @@ class Reconnecting:
             if time.monotonic() < self._retry_at:
                 raise self._loss()
             self._link.close()
-            for method in ("read", "write"):  # ours raise the reason
-                self.__dict__.pop(method, None)
             before = self._lock
             try:
                 self._use(self._reopen())
             except (MotorbusError, OSError) as error:
                 self._error = error
-                self._pause = min(2 * self._pause or FIRST_RETRY, LAST_RETRY)
-                self._retry_at = time.monotonic() + self._pause
                 if isinstance(error, AnotherAdapter) and before.held:  # any program may open that one
                     before.release()
                     self.on_rename("")
                 raise self._loss() from error
+            finally:
+                self._retry_at = time.monotonic() + RETRY
             self._error = None
-            self._repaired, self._pause, self._retry_at = losses, 0.0, time.monotonic() + FIRST_RETRY
+            self._repaired = losses
             if self._lock is not before:
                 before.release()
                 self.on_rename(self.lock_name)
 
     def _reopen(self) -> Link:
-        """Open the port with its present rate and mode; a rate that was not given is not forced."""
-        settings = dict(self._settings)
-        if self.rate != self._first_rate:
-            settings["rate"] = self.rate
+        """Open the port with its present rate and mode."""
+        settings = {**self._settings, "rate": self.rate}
         if settings.get("kind") == "frames":
             settings["options"] = {**(settings.get("options") or {}), "listen_only": self.listen_only}
         lock = self._lock if self._lock.held else None
@@ -226,19 +187,16 @@ class Reconnecting:
 
     def rest(self, until: float) -> None:
         """See `Renewable.rest`."""
-        retry = max(self._retry_at, time.monotonic() + FIRST_RETRY / 10)
+        retry = max(self._retry_at, time.monotonic() + RETRY / 20)
         time.sleep(max(0.0, min(until, retry) - time.monotonic()))
 
     def _loss(self) -> LinkLost:
         """The error of the lost port, with the reason why it was not reopened."""
         error = self._error
-        found = lost(self.name, getattr(error, "summary", error) or "it went away")
-        if isinstance(error, LinkLost):
-            found.summary = error.summary
-        if isinstance(error, MotorbusError) and not isinstance(error, PortNotFound):
-            found.expected, found.cause, found.advice = error.expected, error.cause, error.advice
-        found.advice = f"{found.advice or 'check the other end'}; {RETRY_ADVICE}"
-        return found
+        if not isinstance(error, LinkLost):
+            error = lost(self.name, getattr(error, "summary", error) or "it went away")
+        advice = f"{error.advice}; {RETRY_ADVICE}"
+        return LinkLost(error.summary, expected=error.expected, cause=error.cause, advice=advice)
 
 
 def reconnecting(link: Link, *, lister: Lister = list_ports, **settings: Any) -> Link:
@@ -253,11 +211,8 @@ def reconnecting(link: Link, *, lister: Lister = list_ports, **settings: Any) ->
     is_terminal = real.startswith(usb_adapters.PSEUDO_TERMINALS)
     if lock is None or not lock.held or (is_terminal and not os.path.islink(device)):
         return link
-    if not device:
+    if not device or is_terminal:
         return Reconnecting(link, lambda: name, settings)
-    if is_terminal:
-        before = link_time(device)
-        return Reconnecting(link, lambda: find_terminal(name, device, before), settings)
     known = list_adapters(lister).get(real)
     port_at: Callable[[str], str] = getattr(link, "port_at", str)
     return Reconnecting(link, lambda: port_at(find_adapter(name, real, known, lister)), settings)

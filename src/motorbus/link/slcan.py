@@ -9,21 +9,29 @@ from __future__ import annotations
 import contextlib
 import re
 import time
-from collections.abc import Mapping
 from typing import Final
 
 from motorbus.core import units
 from motorbus.core.can_frame import REMOTE_FLAG, CanFrame
 from motorbus.core.request import Data
 from motorbus.errors import LinkError, RequestError
+from motorbus.link.can import CanLink
 from motorbus.link.errors import full
 from motorbus.link.lock import PortLock
 from motorbus.link.serial import open_stream
 
-RATES: Final = (10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 0, 1_000_000)
-"""bit/s of the commands S0 to S8. S7 is not used: 800 kbit/s in the LAWICEL manual, 750 kbit/s in python-can."""
-RATE_ADVICE: Final = "S7 means 800 or 750 kbit/s, so it is not used; bitrate=800000,btr=0016 is 800 kbit/s"
-CLOCK: Final = 8_000_000  # Hz of BTR0 and BTR1 (SJA1000 at 16 MHz)
+RATES: Final = {
+    10_000: b"S0",
+    20_000: b"S1",
+    50_000: b"S2",
+    100_000: b"S3",
+    125_000: b"S4",
+    250_000: b"S5",
+    500_000: b"S6",
+    800_000: b"s0016",  # S7 is 800 kbit/s in the LAWICEL manual and 750 kbit/s in python-can; this sets BTR0, BTR1
+    1_000_000: b"S8",
+}
+"""Command of each rate in bit/s."""
 STAMP: Final = 4  # hexadecimal digits of the timestamp that an adapter may append
 LONGEST: Final = 512  # bytes kept of a line without end; the longest line has fewer than 60
 FIRST_REPLY: Final = 0.05  # s and the latency of the port, in which an adapter that replies does so
@@ -32,7 +40,6 @@ SILENT_PAUSE: Final = 0.003  # s of silence after which no more replies to an ea
 MOST_READS: Final = 64  # of data that is dropped, in a row
 LINE_BITS: Final = 220  # on the serial line, of a line with an 11-bit identifier and 8 bytes
 DEFAULT_BAUD: Final = 115_200
-OPTIONS: Final = ("btr", "tty_baudrate")
 CANCEL: Final = b"?\r"  # makes an unfinished line invalid
 
 _LINE: Final = re.compile(rb"([^\r\a]*)([\r\a])")
@@ -92,22 +99,14 @@ class SlcanCodec:
 
     def _decode(self, line: re.Match[bytes]) -> CanFrame | None:
         """The frame of a line; None for a reply or a damaged line."""
-        text, end = line[1].strip(b"\n"), line[2]
-        if end == b"\a":
-            self.refused += 1
-            self.damaged += bool(text)
-            self._keep_reply(False)
-        elif match := _FRAME.fullmatch(text):
+        text, refused = line[1].strip(b"\n"), line[2] == b"\a"
+        if not refused and (match := _FRAME.fullmatch(text)):
             return self._decode_frame(match)
-        elif _REPLY.fullmatch(text):
-            self._keep_reply(True)
-        elif text[:1] not in _CAN_FD:
-            self.damaged += 1
+        if refused or _REPLY.fullmatch(text):
+            self.reply = not refused if self.reply is None else self.reply
+        self.refused += refused
+        self.damaged += not _REPLY.fullmatch(text) and text[:1] not in _CAN_FD
         return None
-
-    def _keep_reply(self, accepted: bool) -> None:
-        if self.reply is None:
-            self.reply = accepted
 
     def _decode_frame(self, line: re.Match[bytes]) -> CanFrame | None:
         standard, short, extended, long, count, digits = line.groups()
@@ -128,53 +127,45 @@ class SlcanCodec:
         return CanFrame(identifier, bytes.fromhex(digits[: 2 * size].decode()), extended is not None)
 
 
-class SlcanChannel:
-    """An slcan adapter on its port; `configure` opens its channel. Errors as for `open_stream`.
+class SlcanLink(CanLink):
+    """An slcan adapter. Errors as for `open_stream`; RequestError too for a rate of its serial line that is none.
 
-    `channel` is a port, with `@` and the rate of its serial line (bit/s). `options`: `tty_baudrate`, that rate; `btr`,
-    BTR0 and BTR1 as four hexadecimal digits. An adapter whose replies come later than `FIRST_REPLY` is used as one
-    without replies: what it refuses is not noticed.
+    The channel of its address is a port, with `@` and the rate of its serial line (bit/s). An adapter whose replies
+    come later than `FIRST_REPLY` is used as one without replies: what it refuses is not noticed.
     """
 
-    def __init__(
-        self, name: str, channel: str, options: Mapping[str, object], connect_time: float | None
-    ) -> None:
-        self.name = name
-        for option in options:
-            if option not in OPTIONS:
-                raise RequestError(
-                    f"{name}: slcan has no option {option!r}", expected=f"one of {', '.join(OPTIONS)}"
-                )
-        self._timing = read_timing(name, options["btr"]) if "btr" in options else b""
-        port, _, baud = channel.partition("@")
-        rate = _read_baud(name, baud or options.get("tty_baudrate", DEFAULT_BAUD))
-        self._link = link = open_stream(
-            port,
-            rate=rate,
-            lock=PortLock(port),  # the caller has locked it
-            connect_time=connect_time,
-        )
-        self.latency = link.latency
-        self.warnings = link.warnings
-        self._first_reply = FIRST_REPLY + link.latency
-        if link.paced:  # one line each way on the serial line; adapters with their own USB are faster
-            self.latency += 2 * LINE_BITS / rate
+    _reported = 0, 0
+    _unfinished = False
+    """A line was sent in part. It must not become a frame later, so `CANCEL` is sent after it."""
+
+    def open_port(self) -> None:
+        if self.options:
+            name = next(iter(self.options))
+            raise RequestError(f"{self.name}: slcan has no option {name!r}", expected="listen_only")
         self._codec = SlcanCodec()
-        self._reported = 0, 0
-        self._unfinished = False
-        """A line was sent in part. It must not become a frame later, so `CANCEL` is sent after it."""
+        port, _, text = self.address.channel.partition("@")
+        baud = _read_baud(self.name, text or DEFAULT_BAUD)
+        lock = PortLock(port)  # not acquired: this link has locked the port
+        self._stream = stream = open_stream(port, rate=baud, lock=lock, connect_time=self.connect_time)
+        self.latency, self.warnings, self.fileno = stream.latency, stream.warnings, stream.fileno
+        if stream.paced:  # one line each way on the serial line; adapters with their own USB are faster
+            self.latency += 2 * LINE_BITS / baud
 
     def configure(self, rate: int, listen_only: bool) -> None:
-        """Open the channel again, at this rate in bit/s. Raises LinkError for a rate or mode that it refuses."""
-        command = self._rate_command(rate)
-        replies = self._command(b"C", self._first_reply) is not None  # BEL: it is closed already
+        if rate not in RATES:
+            raise LinkError(
+                f"{self.name}: slcan has no bit rate of {rate} bit/s",
+                expected=f"one of {', '.join(str(one) for one in RATES)} bit/s",
+            )
+        first_reply = FIRST_REPLY + self._stream.latency
+        replies = self._command(b"C", first_reply) is not None  # BEL: it is closed already
         for _ in range(MOST_READS):  # frames of the old rate, and replies to a program that was killed
-            if not self._link.read(time.monotonic() + SILENT_PAUSE):
+            if not self._stream.read(time.monotonic() + SILENT_PAUSE):
                 break
-        timeout = REPLY_TIME if replies else self._first_reply
+        timeout = REPLY_TIME if replies else first_reply
         refusal = ""
-        if self._command(command, timeout) is False:
-            refusal = f"refuses {rate} bit/s ({command.decode()})"
+        if self._command(RATES[rate], timeout) is False:
+            refusal = f"refuses {rate} bit/s ({RATES[rate].decode()})"
         elif self._command(b"L" if listen_only else b"O", timeout) is False:
             refusal = "cannot only listen" if listen_only else "refuses to open its channel"
         if refusal:
@@ -186,64 +177,42 @@ class SlcanChannel:
             )
         self.trouble()  # a refused C is none
 
-    def _rate_command(self, rate: int) -> bytes:
-        if self._timing:
-            made = rate_of_timing(*self._timing)
-            if made != rate:
-                raise LinkError(
-                    f"{self.name}: btr={self._timing.hex()} makes {made} bit/s, not {rate}",
-                    advice=f"write bitrate={made}, or leave btr out",
-                )
-            return b"s" + self._timing.hex().upper().encode()
-        if rate and rate in RATES:
-            return b"S%d" % RATES.index(rate)
-        raise LinkError(
-            f"{self.name}: slcan has no bit rate of {rate} bit/s",
-            expected=f"one of {', '.join(str(one) for one in RATES if one)} bit/s",
-            advice=RATE_ADVICE,
-        )
-
     def _command(self, command: bytes, timeout: float) -> bool | None:
         """Send a command; whether the adapter accepts it, or None when it does not reply in time (s)."""
         codec = self._codec
         codec.forget()
-        self._send(command + b"\r")
+        self._send_line(command + b"\r")
         end = time.monotonic() + timeout
         while codec.reply is None and time.monotonic() < end:
             self._receive(end)
         return codec.reply
 
-    def _receive(self, until: float) -> list[CanFrame]:
-        frames = []
-        for data in self._link.read(until):
+    def _receive(self, until: float) -> list[Data]:
+        frames: list[Data] = []
+        for data in self._stream.read(until):
             assert isinstance(data, bytes)
             frames += self._codec.feed(data)
         return frames
 
     def read(self, until: float) -> list[Data]:
-        """See `Link.read`."""
-        frames: list[Data] = []
-        while not frames:
-            frames += self._receive(until)
-            if time.monotonic() >= until:
-                break
+        frames = self._receive(until)
+        while not frames and time.monotonic() < until:
+            frames = self._receive(until)
         return frames
 
-    def write(self, frame: CanFrame) -> None:
-        """See `Link.write`."""
-        self._send(self._codec.encode(frame))
+    def send(self, frame: CanFrame) -> None:
+        self._send_line(self._codec.encode(frame))
 
-    def _send(self, text: bytes) -> None:
+    def _send_line(self, text: bytes) -> None:
         """Send a whole line. Raises LinkLost, or LinkFull: a line that was sent in part is no frame."""
-        if self._unfinished and self._link.send(CANCEL) == len(CANCEL):
+        if self._unfinished and self._stream.send(CANCEL) == len(CANCEL):
             self._unfinished = False
-        written = 0 if self._unfinished else self._link.send(text)
+        written = 0 if self._unfinished else self._stream.send(text)
         if written != len(text):
             self._unfinished = self._unfinished or written > 0
             raise full(self.name, 0, len(text))
 
     def trouble(self) -> str:
-        """What the adapter has reported since the last call; "" for nothing."""
         refused, damaged = self._codec.refused, self._codec.damaged
         before, self._reported = self._reported, (refused, damaged)
         if refused > before[0]:
@@ -255,27 +224,11 @@ class SlcanChannel:
             return f"{damaged - before[1]} lines of the adapter were damaged: its cable, or another program on its port"
         return ""
 
-    def fileno(self) -> int | None:
-        """See `Link.fileno`."""
-        return self._link.fileno()
-
-    def close(self) -> None:
+    def shut(self) -> None:
         """Close the channel of the adapter, and the port."""
         with contextlib.suppress(LinkError):
-            self._send(b"C\r")
-        self._link.close()
-
-
-def read_timing(name: str, text: object) -> bytes:
-    """BTR0 and BTR1 of the option `btr`. Raises RequestError."""
-    if re.fullmatch(r"[0-9A-Fa-f]{4}", str(text)) is None:
-        raise RequestError(f"{name}: btr={text}: not four hexadecimal digits", expected="as btr=0016")
-    return bytes.fromhex(str(text))
-
-
-def rate_of_timing(btr0: int, btr1: int) -> int:
-    """Bit rate (bit/s) that these registers of an SJA1000 make."""
-    return round(CLOCK / ((btr0 & 0x3F) + 1) / (3 + (btr1 & 0x0F) + (btr1 >> 4 & 0x07)))
+            self._send_line(b"C\r")
+        self._stream.close()
 
 
 def _read_baud(name: str, text: object) -> int:
@@ -286,5 +239,5 @@ def _read_baud(name: str, text: object) -> int:
         raise RequestError(
             f"{name}: {text} is not a rate of the serial line in bit/s",
             expected=refusal.expected,
-            advice="write can://slcan/dev/ttyACM0@1000000, or tty_baudrate=1000000",
+            advice="write can://slcan/dev/ttyACM0@1000000",
         ) from None

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from motorbus.errors import RequestError
 from motorbus.link.base import Link
 from motorbus.link.lock import PortLock
+
+if TYPE_CHECKING:
+    from motorbus.link.can import PythonCanLink
+    from motorbus.link.slcan import SlcanLink
 
 SERIAL_PORTS = "a device such as /dev/ttyACM0 or COM7, socket://HOST:PORT or rfc2217://HOST:PORT"
 CAN_CHANNELS = "can://INTERFACE/CHANNEL, as can://slcan/dev/ttyACM0 or can://socketcan/can0"
@@ -47,9 +51,7 @@ def open_link(
     if not port.strip() or "\0" in port:
         raise RequestError(f"{port!r} is not a port", expected=expected)
     if scheme == "can":
-        from motorbus.link.can import CanLink
-
-        return CanLink(
+        return open_can(
             port, rate=rate, default_rate=default_rate, options=options, lock=lock, connect_time=connect_time
         )
     rate = rate or default_rate
@@ -61,3 +63,12 @@ def open_link(
     given: Mapping[str, Any] = options or {}
     link.latency = given.get("latency", link.latency)
     return link
+
+
+def open_can(port: str, **settings: Any) -> PythonCanLink | SlcanLink:
+    """Open a CAN channel; `settings` and errors are those of `CanLink`."""
+    from motorbus.link.can import PythonCanLink, read_address
+    from motorbus.link.slcan import SlcanLink
+
+    address = read_address(port)
+    return (SlcanLink if address.interface == "slcan" else PythonCanLink)(address, **settings)

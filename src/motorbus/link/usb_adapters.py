@@ -14,27 +14,11 @@ PSEUDO_TERMINALS = ("/dev/pts/", "/dev/ttys")
 FAST_TIMER = 1  # ms; the lowest FTDI latency timer
 
 ADAPTERS: Final[Mapping[tuple[int | None, int | None], str]] = {
-    # WCH driver ch343ser_linux
-    (0x1A86, 0x55D3): "CH343: usual on FEETECH and Waveshare servo boards",
-    (0x1A86, 0x55D2): "CH342: two ports in one",
-    (0x1A86, 0x55D4): "CH9102: usual on ESP32 boards with a serial bus",
-    # Linux drivers/usb/serial/ch341.c
-    (0x1A86, 0x7523): "CH340: usual on FEETECH URT boards and RS-485 sticks",
-    (0x1A86, 0x7522): "CH340K",
-    (0x1A86, 0x5523): "CH341",
-    # Linux drivers/usb/serial/ftdi_sio_ids.h
-    (0x0403, 0x6001): "FT232R: usual in USB-RS485 cables; check its latency timer",
-    (0x0403, 0x6010): "FT2232: two ports in one; check its latency timer",
-    (0x0403, 0x6011): "FT4232H: four ports in one; check its latency timer",
-    (0x0403, 0x6014): "FT232H: usual in ROBOTIS U2D2; check its latency timer",
-    (0x0403, 0x6015): "FT230X: check its latency timer",
-    # Linux drivers/usb/serial/cp210x.c and pl2303.h
-    (0x10C4, 0xEA60): "CP210x: usual on ESP32 boards",
-    (0x067B, 0x2303): "PL2303",
-    # craigm26/OpenCastor#527; Raspberry Pi Pico SDK, usb_pid; Espressif USB Serial/JTAG, ESP-IDF
-    (0x0483, 0x5740): "STM32: usual on controller boards with own USB",
-    (0x2E8A, 0x000A): "RP2040: a board that passes bytes on",
-    (0x303A, 0x1001): "ESP32: its own USB port",
+    (0x1A86, 0x55D3): "CH343: usual on FEETECH and Waveshare servo boards",  # WCH driver ch343ser_linux
+    (0x1A86, 0x7523): "CH340: usual on FEETECH URT boards and RS-485 sticks",  # Linux ch341.c
+    (0x0403, 0x6001): "FT232R: usual in USB-RS485 cables; check its latency timer",  # Linux ftdi_sio_ids.h
+    (0x10C4, 0xEA60): "CP210x: usual on ESP32 boards",  # Linux cp210x.c
+    (0x0483, 0x5740): "STM32: usual on controller boards with own USB",  # craigm26/OpenCastor#527
 }
 """What an adapter probably is, by vendor and product."""
 

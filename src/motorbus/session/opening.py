@@ -162,6 +162,6 @@ def lock_name(address: str, options: Mapping[str, object]) -> str:
     opening = prepare(address, dict(options))
     if not opening.port.startswith(ADAPTER):
         return opening.port
-    from motorbus.link.can import describe
+    from motorbus.link.can import read_address
 
-    return describe(opening.port).lock_name
+    return read_address(opening.port).lock_name

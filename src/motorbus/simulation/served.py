@@ -67,9 +67,9 @@ def join(port: str, rate: int = 0, default_rate: int = 0, **options: object) -> 
     """
     if not port.startswith(_CAN):
         raise RequestError(f"{port!r} is no CAN channel", expected="can://INTERFACE/CHANNEL")
-    from motorbus.link.can import CanLink
+    from motorbus.link.url import open_can
 
-    return LinkClient(CanLink(port, rate=rate, default_rate=default_rate, options=options, shared=True))
+    return LinkClient(open_can(port, rate=rate, default_rate=default_rate, options=options, shared=True))
 
 
 def check_harmless(port: str) -> None:

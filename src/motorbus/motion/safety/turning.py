@@ -56,7 +56,7 @@ class Resting:
     def __init__(self, axis: AxisVerbs) -> None:
         gate: Any = axis.bus.interlock
         self._node = axis.spec.node
-        self._lock = axis.bus.lock
+        self._lock = axis.bus.turn
         self._turning: Turning | None = getattr(gate, "turning", None)
         self._since = None if self._turning is None else self._turning.last(self._node)
 
