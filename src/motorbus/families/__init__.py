@@ -9,7 +9,6 @@ from __future__ import annotations
 import sys
 from functools import cache
 from importlib import import_module
-from os import environ
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING
 
@@ -45,8 +44,7 @@ def load(name: str) -> Family:
 
 
 def _inside() -> set[str]:
-    found = {module.name for module in iter_modules(__path__) if module.ispkg}
-    return {name for name in found if not name.endswith("_new")}  # until the switch
+    return {module.name for module in iter_modules(__path__) if module.ispkg}
 
 
 @cache
@@ -55,7 +53,3 @@ def _outside(path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
     from importlib.metadata import entry_points  # 20 ms that a built-in family need not pay
 
     return tuple(entry_points(group=GROUP))
-
-
-for _name in environ.get("MOTORBUS_NEW_FAMILIES", "").split():  # until the switch
-    sys.modules[f"{__name__}.{_name}"] = import_module(f"{__name__}.{_name}_new")
