@@ -9,7 +9,6 @@ import socket
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -64,9 +63,10 @@ class Unplugging(PerfectLine):
 @pytest.mark.parametrize("lost", [1, 2, 3])
 @pytest.mark.parametrize("family", ["feetech", "kst"])
 def test_one_that_is_lost_ends_the_move_of_all_within_a_second(family: str, lost: int, run: Run) -> None:
-    options: dict[str, Any] = {"speed": 0.5} if family == "kst" else {}
     bounds = [] if family == "kst" else ["--velocity", "0.5"]
-    with motorbus.simulate(family, ids="1-3", **options) as sim:
+    with motorbus.simulate(family, ids="1-3") as sim:
+        for node in (1, 2, 3) if family == "kst" else ():
+            sim[node].speed = 0.5
         start = run("read", f"{sim.url}#1", "--json").document["position"]
         sim.line, begun = Unplugging(sim, lost), sim.now
         ran = run("move", f"{sim.url}#1+2+3={start + 0.7}", *bounds)

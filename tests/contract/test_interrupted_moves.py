@@ -29,9 +29,18 @@ KINDS = [
     Kind("feetech", {"model": "sts3215"}, -1.0, {"velocity": 0.6}),
     Kind("feetech", {"model": "hls3925"}, -1.0, {"velocity": 0.6}),
     Kind("feetech", {"model": "scs0009"}, -1.0, {"velocity": 0.6}),
-    Kind("kst", {"speed": 0.5}, 0.7, {}),
+    Kind("kst", {}, 0.7, {}),
 ]
 EVERY = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.options.get("model", kind.family))
+
+
+def simulated(kind: Kind) -> Simulation:
+    """This device; the speed of a KST servo is no option."""
+    sim = motorbus.simulate(kind.family, **kind.options)
+    if kind.family == "kst":
+        for node in sim.simulator.nodes:
+            sim[node].speed = 0.5
+    return sim
 
 
 class Line(PerfectLine):
@@ -61,7 +70,7 @@ def device(bus: Any, kind: Kind, awaited: bool = False) -> Any:
 @contextmanager
 def opened(kind: Kind) -> Iterator[tuple[Simulation, Any, float]]:
     """The simulation, its device on an open bus with torque on where it has a switch, and its goal."""
-    with motorbus.simulate(kind.family, **kind.options) as sim, motorbus.open(sim.url) as bus:
+    with simulated(kind) as sim, motorbus.open(sim.url) as bus:
         servo = device(bus, kind)
         if hasattr(servo, "enable_torque"):
             servo.enable_torque()
@@ -136,7 +145,7 @@ def test_what_ends_a_task_stops_its_move_and_a_closed_coroutine_sends_nothing(ki
         raise AssertionError("it was not ended")
 
     async def main() -> None:
-        with motorbus.simulate(kind.family, **kind.options) as sim:
+        with simulated(kind) as sim:
             async with motorbus.open_async(sim.url) as bus:
                 servo = device(bus, kind, awaited=True)
                 goal = await servo.position() + kind.way
@@ -168,7 +177,7 @@ def test_without_waiting_it_goes_on(kind: Kind) -> None:
 @pytest.mark.parametrize("wait", [True, False])
 def test_a_newer_move_survives_the_end_of_the_older(kind: Kind, wait: bool) -> None:
     async def main() -> None:
-        with motorbus.simulate(kind.family, **kind.options) as sim:
+        with simulated(kind) as sim:
             async with motorbus.open_async(sim.url) as bus:
                 servo = device(bus, kind, awaited=True)
                 start = await servo.position()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Final, Generic, TypeVar
 
@@ -11,7 +11,7 @@ from motorbus.core.family import State
 from motorbus.core.interrupted import Device, Moving, stopped_if_interrupted
 from motorbus.core.register import is_number, shown
 from motorbus.core.setpoint import Setpoint
-from motorbus.core.steps import Runnable, Sleep, catch, gather
+from motorbus.core.steps import Runnable, Sleep, gather
 from motorbus.errors import MotionError, MotorbusError, RequestError, Stalled
 
 PERIOD: Final = 0.02  # s between two samples; one axis that is waited for takes a tenth of a bus at most
@@ -61,6 +61,10 @@ class MoveLogic(Generic[D]):
         )
 
 
+async def _await(runnable: Runnable[object]) -> None:
+    await runnable
+
+
 async def move(
     logic: MoveLogic[D],
     goals: Mapping[D, float],
@@ -68,13 +72,16 @@ async def move(
     wait: bool = True,
     tolerance: float | None = None,
     timeout: float | None = None,
+    around: Callable[[Runnable[object]], Runnable[object]] = _await,
 ) -> None:
     """Move devices to these goals (rad); return when all are in position, or at once with `wait=False`.
 
     All goals are checked before the first is sent. In position: within `tolerance` rad and not moving; a device that
-    does not report whether it moves is in position after two such samples in a row. An interrupt of the wait stops all;
-    so does one of several devices that does not take its goal. Raises LimitExceeded; Stalled when a position has not
-    changed for 0.5 s; MotionError after `timeout` s (None: from the distance).
+    does not report whether it moves is in position after two such samples in a row. An interrupt of the wait stops
+    all. `around` wraps what is awaited for each device; it may raise an interrupt for an error.
+
+    Raises LimitExceeded; Stalled when a position has not changed for 0.5 s; MotionError after `timeout` s (None: from
+    the distance).
     """
     for name, value, unit in (("tolerance", tolerance, "rad"), ("timeout", timeout, "s")):
         if value is not None and not (is_number(value) and value > 0):
@@ -85,17 +92,12 @@ async def move(
     arrive = partial(wait_in_position, logic, tolerance=tolerance or logic.tolerance, timeout=timeout)
 
     async def send() -> None:
-        try:
-            for device, goal in checked:
-                await logic.send(device, goal)
-        except MotorbusError:
-            if len(checked) > 1:
-                await gather(*[catch(logic.stop(device)) for device, _ in checked])
-            raise
+        for device, goal in checked:
+            await around(logic.send(device, goal))
 
     async def send_and_wait() -> None:
         await send()
-        await gather(*[arrive(device, goal.value) for device, goal in checked])
+        await gather(*[around(arrive(device, goal.value)) for device, goal in checked])
 
     if wait:
         moving = [

@@ -8,12 +8,9 @@ from math import radians
 import pytest
 
 from motorbus.core.family import Identity
-from motorbus.core.move import move
 from motorbus.core.request import Notification
-from motorbus.errors import DeviceError, LimitExceeded, MotionError, OutcomeUnknown, Stalled
+from motorbus.errors import DeviceError, LimitExceeded, MotionError, Stalled
 from motorbus.families.kst import FAMILY, Promise
-from motorbus.families.kst.driver.motion import MOVE
-from motorbus.families.kst.driver.node import Node
 from motorbus.families.kst.notifications import LOW_VOLTAGE
 from motorbus.link.base import PerfectLine
 from tests.families.kst.bench import Answers, Bench, abort
@@ -124,13 +121,3 @@ def test_health_is_one_read_and_counts_boot_messages(profile: str, request_: str
                 bench.bus.run(health(servo))
         bench.link.line = PerfectLine()
         assert bench.bus.run(health(servo)).restarts == 1
-
-
-def test_one_servo_that_takes_no_target_stops_the_others() -> None:
-    with Bench(5, 6) as bench:
-        bench[6].raw_position = 100
-        bench[5].unplug()
-        goals: dict[Node, float] = {bench.servo(6): -0.5, bench.servo(5): 0.5}
-        with pytest.raises(OutcomeUnknown):
-            bench.bus.run(move(MOVE, goals))
-        assert -286 < bench[6].memory["goal_position"] < 100

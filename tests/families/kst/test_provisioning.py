@@ -104,9 +104,9 @@ def test_id_written_before_is_not_saved_by_mistake() -> None:
 @pytest.mark.parametrize(
     ("ids", "restarts", "error", "text"),
     [
-        ((5, 9), False, OutcomeUnknown, "which of them is the servo"),
+        ((5, 9), False, OutcomeUnknown, "did not come back"),
         ((5, 9), True, VerificationFailed, r"two servos answer as 0x09 \(9\)"),
-        ((5, 5), True, OutcomeUnknown, "which of them is the servo"),
+        ((5, 5), True, OutcomeUnknown, "did not come back"),
     ],
 )
 def test_servo_that_joins_during_the_restart_is_not_mistaken(

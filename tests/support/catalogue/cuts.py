@@ -272,4 +272,9 @@ def known_faults() -> Iterator[tuple[Command, str]]:
             yield replace(command, restart=0), NOT_COMPLETED[command.subject.name]
         if command.call.method == "set_multi_turn":
             yield replace(command, quirks=ERASED), TORN
-    yield kst("kst-ext", "set_mid_point", ids=(OLD, OTHER), quirks={"position": 100}), NO_EFFECT
+    yield kst("kst-ext", "set_mid_point", ids=(OLD, OTHER), prepare=turned), NO_EFFECT
+
+
+def turned(device: Any) -> None:
+    """The shaft stands elsewhere than at 0."""
+    device.raw_position = 100

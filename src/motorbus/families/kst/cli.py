@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final, Literal
 
 from cyclopts import App, Group, Parameter
 
-from motorbus.cli import quantity
+from motorbus.cli import quantity, several
 from motorbus.cli.device_command import DeviceCommand, device_command
 from motorbus.cli.exits import Exit
 from motorbus.core import units
@@ -111,6 +111,6 @@ def ping_everyone(bus: Any) -> list[int]:
 
 
 def move_together(bus: Any, goals: Mapping[int, float], *, wait: bool = True) -> None:
-    """For `motorbus move` with several servos: targets in rad by id, see `core.move`."""
+    """For `motorbus move` with several servos: targets in rad by id; one that does not answer stops all."""
     servos: dict[Node, float] = {Servo(bus, node): to for node, to in goals.items()}
-    bus.run(move(MOVE, servos, wait=wait))
+    several.carried_out(bus, move(MOVE, servos, wait=wait, around=several.or_all_stop))

@@ -69,11 +69,13 @@ class KstDriver:
         nmt: str = "profile",
     ) -> None:
         self.family = family
+        made = PROFILES[choice("profile", profile, PROFILES)]
+        form = choice("nmt", nmt, NMT)
         self.settings = BusSettings(
-            profile=PROFILES[choice("profile", profile, PROFILES)],
+            profile=made,
             extended=choice("id_format", id_format, ID_FORMATS) == "ext",
             sized=choice("sized", sized, SIZED) == "yes",
-            form=choice("nmt", nmt, NMT),
+            nmt=made.nmt if form == "profile" else form,
         )
 
     def air_time(self, request: Request[Any], rate: int) -> float:

@@ -27,20 +27,15 @@ class BusSettings:
     `profile`   scale, range, objects and start rule of the maker
     `extended`  29-bit identifiers (id_format=ext); else 11-bit
     `sized`     writes state their length (CiA 301); else specifier 0x22, as in the manual
-    `form`      of start and stop, one of `NMT`
+    `nmt`       form of start and stop: "none", "vendor" or "standard"
     `state`     what the open bus has received
     """
 
     profile: Profile = PROFILES["kst"]
     extended: bool = False
     sized: bool = False
-    form: str = "profile"
+    nmt: str = "none"
     state: BusState = field(default_factory=BusState)
-
-    @property
-    def nmt(self) -> str:
-        """The form of start and stop: "none", "vendor" or "standard"."""
-        return self.profile.nmt if self.form == "profile" else self.form
 
     @property
     def must_start(self) -> bool:

@@ -9,13 +9,13 @@ to 4.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Final, NamedTuple, TypeVar
+from typing import Final, NamedTuple
 
 from motorbus.core.family import IdChanged
 from motorbus.core.register import is_number, shown
 from motorbus.core.request import Priority, Request
 from motorbus.core.scan import BitrateRestored
-from motorbus.core.steps import Emit, Exclusive, Progress, Runnable, SetBitrate, Sleep
+from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate, Sleep
 from motorbus.errors import NoReply, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.kst.driver.broadcast import broadcast_ping
 from motorbus.families.kst.driver.identity import (
@@ -28,8 +28,6 @@ from motorbus.families.kst.driver.identity import (
 from motorbus.families.kst.driver.node import Node, checked_id, hexadecimal
 from motorbus.families.kst.driver.requests import ask_presence, save, write_row
 from motorbus.families.kst.profiles import bit_rate_code
-
-T = TypeVar("T")
 
 TIMEOUT: Final = 120.0  # s to wait for the power cycle
 PERIOD: Final = 0.1  # s between two reads while waiting
@@ -80,7 +78,7 @@ async def provision(
 
     Raises RequestError (nothing is written) for an invalid id or rate, an id in use, two servos with one id, or a new
     rate while other servos are on the bus; NoReply; VerificationFailed when it comes back beside another servo with its
-    new id; OutcomeUnknown when it does not come back in time, or a servo answers to both ids.
+    new id; OutcomeUnknown when it does not come back in time, or a servo still answers as before.
     """
     if new_id is None and new_rate is None:
         raise RequestError("nothing to provision", expected="new_id=, new_rate=, or both")
@@ -96,27 +94,32 @@ async def provision(
     await Emit(Progress(0, STEPS, "looking for the servo"))
     found = await Exclusive(_find((node, new), (rate, goal.rate)))
     if found != goal:
-        await Exclusive(_at(found.rate, _write(found, goal)))
+        await Exclusive(_write(found, goal))
         await Emit(PowerCycleNeeded(node.node, new.node, goal.rate))
         await _wait(found, goal, timeout)
     await Emit(Progress(STEPS - 1, STEPS, "it is back: verifying"))
-    firmware = await Exclusive(_at(goal.rate, _verify(found, goal)))
+    firmware = await Exclusive(_verify(goal))
     await Emit(Progress(STEPS, STEPS, "verified after the restart"))
     return Provisioned(new.node, goal.rate, firmware, resumed=found == goal)
 
 
-async def _at(rate: int, runnable: Runnable[T]) -> T:
-    """Run this at another rate (bit/s) of the bus. Reserve the bus."""
-    async with BitrateRestored():
-        await SetBitrate(rate)
-        return await runnable
+class _AtRate(BitrateRestored):
+    """The bus has this rate (bit/s) in the block. Reserve the bus."""
+
+    def __init__(self, rate: int) -> None:
+        self._rate = rate
+
+    async def enter(self) -> None:
+        await super().enter()
+        await SetBitrate(self._rate)
 
 
 async def _find(nodes: Iterable[Node], rates: Iterable[int]) -> Place:
     """The id and rate, of the old and the new ones, at which the servo answers now."""
     nodes, rates = dict.fromkeys(nodes), dict.fromkeys(rates)
     for rate in rates:
-        found = [node for node in nodes if await _at(rate, answers_alone(node))]
+        async with _AtRate(rate):
+            found = [node for node in nodes if await answers_alone(node)]
         if len(found) == 2:
             raise id_taken(*found)
         if found:
@@ -134,15 +137,16 @@ async def _find(nodes: Iterable[Node], rates: Iterable[int]) -> Place:
 async def _write(found: Place, goal: Place) -> None:
     """Write what is missing, read it back, save."""
     node, new = found.node, goal.node.node
-    if found.rate != goal.rate:
-        await _check_no_other(found, goal)
-    await Emit(Progress(1, STEPS, f"writing to {hexadecimal(node.node)}"))
-    if node.node != new or await read_id(node) not in (None, new):
-        await write_node_id(node, new)
-    if found.rate != goal.rate:
-        await set_bit_rate(node, goal.rate)
-    await Emit(Progress(2, STEPS, "saving"))
-    await save(node)
+    async with _AtRate(found.rate):
+        if found.rate != goal.rate:
+            await _check_no_other(found, goal)
+        await Emit(Progress(1, STEPS, f"writing to {hexadecimal(node.node)}"))
+        if node.node != new or await read_id(node) not in (None, new):
+            await write_node_id(node, new)
+        if found.rate != goal.rate:
+            await set_bit_rate(node, goal.rate)
+        await Emit(Progress(2, STEPS, "saving"))
+        await save(node)
 
 
 async def _check_no_other(found: Place, goal: Place) -> None:
@@ -159,38 +163,40 @@ async def _check_no_other(found: Place, goal: Place) -> None:
 
 
 async def _wait(old: Place, goal: Place, timeout: float) -> None:
-    """Read at the new place until the servo answers there. Raises OutcomeUnknown after `timeout` s."""
+    """Read until the servo answers at the new place and not at the old one. Raises OutcomeUnknown after `timeout` s.
+
+    The new rate is tried only while the servo is silent at the old one.
+    """
     begun = await Sleep(0)  # the time
-    while not await Exclusive(_at(goal.rate, count_replies(goal.node))):
+    while await Exclusive(_answers(old)) or not await Exclusive(_answers(goal)):
         if await Sleep(PERIOD) - begun > timeout:
             raise OutcomeUnknown(
                 f"{hexadecimal(old.node.node)} was set to {hexadecimal(goal.node.node)} at {goal.rate} bit/s and "
                 f"saved; it did not come back within {timeout:g} s",
-                cause="its supply was not taken away and given back yet, or it went before the flash was written",
+                cause="its supply was not taken away and given back yet, it went before the flash was written, or "
+                "another servo answers as before",
                 advice="power-cycle it, then call provision again: it continues from the present state",
                 node=old.node.node,
             )
 
 
-async def _verify(old: Place, goal: Place) -> str:
-    """Check that one servo answers with the new id, and none with the old one. Returns its firmware version."""
+async def _answers(place: Place) -> bool:
+    async with _AtRate(place.rate):
+        return await count_replies(place.node) > 0
+
+
+async def _verify(goal: Place) -> str:
+    """Check that one servo answers with the new id, and reads it back. Returns its firmware version."""
     node, new = goal.node, goal.node.node
-    if old.node is not node and old.rate == goal.rate and await count_replies(old.node):
-        raise OutcomeUnknown(
-            f"{hexadecimal(new)} answers, and {hexadecimal(old.node.node)} does too: which of them is the servo that "
-            "was provisioned is not known",
-            cause="another servo has joined the bus meanwhile, or this one has not restarted",
-            advice="take one of them off the bus, then call provision again: it continues from the present state",
-            node=new,
-        )
-    if second := await second_servo(node):
+    async with _AtRate(goal.rate):
+        second, identity = await second_servo(node), await identify(node)
+    if second:
         raise VerificationFailed(
             f"two servos answer as {hexadecimal(new)} after the restart: {second}",
             cause="a servo that had this id already has joined the bus, or the bus is disturbed",
             advice="take one of them off the bus, then provision the other one to a free id",
             node=new,
         )
-    identity = await identify(node)
     found = identity.details["reads_back_id"]
     if found not in (None, new):
         raise VerificationFailed(

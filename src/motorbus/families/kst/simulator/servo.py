@@ -51,7 +51,7 @@ class Servo(PoweredDevice):
     `motion`       of the shaft, in raw counts
     `started`      a start was received
     `delay`        s added to its replies
-    `temperature`  (°C) and `load` (-1 to 1, a share of full torque) may be set
+    `temperature`  (°C), `load` (-1 to 1, a share of full torque) and `speed` (rad/s) may be set
     `extended`     the last request had a 29-bit identifier: the frames of the servo then have one as well
     """
 
@@ -67,7 +67,7 @@ class Servo(PoweredDevice):
         self.profile, self.quirks = profile, quirks
         self.delay = self.load = 0.0
         self._busy_until = self._saved_at = -inf
-        self.temperature = 25.0
+        self.temperature, self.speed = 25.0, SPEED
         self.extended = quirks.id_format == "ext"
         self.motion = rest(now(), 0)
         self._now = now
@@ -242,7 +242,7 @@ class Servo(PoweredDevice):
             self.values["goal_position"] = goal
             position, velocity, _ = self.motion.state(at)
             unit = 180 / pi * self.profile.counts_per_degree  # counts per rad
-            limits = {"speed": SPEED * unit, "acceleration": ACCELERATION * unit}
+            limits = {"speed": self.speed * unit, "acceleration": ACCELERATION * unit}
             self.motion = move(at, position, self._place(goal), velocity=velocity, **limits)
 
     @property
