@@ -47,8 +47,8 @@ COMMON = [
 ]
 FEETECH = [
     "ping BUS --broadcast",
-    "feetech factory-restore BUS#1 --yes",
-    "feetech factory-restore BUS#1 --dry-run",
+    "feetech reset BUS#1 --yes",
+    "feetech reset BUS#1 --dry-run",
     "set-id BUS#1 9 --yes",
     "set-id BUS#1 9 --dry-run",
     "set-baud BUS#1 500k --yes",
@@ -56,7 +56,6 @@ FEETECH = [
     "recover BUS",
     "recover BUS --yes",
     "recover BUS --dry-run",
-    "recover BUS --alone --yes",
     "recover BUS --forget --yes",
     "recover BUS --of feetech:/dev/ttyACM42 --yes",
     "calibrate BUS#1 --yes",
@@ -154,7 +153,7 @@ TURNED = {
 @contextmanager
 def standing(family: str, command: str = "") -> Iterator[str]:
     """Two simulated devices, under torque where that can be switched, as this command wants them; their bus."""
-    ids = (1,) if "--alone" in command else (1, 2)
+    ids = (1, 2)
     with motorbus.simulate(family, ids=ids, **TURNED.get(family, {})) as simulation:
         with motorbus.open(simulation.url) as bus:
             for node in ids:

@@ -25,10 +25,12 @@ VARIANTS = {"feetech": tuple(MODELS), "kst": PROFILES, "stepper": ("",)}
 
 EXCLUDED = {
     "feetech": {
-        "copyable": "lists table rows; sends nothing",
         "forget_settings": "memory of the driver; sends nothing",
         "heard": "called by the driver with a reply",
+        "learn_settings": "called by the driver with settings that were read",
         "raw": "converts a value; sends nothing",
+        "refusal": "makes an error; sends nothing",
+        "row": "gives a table row; sends nothing",
         "value": "converts a value; sends nothing",
     },
     "kst": {
@@ -54,6 +56,11 @@ def shared(name: str, *args: Any, **kwargs: Any) -> Call:
     return Call(name, args, kwargs, on="family")
 
 
+def grouped(name: str, *args: Any, **kwargs: Any) -> Call:
+    """A method of a group of all devices."""
+    return Call(name, args, kwargs, on="group")
+
+
 # -- FEETECH ---------------------------------------------------------------------------------------------------------
 
 PREPARED = (call("prepare"),)
@@ -72,7 +79,6 @@ FEETECH: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("read_raw", "present_position", "id"), "", PREPARED),
     (call("position"), "", PREPARED),
     (call("position"), "unprepared", ()),
-    (call("position", confirmed=True), "confirmed", PREPARED),
     (call("velocity"), "", PREPARED),
     (call("load"), "", PREPARED),
     (call("current"), "", PREPARED),
@@ -80,16 +86,15 @@ FEETECH: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("temperature"), "", PREPARED),
     (call("telemetry"), "", PREPARED),
     (call("alarms"), "", PREPARED),
-    (call("blockers"), "", PREPARED),
+    (call("why_not_moving"), "", PREPARED),
     (call("mode"), "", PREPARED),
     (call("zero"), "", PREPARED),
-    (call("many_turns"), "", PREPARED),
     (call("write", acceleration=10.0), "ram", PREPARED),
     (call("write", max_temperature=60.0), "eeprom", PREPARED),
     (call("write", goal_position=2.5), "goal", TORQUE_ON),
     (call("write", goal_position=99.0), "out_of_range", TORQUE_ON),
     (call("write", present_position=1.0), "read_only", PREPARED),
-    (call("rewrite", max_temperature=70.0), "", PREPARED),
+    (call("write", force=True, max_temperature=70.0), "force", PREPARED),
     (call("reg_write", goal_position=2.5), "", TORQUE_ON),
     (call("action"), "", (*TORQUE_ON, call("reg_write", goal_position=2.5))),
     (call("enable_torque"), "", PREPARED),
@@ -104,17 +109,19 @@ FEETECH: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("set_mode", "current"), "current", PREPARED),
     (call("set_velocity", 1.0, acceleration=5.0), "", VELOCITY),
     (call("set_velocity", 1.0), "wrong_mode", TORQUE_ON),
+    (call("jog", 1.0, 0.2), "", VELOCITY),
+    (call("jog", 1.0, 0.2), "wrong_mode", TORQUE_ON),
     (call("set_duty", 0.2), "", PWM),
     (call("set_current", 0.1), "", CURRENT),
     (call("step", 0.2, wait=False), "", STEP),
-    (call("set_id", 7, among=(1, 2, 3)), "", PREPARED),
-    (call("set_baud", 500_000, among=(1, 2, 3)), "", PREPARED),
+    (call("set_id", 7), "", PREPARED),
+    (call("set_baud", 500_000), "", PREPARED),
     (call("recover", "set_id", NO_FACTS), "no_facts", PREPARED),
     (call("factory_restore"), "", PREPARED),
     (call("calibrate"), "", PREPARED),
     (call("calibrate", 1.0), "to", PREPARED),
     (call("clear_turns"), "", PREPARED),
-    (call("set_many_turns", True), "on", PREPARED),
+    (call("set_multi_turn", True), "on", PREPARED),
     (call("cap_torque", 0.5), "", PREPARED),
     (call("cap_current", 0.5), "", PREPARED),
     (call("recover_overload"), "", TORQUE_ON),
@@ -124,18 +131,16 @@ FEETECH: list[tuple[Call, str, tuple[Call, ...]]] = [
 ]
 FEETECH_GROUP: list[tuple[Call, str]] = [
     (shared("prepare_all", DEVICES), ""),
-    (shared("read_positions", DEVICES), ""),
-    (shared("sync_read_positions", DEVICES), ""),
-    (shared("sync_read_states", DEVICES), ""),
-    (shared("sync_read_raw", 40, 2, DEVICES), ""),
+    (grouped("positions"), ""),
+    (grouped("read", "present_position", "present_velocity"), "group"),
     (
         shared(
             "sync_write", {1: {"goal_position": 2.5}, 2: {"goal_position": 2.6}, 3: {"goal_position": 2.7}}
         ),
         "",
     ),
-    (Call("sync_writer", (DEVICES, "goal_position"), {"values": (2.5, 2.6, 2.7)}, on="kept"), ""),
-    (shared("sync_write_positions", DEVICES, (2.5, 2.6, 2.7)), ""),
+    (grouped("write", "goal_position", values=(2.5, 2.6, 2.7)), "group"),
+    (grouped("write", "goal_position", "goal_velocity", values=[(2.5, 1.0)] * 3), "group_two"),
     (shared("reg_write_all", {1: {"goal_position": 2.5}, 2: {"goal_position": 2.6}}), ""),
     (shared("action_all"), ""),
     (shared("disable_torque_all", (1, 2, 3)), ""),
@@ -173,7 +178,7 @@ FEETECH_STATES: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("reg_write", goal_position=2.5), "not_acknowledged", (*SILENT, call("enable_torque"))),
     (call("position"), "offset", TURNED),
     (call("position"), "offset_in_velocity_mode", (*TURNED, *VELOCITY[:1])),
-    (call("move", 8.0, wait=False), "many_turns", (call("set_many_turns", True), call("enable_torque"))),
+    (call("move", 8.0, wait=False), "many_turns", (call("set_multi_turn", True), call("enable_torque"))),
     (call("position"), "resolution", (call("write", angular_resolution=2),)),
     (
         call("move", 5.0, wait=False),
@@ -236,24 +241,16 @@ FEETECH_GROUP_REFUSED: list[tuple[Call, str]] = [
     (shared("sync_write", {1: {"goal_position": 2.5}, 2: {"goal_position": nan}}), "nan"),
     (shared("sync_write", {1: {"goal_position": 2.5}, 2: {"goal_position": 99.0}}), "out_of_range"),
     (shared("sync_write", {1: {"max_temperature": 60.0}}), "eeprom"),
-    (shared("sync_write_positions", DEVICES, (2.5, 2.6)), "too_few"),
-    (shared("sync_write_positions", DEVICES, (2.5, 2.6, nan)), "nan"),
-    (Call("sync_writer", (DEVICES, "goal_position"), {"values": (2.5, 2.6)}, on="kept"), "too_few"),
-    (Call("sync_writer", (DEVICES, "goal_position"), {"values": (2.5, 2.6, nan)}, on="kept"), "nan"),
-    (
-        Call("sync_writer", (DEVICES, "goal_position"), {"values": {3: 2.5, 2: 2.6, 1: 2.7}}, on="kept"),
-        "no_order",
-    ),
+    (grouped("write", "goal_position", values=(2.5, 2.6)), "group_too_few"),
+    (grouped("write", "goal_position", values=(2.5, 2.6, nan)), "group_nan"),
+    (grouped("write", "goal_position", values={3: 2.5, 2: 2.6, 1: 2.7}), "group_no_order"),
     (shared("reg_write_all", {1: {"goal_position": 2.5}, 9: {"goal_position": 2.5}}), "one_silent"),
     (shared("sync_read", ("nonsense",), DEVICES), "unknown"),
     (shared("disable_torque_all", (1, 9)), "one_silent"),
 ]
 FEETECH_UNPREPARED: list[Call] = [
-    shared("read_positions", DEVICES),
-    shared("sync_read_positions", DEVICES),
-    shared("sync_read_states", DEVICES),
-    shared("sync_write_positions", DEVICES, (2.5, 2.6, 2.7)),
-    Call("sync_writer", (DEVICES, "goal_position"), {"values": (2.5, 2.6, 2.7)}, on="kept"),
+    grouped("positions"),
+    grouped("write", "goal_position", values=(2.5, 2.6, 2.7)),
 ]
 
 

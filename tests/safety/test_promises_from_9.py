@@ -10,7 +10,7 @@ import pytest
 import motorbus
 from motorbus.core.steps import Emit
 from motorbus.errors import Faulted, LimitExceeded, MotorbusError, Overloaded, Refused, RequestError
-from motorbus.families.feetech import action_all, reg_write_all, sync_write_positions
+from motorbus.families.feetech import ServoGroup, action_all, reg_write_all
 from motorbus.motion.safety.gate import Gate
 from motorbus.session.robot import Robot
 from tests.conformance.cuts import Kind, violations
@@ -111,7 +111,7 @@ def test_13_a_synchronous_move_is_all_or_nothing(wrong: float) -> None:
         for values in ([pi, pi, pi + wrong], [pi + wrong, pi, pi]):
             devices = [robot[name].device for name in ("a1", "a2", "a3")]
             with pytest.raises(LimitExceeded):
-                robot.buses["arm"].run(sync_write_positions(devices, values))  # type: ignore[attr-defined]
+                robot.buses["arm"].run(ServoGroup(devices).write("goal_position")(values))  # type: ignore[attr-defined]
         assert [data for data in sent(sims) if not asks(data)] == []
 
 

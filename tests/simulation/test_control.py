@@ -76,6 +76,7 @@ def test_help_names_every_order() -> None:
         order = word.replace("[ID]", "").replace("ID", "1").replace("INPUT on|off", "2 on")
         order = order.replace("[SCRIPT|off]", "off")
         order = order.replace("[LOW HIGH]", "").replace("ANGLE", "30deg").replace("PERCENT", "50%")
+        order = order.replace("VOLTS", "7.4").replace("DEGREES", "40")
         answer = obey(bus, order, faults)
         assert not answer.startswith("error") or "has no physics for" in answer
 

@@ -151,7 +151,24 @@ def test_a_kst_servo_takes_a_load_and_no_other_force() -> None:
             assert obey(sim.simulator, verb) == f"error: node 37 has no physics for `{verb.split()[0]}`"
 
 
-@pytest.mark.parametrize("order", ["block 1", "push 1 30deg", "load 1 50%", "release 1"])
+def test_supply_and_heat_raise_the_alarms_of_a_servo_and_end_them() -> None:
+    with motorbus.simulate("feetech", ids="1") as sim, motorbus.open(sim.url) as bus:
+        servo = motorbus.feetech.Servo(bus, 1)
+        for order in ("supply 1 12V", "heat 1 90"):
+            assert obey(sim.simulator, order) == "ok"
+        state = servo.telemetry()
+        assert (state.voltage, state.temperature, state.alarm) == (12.0, 90.0, ("voltage", "temperature"))
+        for order in ("supply 1 7.4", "heat 1 30°C"):
+            assert obey(sim.simulator, order) == "ok"
+        assert servo.telemetry().alarm == ()
+        assert "error" in obey(sim.simulator, "supply 1 hot")
+        assert obey(sim.simulator, "heat 1") == "error: the order is: heat ID DEGREES"
+
+
+FORCES = ["block 1", "push 1 30deg", "load 1 50%", "release 1", "supply 1 7.4", "heat 1 40"]
+
+
+@pytest.mark.parametrize("order", FORCES)
 def test_a_stepper_controller_says_that_it_has_no_physics(order: str) -> None:
     with motorbus.simulate("stepper") as sim:
         assert obey(sim.simulator, order) == f"error: node 1 has no physics for `{order.split()[0]}`"

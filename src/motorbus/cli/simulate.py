@@ -42,9 +42,9 @@ removes its link and its control socket. Told no way to the bus, it says which
 pseudo-terminal it has made. --tcp without a host binds 127.0.0.1; there is no
 login. The control socket takes one order a line:
 status, power-cycle [ID], unplug ID, plug ID, set-input ID INPUT on|off,
-faults [SCRIPT|off], help, and for the shaft of a FEETECH servo
-block ID [LOW HIGH], push ID ANGLE, load ID PERCENT, release ID (of a KST
-servo load and release).
+faults [SCRIPT|off], help, supply ID VOLTS, heat ID DEGREES (of servos), and
+for the shaft of a FEETECH servo block ID [LOW HIGH], push ID ANGLE,
+load ID PERCENT, release ID (of a KST servo load and release).
 
 A CAN bus is served by the slcan protocol on --link and --tcp, and may be
 served in several ways at once: what one program sends, the others see.

@@ -12,6 +12,7 @@ import os
 import socket
 import stat
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,8 @@ MOST_CLIENTS = 16
 SCHEMA = "motorbus.simulator/1"
 HELP = (
     "status | power-cycle [ID] | unplug ID | plug ID | set-input ID INPUT on|off"
-    " | block ID [LOW HIGH] | push ID ANGLE | load ID PERCENT | release ID | faults [SCRIPT|off] | help"
+    " | block ID [LOW HIGH] | push ID ANGLE | load ID PERCENT | release ID"
+    " | supply ID VOLTS | heat ID DEGREES | faults [SCRIPT|off] | help"
 )
 
 
@@ -236,6 +238,16 @@ def _release(simulator: Simulator, words: list[str]) -> str:
     return "ok"
 
 
+def _influence(simulator: Simulator, words: list[str], order: str, quantity: str) -> str:
+    """Set the supply (V) or the temperature (°C) of a node."""
+    _expect(words, at_least=2, at_most=2, order=order)
+    node = _node(simulator, words[0])
+    if not hasattr(node, quantity):
+        raise RequestError(f"node {words[0]} has no physics for `{order.split()[0]}`")
+    setattr(node, quantity, units.parse(words[1], quantity))
+    return "ok"
+
+
 def _quantity(text: str, quantity: str) -> float:
     """A number with its unit. Raises RequestError without one."""
     value = units.parse(text, quantity)
@@ -267,6 +279,8 @@ _ORDERS: dict[str, Callable[[Simulator, list[str]], str]] = {
     "push": _push,
     "load": _load,
     "release": _release,
+    "supply": partial(_influence, order="supply ID VOLTS", quantity="voltage"),
+    "heat": partial(_influence, order="heat ID DEGREES", quantity="temperature"),
     "help": _help,
 }
 

@@ -56,9 +56,8 @@ def feetech(kind: str, method: str, *arguments: Any, name: str = "", **fields: A
 
 
 def identity(kind: str, method: str, value: int, *, name: str = "", **fields: Any) -> Command:
-    """A change of id or rate, among the ids of this bus."""
-    options = {"among": (OLD, NEW, OTHER)}
-    return feetech(kind, method, value, name=name, options=options, journalled=True, **fields)
+    """A change of id or rate."""
+    return feetech(kind, method, value, name=name, journalled=True, **fields)
 
 
 def guarded(kind: str, method: str, *arguments: Any, **fields: Any) -> Command:
@@ -112,7 +111,7 @@ FEETECH = [
     identity("scs2", "set_baud", SLOW, quirks={"torn": "old", "baud_ack": "new"}, cuts=10),
     identity("smcl", "set_baud", SLOW, quirks={"eeprom_commit": "after_ack"}, cuts=10),
     guarded("sts", "set_mode", "velocity", pairs=50),
-    guarded("sts", "set_many_turns", True, quirks={"torn": "new"}, pairs=50),
+    guarded("sts", "set_multi_turn", True, quirks={"torn": "new"}, pairs=50),
     guarded("sts", "calibrate", 1.0, name="-to", pairs=50),
     guarded("sts", "calibrate", name="-middle"),
     guarded("hls", "calibrate"),
@@ -200,7 +199,7 @@ def known_faults() -> Iterator[tuple[Command, str]]:
     for command in COMMANDS:
         if command.restart == 1:
             yield replace(command, restart=0), NOT_COMPLETED[command.subject.name]
-        if command.call.method == "set_many_turns":
+        if command.call.method == "set_multi_turn":
             yield replace(command, quirks=ERASED), TORN
     yield kst("kst-ext", "set_mid_point", ids=(OLD, OTHER), prepare=turned), NO_EFFECT
 
