@@ -421,6 +421,13 @@ def test_others_learn_of_an_error_before_project_1_is_given_back(one: Bench) -> 
         one.run(manual.keep_time(one.device, 3.0, others, velocity=tau))
     assert seen[0] != made()
     assert one.simulated.store.working == made()
+    seen.clear()
+    one.device.state.may_run = True
+    one.line.change = lambda data: data
+    with pytest.raises(RequestError, match="may still run"):
+        one.run(manual.keep_time(one.device, 3.0, others, velocity=tau))
+    assert seen
+    one.device.stop()
     one.simulated.put(2, replace(made(), number=2))
     one.device.write(project=2, save=False, step_1_delay=1.0)
     seen.clear()

@@ -68,6 +68,7 @@ def test_notice_completes_it(one: Bench) -> None:
 @pytest.mark.parametrize("project", [made(SWITCH), made(SWITCH, Step(output=8), project_loop=200)])
 def test_project_without_time_completes_at_once(project: Project) -> None:
     with bench(project) as one:
+        one.device.set_output(1, False)
         assert one.device.run(1).outcome is Outcome.COMPLETED
         assert one.device.last_commanded[1] is None, "its steps switch outputs"
 
@@ -103,6 +104,33 @@ def test_notice_of_a_false_end_only_is_unknown(one: Bench) -> None:
     ran = beside(one, spurious())
     assert ran.outcome is Outcome.UNKNOWN
     assert "too early" in ran.why
+
+
+def test_notice_before_the_acknowledgement_does_not_count() -> None:
+    with bench(made(SWITCH), turnaround=0.1) as one:
+        notices = iter([True])
+        one.line.change = lambda data: data if len(data) != 2 or next(notices, False) else b""
+        line: Any = one.simulator
+        ran = beside(
+            one, later(0.25, lambda: line.send(one.link.now(), b"\xee\xdd"))
+        )  # before the acknowledgement
+        assert ran.outcome is Outcome.UNKNOWN
+        assert "too early" in ran.why
+
+
+def test_notice_during_a_stop_that_is_acknowledged_is_stopped(one: Bench) -> None:
+    async def stop() -> None:
+        await Sleep(0.9)
+        one.line.change = without(0x5E)
+        await stop_later(one, 0.0)
+
+    async def restore() -> None:
+        await Sleep(1.05)
+        one.simulated.notice()
+        await Sleep(0.01)
+        one.line.change = lambda data: data
+
+    assert beside(one, stop(), restore()).outcome is Outcome.STOPPED
 
 
 # -- timeout -----------------------------------------------------------------------------------------------------------

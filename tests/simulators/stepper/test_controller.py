@@ -282,6 +282,10 @@ def test_stop_mode_decides_how_a_stop_ends_the_motion(mode: int) -> None:
     host.wait(0.1)
     assert host.phase == "idle"
     assert host.controller.position < -400
+    host.ask("jog_reverse", 0.5)
+    host.ask("set_stop_mode", stop_mode=1 - mode)
+    host.ask("stop_motor", 0.002)
+    assert host.phase == ("idle" if mode == 0 else "slowing down")
 
 
 @pytest.mark.parametrize(("tick", "seconds"), [(1.0, 1.092), (10.0, 1.853)])

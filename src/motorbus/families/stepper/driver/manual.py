@@ -241,7 +241,6 @@ async def keep_time(
         first, pulse = move.moment(1), move.sign * pulse_angle(project)
         lead = REQUEST_LENGTH * 10 / await SetBitrate(0) + first
         await timing.start(lead)
-        watch.check()
         begun = await Sleep(0) + lead
         whole = pulse * (move.pulses or 0)
         await _request(watch, "run_once", "relative", whole, project)

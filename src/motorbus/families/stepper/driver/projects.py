@@ -166,8 +166,6 @@ async def _send(node: Node, project: int, orders: list[Edit]) -> None:
     for edit in orders:
         values: dict[str, Any] = dict(edit.values)
         requests.append(command(node, edit.command, ignore, expert=True, **values))
-    if node.state.unsaved is not None and node.state.unsaved.number != project:
-        node.state.unsaved = None  # the selection loses these edits
     for done, request in enumerate(requests, 1):
         await request
         await Emit(Progress(done, len(requests), f"writing project {project}"))

@@ -93,7 +93,6 @@ class Controller(PoweredDevice):
         self._storing = None
         self.machine.power_off(self.now)
         self._collect()
-        self.notices.clear()
         self.on_power_off()
 
     def power_on(self) -> None:
