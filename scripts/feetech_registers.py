@@ -129,7 +129,9 @@ def _models() -> Iterator[str]:
         ]
         for number, model in MODELS.items()
     ]
-    yield from listed(("number", "major.minor", "model", "map", "byte order", "counts", "in doubt", "note"), rows)
+    yield from listed(
+        ("number", "major.minor", "model", "map", "byte order", "counts", "in doubt", "note"), rows
+    )
 
 
 def _baud_codes() -> Iterator[str]:
