@@ -20,7 +20,6 @@ WITHOUT_HARDWARE = re.compile(
 )
 
 
-
 def name_of(page: Path) -> str:
     return str(page.relative_to(ROOT))
 
