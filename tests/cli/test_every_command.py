@@ -144,7 +144,7 @@ def words(command: str, family: str, bus: str) -> list[str]:
 
 
 TURNED = {
-    "feetech": {"broadcast_ping": "in_turn", "clear_turns": "accept"},
+    "feetech": {"broadcast_ping": "in_turn"},
     "kst": {"profile": "kst-ext"},
 }
 """Options of the simulated devices with which every command can do its work."""
@@ -170,7 +170,7 @@ def standing(family: str, command: str = "") -> Iterator[str]:
 def leave_unfinished(bus: Any, registers: bytes) -> None:
     """The id of servo 1 was about to become 7 when the program was killed."""
     facts = {"node": 1, "new": 7, "rate": 1_000_000, "new_rate": 1_000_000, "registers": registers.hex()}
-    bus.journal(JournalEntry("set_id", INTENT, {**facts, "others": []}))
+    bus.journal(JournalEntry("set_id", INTENT, {**facts, "taken": []}))
 
 
 def can(family: str, command: str) -> bool:

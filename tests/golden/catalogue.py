@@ -25,8 +25,9 @@ VARIANTS = {"feetech": tuple(MODELS), "kst": PROFILES, "stepper": ("",)}
 
 EXCLUDED = {
     "feetech": {
+        "forget_answers": "memory of the driver; sends nothing",
         "forget_settings": "memory of the driver; sends nothing",
-        "heard": "called by the driver with a reply",
+        "note_reply": "called by the driver with a reply",
         "learn_settings": "called by the driver with settings that were read",
         "raw": "converts a value; sends nothing",
         "refusal": "makes an error; sends nothing",

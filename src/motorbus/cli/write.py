@@ -95,7 +95,7 @@ def write(
         orders = _orders(one, wanted, raw)
         values = {order.entry.name: order.value for order in orders}
         tell = _Plan(opening, output)
-        rehearse = partial(_write, face(rehearsal, node), values, tell)
+        rehearse = partial(_write, face(rehearsal, node), values, tell.plan)
         memory = faces.offer(family.name, "KEPT") or Storage.EEPROM.value
         kept = [order.entry.name for order in orders if order.entry.storage is Storage.EEPROM]
         what = f"write {', '.join(kept)} to {memory}, where it survives power-off"
@@ -103,7 +103,7 @@ def write(
             _permit(orders, output, rehearse, what=what if kept else "", expert=expert, yes=yes or dry_run)
             ways = goals_among(one, [order.entry for order in orders], values)
             consent_to_ways(ways, output, yes=yes or dry_run, rehearse=rehearse)
-            told = _write(one, values, tell)
+            told = _write(one, values, tell.plan if dry_run else tell)
     if dry_run:
         dry.show(rehearsal, output)
     else:
@@ -121,15 +121,19 @@ class _Plan:
         self._said = False
 
     def __call__(self, event: object) -> None:
+        if not self.plan(event) and self._report is not None:
+            self._report(event)
+
+    def plan(self, event: object) -> bool:
+        """Print what is about to be written, once; whether the event says that."""
         text = self._planned(event) if self._planned is not None else ""
         if text and not self._said:
             self._said = True
             self._output.text(text)
-        elif not text and self._report is not None:
-            self._report(event)
+        return bool(text)
 
 
-def _write(one: Any, values: Mapping[str, Value], tell: Callable[[object], None]) -> Any:
+def _write(one: Any, values: Mapping[str, Value], tell: Callable[[object], object]) -> Any:
     """What the verb returns, None of most families."""
     return one.bus.run(type(one).write.function(one, **values), report=tell)
 

@@ -109,9 +109,9 @@ def test_a_second_servo_answers_too() -> None:
 
 
 def test_a_torn_eeprom_is_what_the_switch_says() -> None:
-    for torn, left in (("old", 1), ("new", 7), ("erased", 255)):
+    for torn, left in (("old", 1), ("new", 7), ("erased", 1)):
         script = "exchange 1: torn-eeprom 1"
-        link, world, line, _ = host(script, torn=torn, torn_identity="unreachable", while_storing="answer")
+        link, world, line, _ = host(script, torn=torn)
         asked(link, UNLOCK)
         assert line.fired == []
         assert [str(one) for one in line.pending] == [script]

@@ -165,6 +165,6 @@ def move_together(
     async def move() -> None:
         for error in (await prepare_all(servos)).values():
             raise error
-        await move_all(Motion(velocity, acceleration, None), servos, wait=wait)
+        await move_all(Motion(velocity, acceleration), servos, wait=wait, around=several.or_all_stop)
 
     several.carried_out(bus, move())

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from math import remainder
-from typing import Final
+from typing import Any, Final
 
 from motorbus.core import move as core_move
 from motorbus.core.family import State
@@ -415,10 +415,11 @@ async def move_all(
     wait: bool = True,
     tolerance: float | None = None,
     timeout: float | None = None,
+    **further: Any,
 ) -> None:
-    """`core.move.move`; a stalled servo is asked for the reason."""
+    """`core.move.move`, with its further arguments; a stalled servo is asked for the reason."""
     try:
-        await core_move.move(logic, to, wait=wait, tolerance=tolerance, timeout=timeout)
+        await core_move.move(logic, to, wait=wait, tolerance=tolerance, timeout=timeout, **further)
     except Stalled as error:
         node = next(one for one in to if one.node == error.node)
         reasons = await catch(diagnosis.why_not_moving(node))
