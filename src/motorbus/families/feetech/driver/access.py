@@ -6,6 +6,7 @@ Adjoining registers travel together. RAM is written at once, EEPROM by `eeprom.s
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from difflib import get_close_matches
 from typing import Final, NamedTuple, TypeAlias
 
 from motorbus.core.access import readable_rows, writable_values
@@ -125,10 +126,15 @@ def _needs_limp(row: Register) -> bool:
 
 def check_names(names: Iterable[str]) -> None:
     """Raise RequestError for a name that no register map has."""
-    tables = list(TABLES.values())
+    known = {name for table in TABLES.values() for name in table} | set(GROUPS)
     for name in names:
-        if name not in GROUPS and not any(name in table for table in tables):
-            tables[0][name]  # raises, with suggestions
+        if name not in known:
+            near = get_close_matches(str(name), sorted(known), n=3)
+            raise RequestError(
+                f"no map has a register {shown(name)}",
+                expected=f"perhaps {', '.join(near)}" if near else "",
+                advice="`motorbus info BUS#ID --registers` lists them",
+            )
 
 
 def check_values(values: Mapping[str, Value]) -> None:

@@ -171,11 +171,16 @@ def unanswered(
     unless: Precondition | None = None,
     deferred: Deferred | None = None,
 ) -> Request[None]:
-    """A request without a reply, as every broadcast."""
+    """A request without a reply, as every broadcast; it counts as carried out once it was sent."""
+
+    def decode(_: Response) -> None:
+        if deferred is not None:
+            deferred.done = True
+
     return Request(
         wire,
         (),
-        lambda _: None,
+        decode,
         priority=priority,
         effect=effect,
         setpoints=goals,
