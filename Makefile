@@ -39,6 +39,7 @@ bench: $(READY) $(PEERS)
 docs: $(READY)
 	$(BIN)/python -m scripts.feetech_registers
 	$(BIN)/python -m scripts.kst_reference
+	$(BIN)/python -m scripts.stepper_reference
 	$(BIN)/python -m scripts.machine_file
 	$(BIN)/zensical build --strict --clean
 

@@ -17,14 +17,13 @@ def main(address: str = "feetech:sim,ids=1-6", cycles: int = 200) -> None:
         for servo in servos:
             servo.prepare()
             servo.enable_torque()
-        read = motorbus.feetech.sync_read_positions(servos)
+        group = motorbus.feetech.ServoGroup(servos)
+        read, write = group.positions, group.write("goal_position")
         start = bus.run(read).values
         begun = bus.link.now()
         for cycle in range(cycles):
             swing = 0.2 * math.sin(2 * math.pi * cycle / cycles)
-            bus.run(
-                motorbus.feetech.sync_write_positions(servos, [start[servo.node] + swing for servo in servos])
-            )
+            bus.run(write([start[servo.node] + swing for servo in servos]))
             positions = bus.run(read)
             for silent in positions.missing:
                 print(f"servo {silent} did not answer in cycle {cycle}")

@@ -38,11 +38,11 @@ def main(arms: int = 5, servos: int = 6, seconds: float = 4.0) -> None:
             goal = math.pi + 0.5 * math.sin(cycle)
             for sim, bus, arm in fleet:
                 sim.wait(begun + cycle / 2)  # two cycles in a second of the fleet
-                bus.run(motorbus.feetech.sync_write_positions(arm, [goal] * servos))
+                bus.run(motorbus.feetech.ServoGroup(arm).write("goal_position")([goal] * servos))
         found: list[float] = []
         for sim, bus, arm in fleet:
             sim.wait(begun + cycles / 2 + 1.0)
-            found += bus.run(motorbus.feetech.sync_read_positions(arm)).values.values()
+            found += bus.run(motorbus.feetech.ServoGroup(arm).positions).values.values()
         took = time.process_time() - prepared
     furthest = max(abs(position - goal) for position in found)
     speed = (cycles / 2 + 1) / took

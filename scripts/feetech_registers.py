@@ -12,16 +12,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from motorbus.core.register import Register, RegisterMap
-from motorbus.families.feetech.table import (
-    ALARM_BITS_OF,
-    BAUD_CODES,
-    BAUD_CODES_OF,
-    FIRMWARE,
-    MODELS,
-    PHASE_BITS,
-    TABLES,
-    model_number,
-)
+from motorbus.families.feetech.models import FIRMWARE, MODELS, model_number
+from motorbus.families.feetech.registers import TABLES
+from motorbus.families.feetech.registers.codes import ALARM_BITS, BAUD_CODES, BAUD_CODES_OF, PHASE_BITS
 from scripts.pages import kept, listed
 
 ROOT: Final = Path(__file__).resolve().parent.parent
@@ -92,8 +85,8 @@ def text_of_database() -> str:
 
 def _choice() -> Iterator[str]:
     yield "## Which map a servo has\n"
-    yield "Registers 0 to 4 tell: firmware, byte order, model. The model number decides the byte order, and one that"
-    yield "nobody knows tells it by register 2. Other firmware has no map here: it is read by what all maps share.\n"
+    yield "By registers 0 to 4: firmware, byte order, model. The model number decides the byte order, for an unknown"
+    yield "one register 2 does. Other firmware has no map here: it is read by what all maps share.\n"
     rows: list[list[object]] = []
     for one in FIRMWARE:
         minors = f"{one.major}.{one.minors.start} to {one.major}.{one.minors.stop - 1}"
@@ -132,11 +125,13 @@ def _models() -> Iterator[str]:
                 model.name,
                 " or ".join(model.maps),
             ),
-            *(model.order, f"{model.resolution} over {model.arc:g}°", model.note),
+            *(model.order, f"{model.resolution} over {model.arc:g}°", model.arc_doubt, model.note),
         ]
         for number, model in MODELS.items()
     ]
-    yield from listed(("number", "major.minor", "model", "map", "byte order", "counts", "note"), rows)
+    yield from listed(
+        ("number", "major.minor", "model", "map", "byte order", "counts", "in doubt", "note"), rows
+    )
 
 
 def _baud_codes() -> Iterator[str]:
@@ -152,7 +147,7 @@ def _baud_codes() -> Iterator[str]:
 def _alarms() -> Iterator[str]:
     yield "## Alarm bits\n"
     yield "Of the error byte in every answer, of register 65, and of the masks 19 and 20.\n"
-    yield from _bits(ALARM_BITS_OF)
+    yield from _bits(ALARM_BITS)
 
 
 def _phase() -> Iterator[str]:

@@ -12,22 +12,19 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from glob import glob
 from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 WANTED = ((3, 11), (3, 12), (3, 13))
 PROBE = "import sys, venv, ensurepip; print(sys.implementation.name, *sys.version_info[:2], sys.executable)"
-# Where version managers keep what they have installed, below the home folder or the root.
 FOLDERS = (
+    "/usr/bin",
+    "/usr/local/bin",
+    "~/.local/bin",
     "~/.pyenv/versions/*/bin",
     "~/.local/share/uv/python/*/bin",
-    "~/.local/bin",
-    "~/.local/share/mise/installs/python/*/bin",
-    "/opt/*/bin",
-    "/opt/homebrew/bin",
-    "/usr/local/bin",
-    "/usr/bin",
 )
 
 
@@ -41,21 +38,12 @@ class Row(NamedTuple):
 
 
 def candidates(version: tuple[int, int]) -> Iterator[str]:
-    """Paths that may be a Python of this version, the likeliest first, none twice."""
+    """Paths that may be a Python of this version."""
     name = f"python{version[0]}.{version[1]}"
-    seen = set()
-    for path in (shutil.which(name), *_in_folders(name)):
-        if path and path not in seen:
-            seen.add(path)
-            yield path
-
-
-def _in_folders(name: str) -> Iterator[str]:
-    for pattern in FOLDERS:
-        expanded = Path(pattern).expanduser()
-        yield from sorted(
-            map(str, Path(expanded.anchor).glob(f"{expanded.relative_to(expanded.anchor)}/{name}"))
-        )
+    if path := shutil.which(name):
+        yield path
+    for folder in FOLDERS:
+        yield from sorted(glob(f"{Path(folder).expanduser()}/{name}"))
 
 
 def runs(path: str, version: tuple[int, int]) -> bool:

@@ -24,3 +24,16 @@ def kept(wanted: Mapping[Path, str]) -> int:
     for file, text in wanted.items():
         file.write_text(text, encoding="utf-8")
     return 0
+
+
+def assumptions(folder: Path) -> Iterator[tuple[str, str]]:
+    """The file and the text of each comment below this folder that ends with `# assumption`."""
+    for file in sorted(folder.rglob("*.py")):
+        for line in file.read_text(encoding="utf-8").splitlines():
+            code, mark, rest = line.strip().partition("# assumption")
+            if not mark or rest:
+                continue
+            code, _, text = code.rpartition("# ")
+            name, constant, value = code.partition(": Final")
+            shown = f"`{name}{value.rstrip()}`: " if constant else ""
+            yield f"`{file.relative_to(folder)}`", f"{shown}{text.strip()}."

@@ -22,8 +22,8 @@ class Motorbus(Contender):
         for servo in servos:
             servo.prepare()
         self.first = servos[0]
-        self.positions = feetech.sync_read_positions(servos)
-        self.goals = feetech.sync_writer(servos, "goal_position")
+        self.positions = feetech.ServoGroup(servos).positions
+        self.goals = feetech.ServoGroup(servos).write("goal_position")
 
     def read(self) -> float:
         return self.first.position()

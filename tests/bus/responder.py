@@ -8,7 +8,7 @@ from typing import Any
 from motorbus.bus.blocking import Bus
 from motorbus.core.family import SimulatedNode
 from motorbus.core.request import Data, Effect, Expected, Request, Response
-from motorbus.families.feetech import FAMILY, wire
+from motorbus.families.feetech import FAMILY, protocol
 from motorbus.link.base import Line
 from motorbus.link.memory import MemoryLink
 from tests.bus.script import ADMIT_ALL
@@ -25,8 +25,8 @@ class Responder:
         for node, memory in self.memory.items():
             memory[5], memory[LOCK], memory[56] = node, 1, node
         self.dead: set[int] = set()
-        self.heard: list[wire.InstructionPacket] = []
-        self._splitter = wire.Splitter("instruction")
+        self.heard: list[protocol.Packet] = []
+        self._parser = protocol.parser()
         self._out: list[tuple[float, Data]] = []
         self.rate = 0
 
@@ -36,23 +36,23 @@ class Responder:
 
     def receive(self, data: Data, at: float) -> None:
         assert isinstance(data, bytes)
-        for packet in self._splitter.feed(data):
-            if isinstance(packet, wire.InstructionPacket):
-                self.heard.append(packet)
-                self._carry_out(packet, at)
+        for frame, fault in self._parser.feed(data):
+            if not fault:
+                self.heard.append(protocol.decode(frame))
+                self._carry_out(self.heard[-1], at)
 
-    def _carry_out(self, packet: wire.InstructionPacket, at: float) -> None:
+    def _carry_out(self, packet: protocol.Packet, at: float) -> None:
         parameters = packet.parameters
-        if packet.instruction == wire.Instruction.SYNC_READ:
+        if packet.code == protocol.Instruction.SYNC_READ:
             for node in parameters[2:]:
                 self._answer(node, at, self._read(node, parameters[0], parameters[1]))
-        elif packet.instruction == wire.Instruction.READ:
+        elif packet.code == protocol.Instruction.READ:
             self._answer(packet.id, at, self._read(packet.id, parameters[0], parameters[1]))
-        elif packet.instruction == wire.Instruction.WRITE and packet.id in self.memory:
+        elif packet.code == protocol.Instruction.WRITE and packet.id in self.memory:
             if packet.id not in self.dead:
                 self.memory[packet.id][parameters[0] : parameters[0] + len(parameters) - 1] = parameters[1:]
             self._answer(packet.id, at)
-        elif packet.instruction == wire.Instruction.PING:
+        elif packet.code == protocol.Instruction.PING:
             self._answer(packet.id, at)
 
     def _read(self, node: int, address: int, count: int) -> bytes:
@@ -60,7 +60,7 @@ class Responder:
 
     def _answer(self, node: int, at: float, data: bytes = b"") -> None:
         if node in self.memory and node not in self.dead:
-            self._out.append((at + DELAY, wire.encode_status(node, 0, data)))
+            self._out.append((at + DELAY, protocol.frame(node, 0, data)))
 
     def advance(self, to: float) -> list[tuple[float, Data]]:
         ready = [item for item in self._out if item[0] <= to]
@@ -80,12 +80,15 @@ def first_byte(answer: Response) -> int:
 
 def position(node: int) -> Request[int]:
     """The low byte of register 56, which is the id."""
-    return Request(wire.read(node, 56, 2), (Expected(node, node, 8),), first_byte, repeatable=True)
+    return Request(protocol.read(node, 56, 2), (Expected(node, node, 8),), first_byte, repeatable=True)
 
 
 def write(node: int, address: int, value: int, effect: Effect = Effect.NONE) -> Request[Response]:
     return Request(
-        wire.write(node, address, bytes([value])), (Expected(node, node, 6),), effect=effect, repeatable=True
+        protocol.write(node, address, bytes([value])),
+        (Expected(node, node, 6),),
+        effect=effect,
+        repeatable=True,
     )
 
 

@@ -36,8 +36,8 @@ class Arm:
         for servo in servos:
             servo.prepare()
             servo.enable_torque()
-        self._write = feetech.sync_writer(servos, "goal_position")
-        self._read = feetech.sync_read_positions(servos)
+        self._write = feetech.ServoGroup(servos).write("goal_position")
+        self._read = feetech.ServoGroup(servos).positions
 
     def batch(self, goal: float = 3.0) -> list[Any]:
         return [self._write([goal] * 3), self._read]

@@ -74,7 +74,7 @@ def test_a_kept_request_of_a_task_may_be_run_meanwhile() -> None:
         servos = [feetech.Servo(bus, node) for node in (1, 2, 3)]
         for servo in servos:
             servo.prepare()
-        read = feetech.sync_read_positions(servos)
+        read = feetech.ServoGroup(servos).positions
         seen: list[Any] = []
 
         async def both() -> Any:
@@ -93,7 +93,7 @@ def test_a_position_that_did_not_come_with_a_group_counts_no_more() -> None:
         servos = [feetech.Servo(bus, node) for node in (1, 2)]
         for servo in servos:
             servo.prepare()
-        read = feetech.sync_read_positions(servos)
+        read = feetech.ServoGroup(servos).positions
         bus.run(read)
         bus.run(read)
         assert set(bus.positions) == {1, 2}
@@ -107,8 +107,8 @@ def _with_goals(sim: Any, bus: Any) -> list[Any]:
     for servo in servos:
         servo.prepare()
         servo.enable_torque()
-    goals = feetech.sync_writer(servos, "goal_position")
-    return [goals([3.1] * 3), feetech.sync_read_positions(servos)]
+    goals = feetech.ServoGroup(servos).write("goal_position")
+    return [goals([3.1] * 3), feetech.ServoGroup(servos).positions]
 
 
 @pytest.mark.parametrize("several", [False, True])
@@ -168,7 +168,7 @@ def test_replies_that_wait_for_a_late_host_are_in_time(monkeypatch: pytest.Monke
         servos = [feetech.Servo(bus, node) for node in range(1, 7)]
         for servo in servos:
             servo.prepare()
-        read, write = feetech.sync_read_positions(servos), bus.link.write
+        read, write = feetech.ServoGroup(servos).positions, bus.link.write
         bus.run(read)
 
         def stall(data: Data) -> None:

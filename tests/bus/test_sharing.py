@@ -20,7 +20,7 @@ from motorbus.bus.running import run_on
 from motorbus.core.request import Request
 from motorbus.core.steps import Sleep
 from motorbus.errors import Interrupted, LinkLost
-from motorbus.families.feetech.driver.torque import disable_torque_everyone
+from motorbus.families.feetech.driver.group import disable_torque_everyone
 from tests.bus.test_batches import Arm
 
 LIMIT = 20.0

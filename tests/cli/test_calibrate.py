@@ -18,13 +18,13 @@ def test_the_middle_needs_consent(run: Run, arm: Simulation) -> None:
     assert arm[3].memory["homing_offset"] == 0
     document = run("calibrate", f"{arm.url}#3", "--yes", "--json").document
     assert document["schema"] == "motorbus.calibrate/1"
-    assert (document["id"], document["how"], document["raw_new_offset"]) == (3, "switch", -1048)
+    assert (document["id"], document["raw_new_offset"]) == (3, -1048)
     assert document["after"] == pytest.approx(math.pi)
     assert arm[3].raw_position == 2048
 
 
 def test_any_pose(run: Run, arm: Simulation) -> None:
-    ran = run("calibrate", f"{arm.url}#3", "--to", "90deg", "--how", "offset", "--yes")
+    ran = run("calibrate", f"{arm.url}#3", "--to", "90deg", "--yes")
     assert ran.code == 0
     assert "#3 is calibrated (simulated)" in ran.out
     assert "1.5708 rad (90.0°)" in ran.out
@@ -53,7 +53,6 @@ def test_a_dry_run_shows_the_whole_sequence_and_changes_nothing(run: Run, arm: S
         assert ran.code == 0, ran.err
         meanings = [one["meaning"] for one in ran.document["withheld"]]
         assert ["lock 0" in meanings[0], "torque_enable 0" in meanings[1]] == [True, True]
-        assert ("homing_offset" if words else "call the present position 2048") in meanings[2]
         assert "lock 1" in meanings[-1]
     assert arm[3].memory["homing_offset"] == 0
 
@@ -63,8 +62,6 @@ def test_a_dry_run_shows_the_whole_sequence_and_changes_nothing(run: Run, arm: S
     [
         ("BUS#3 --to 400deg --yes", 2),
         ("BUS#3 --to nan --yes", 2),
-        ("BUS#3 --how by-hand --yes", 2),
-        ("BUS#3 --how switch --to 1 --yes", 2),
         ("BUS#3 --show --to 1", 2),
         ("BUS#3 --show --dry-run", 2),
         ("BUS --yes", 2),
@@ -83,4 +80,4 @@ def test_in_another_mode_there_is_advice(run: Run, arm: Simulation) -> None:
     assert run("feetech", "mode", f"{arm.url}#3", "velocity", "--yes").code == 0
     ran = run("calibrate", f"{arm.url}#3", "--yes")
     assert ran.code == 2
-    assert "`motorbus feetech mode BUS#ID position` first" in ran.err
+    assert "`motorbus feetech mode BUS#ID position`" in ran.err

@@ -47,8 +47,8 @@ COMMON = [
 ]
 FEETECH = [
     "ping BUS --broadcast",
-    "feetech factory-restore BUS#1 --yes",
-    "feetech factory-restore BUS#1 --dry-run",
+    "feetech reset BUS#1 --yes",
+    "feetech reset BUS#1 --dry-run",
     "set-id BUS#1 9 --yes",
     "set-id BUS#1 9 --dry-run",
     "set-baud BUS#1 500k --yes",
@@ -56,7 +56,6 @@ FEETECH = [
     "recover BUS",
     "recover BUS --yes",
     "recover BUS --dry-run",
-    "recover BUS --alone --yes",
     "recover BUS --forget --yes",
     "recover BUS --of feetech:/dev/ttyACM42 --yes",
     "calibrate BUS#1 --yes",
@@ -75,13 +74,8 @@ KST = [
     "move BUS#1=HERE --dry-run",
     "set-id BUS#1 1 --yes",
     "set-id BUS#1 9 --dry-run",
-    "kst provision BUS#1 --new-id 1 --yes",
-    "kst provision BUS#1 --new-id 9 --new-bitrate 1M --dry-run",
     "kst mid-point BUS#1 --yes",
     "kst mid-point BUS#1 --dry-run",
-    "kst limits BUS#1",
-    "kst limits BUS#1 -0.5 0.5 --yes",
-    "kst limits BUS#1 -30deg 30deg --dry-run",
     "kst reverse BUS#1",
     "kst reverse BUS#1 on --yes",
     "kst reverse BUS#1 on --dry-run",
@@ -145,7 +139,7 @@ def words(command: str, family: str, bus: str) -> list[str]:
 
 
 TURNED = {
-    "feetech": {"broadcast_ping": "in_turn", "clear_turns": "accept"},
+    "feetech": {"broadcast_ping": "in_turn"},
     "kst": {"profile": "kst-ext"},
 }
 """Options of the simulated devices with which every command can do its work."""
@@ -154,7 +148,7 @@ TURNED = {
 @contextmanager
 def standing(family: str, command: str = "") -> Iterator[str]:
     """Two simulated devices, under torque where that can be switched, as this command wants them; their bus."""
-    ids = (1,) if "--alone" in command else (1, 2)
+    ids = (1, 2)
     with motorbus.simulate(family, ids=ids, **TURNED.get(family, {})) as simulation:
         with motorbus.open(simulation.url) as bus:
             for node in ids:
@@ -171,7 +165,7 @@ def standing(family: str, command: str = "") -> Iterator[str]:
 def leave_unfinished(bus: Any, registers: bytes) -> None:
     """The id of servo 1 was about to become 7 when the program was killed."""
     facts = {"node": 1, "new": 7, "rate": 1_000_000, "new_rate": 1_000_000, "registers": registers.hex()}
-    bus.journal(JournalEntry("set_id", INTENT, {**facts, "others": []}))
+    bus.journal(JournalEntry("set_id", INTENT, {**facts, "taken": []}))
 
 
 def can(family: str, command: str) -> bool:

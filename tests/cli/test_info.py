@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import motorbus
-from motorbus.families.feetech.table import STS
+from motorbus.families.feetech.registers import STS
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Bench, Run
 

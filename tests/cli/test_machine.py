@@ -193,9 +193,9 @@ def test_a_name_that_is_none_ends_with_one_error_and_sends_nothing(
         ("recover arm", 0),
         ("feetech mode a1", 0),
         ("read can#37 node_id", 0),
-        ("stepper inputs lift", 0),
+        ("stepper io lift", 0),
         ("scan all", 2),
-        ("kst limits a1", 2),
+        ("kst reverse a1", 2),
     ],
 )
 def test_names_go_where_addresses_go(command: str, code: int, bench: Bench, run: Run) -> None:

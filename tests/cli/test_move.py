@@ -171,12 +171,12 @@ def test_a_device_is_named_once(run: Run, arm: Simulation) -> None:
 
 
 @pytest.mark.parametrize("more", [[], ["#2"]], ids=["one", "two"])
-def test_a_dry_run_shows_one_frame_and_moves_nothing(more: list[str], run: Run, arm: Simulation) -> None:
+def test_a_dry_run_shows_each_frame_and_moves_nothing(more: list[str], run: Run, arm: Simulation) -> None:
     goals = [f"{arm.url}#1=2", *(f"{arm.url}{node}=2.5" for node in more)]
     ran = run("move", *goals, "--dry-run", "--json")
     assert ran.code == 0
-    (frame,) = ran.document["withheld"]
-    assert "goal_position" in frame["meaning"]
+    assert len(ran.document["withheld"]) == len(goals)
+    assert all("goal_position" in frame["meaning"] for frame in ran.document["withheld"])
     assert stands(run, arm, 1) == pytest.approx(math.pi)
 
 

@@ -72,7 +72,7 @@ def test_a_scan_reports_a_duplicate_feetech_id(run: Run) -> None:
         ran = run("scan", simulation.url, "--ids", "1-4", "--json")
     assert [one["id"] for one in ran.document["devices"]] == [1, 2, 3]
     assert len(ran.document["notes"]) == 1
-    assert "#3 at 1000000 bit/s: two servos seem to have this id" in ran.document["notes"][0]
+    assert "#3 at 1000000 bit/s: two servos seem to have the id 3" in ran.document["notes"][0]
 
 
 @pytest.mark.parametrize("said", ["7", "1000000,7", "2M"])

@@ -16,7 +16,7 @@ def reporting() -> Iterator[Simulation]:
     """One servo with newer firmware that reports its position every 20 ms."""
     with motorbus.simulate("kst", ids="0x25", profile="kst-ext") as simulation:
         with motorbus.open(simulation.url) as bus:
-            bus.family.devices.blocking(bus, 0x25).start_reports(0.02)
+            bus.family.devices.blocking(bus, 0x25).set_reports(True)
         yield simulation
 
 

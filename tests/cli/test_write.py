@@ -44,13 +44,13 @@ def test_a_raw_value_that_moves_needs_an_expert(words: list[str], run: Run, arm:
     assert held(run, arm, "goal_position") == 2100
 
 
-@pytest.mark.parametrize("words", [["phase=0"], ["phase=0", "--yes"], ["homing_offset=0raw"]], ids=" ".join)
+@pytest.mark.parametrize("words", [["phase=0"], ["phase=0", "--yes"]], ids=" ".join)
 def test_nobody_is_told_to_be_an_expert_for_what_is_never_written(
     words: list[str], run: Run, arm: Simulation
 ) -> None:
     ran = run("write", f"{arm.url}#1", *words)
     assert ran.code == 2
-    assert "belongs to one servo alone" in ran.err
+    assert "is not written by name" in ran.err
     assert "--expert" not in ran.err
 
 
@@ -155,7 +155,7 @@ def test_a_dry_run_refuses_what_a_real_one_would(run: Run, arm: Simulation) -> N
             "move BUS#1=500deg --yes",
             "500deg: node 1: goal position refused: 8.72682 lies outside 0 to 6.28165 rad",
         ),
-        ("move BUS#1=1e308deg --yes", "1e308deg: goal_position: 1.7453292519943295e+306 rad is out of range"),
+        ("move BUS#1=1e308deg --yes", "1e308deg: node 1: 1.7453292519943295e+306 rad is no possible goal"),
         ("move BUS#1=0 BUS#2=1e9deg --yes", "1e9deg: node 2: "),
     ],
 )
@@ -165,19 +165,14 @@ def test_a_value_out_of_range_is_named_as_it_was_typed_with_its_unit(
     ran = run(*words.replace("BUS", arm.url).split())
     assert ran.err.startswith(f"error: {said}") or f"error: node 1: {said}" in ran.err
     assert "not a finite number" not in ran.err
-    assert "nothing was sent" in ran.err
 
 
-def test_the_question_and_the_result_say_what_becomes_of_the_torque(run: Run, arm: Simulation) -> None:
+def test_the_torque_after_a_write_is_noted(run: Run, arm: Simulation) -> None:
     device = f"{arm.url}#1"
-    assert "torque" not in run("write", device, "max_temperature=65").err
-    assert "torque" not in run("write", device, "max_temperature=65", "--yes", "--json").document
+    assert "torque" not in run("write", device, "max_temperature=65", "--yes").err
     assert run("torque", "on", device).code == 0
-    assert "then it holds where it is" in run("write", device, "max_temperature=66").err
-    ran = run("write", device, "max_temperature=66", "--yes", "--json")
-    assert ran.document["torque"] == {"on": True, "why": ""}
+    assert "has its torque back" in run("write", device, "max_temperature=66", "--yes").err
     assert held(run, arm, "torque_enable") == 1
-    assert "stays off (operating_mode" in run("write", device, "operating_mode=velocity").err
-    ran = run("write", device, "operating_mode=velocity", "--yes")
-    assert "torque was on before the write and is off now: operating_mode" in ran.out
+    assert "torque" not in run("write", device, "max_temperature=67", "--dry-run").err
+    run("write", device, "operating_mode=velocity", "--yes")
     assert held(run, arm, "torque_enable") == 0

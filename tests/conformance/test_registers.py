@@ -104,10 +104,14 @@ def test_what_can_only_be_read_refuses_to_be_written(writer: Family) -> None:
             refused(there, row.name, row.to_value(row.high))
 
 
+KNOWN = "homing_offset"
+"""Written by name where it is known, as from a file of LeRobot; see the tests of the family."""
+
+
 def test_d8_what_is_protected_refuses_to_be_written_by_name(writer: Family) -> None:
     with world(writer) as there:
         for row in there.table(NODE).values():
-            if row.protected and row.writable:
+            if row.protected and row.writable and row.name != KNOWN:
                 refused(there, row.name, row.to_value(row.high))
 
 

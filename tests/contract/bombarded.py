@@ -152,7 +152,7 @@ def rename(address: str, changes: float) -> dict[str, Any]:
             sender = Thread(target=_signal_when_unlocked, args=(bus.trace.subscribe(10_000),))
             sender.start()
             try:
-                feetech.Servo(bus, node).set_id(3 - node, among=(1, 2))
+                feetech.Servo(bus, node).set_id(3 - node)
                 sender.join()
                 time.sleep(PERIOD)
             except KeyboardInterrupt:

@@ -36,7 +36,7 @@ def test_a_group_read_in_a_loop(rounds: Rounds) -> None:
 
             def read(index: int) -> set[int]:
                 right = turn(sim, index)
-                found = bus.run(feetech.read_positions(servos))
+                found = bus.run(feetech.ServoGroup(servos).positions)
                 assert all(abs(right[node] - value) < 1e-3 for node, value in found.values.items()), index
                 assert set(found.values) | set(found.missing) == set(IDS)
                 return set(found.missing)

@@ -19,9 +19,6 @@ WITHOUT_HARDWARE = re.compile(
     r"|^motorbus feetech (registers|models)|^motorbus stepper \w+ \S+\.toml$"
 )
 
-CHANGED = re.compile(r"^motorbus set-(id|baud) ")
-"""Commands that ask every id, most of which nobody has, unless they are told among which."""
-
 
 def name_of(page: Path) -> str:
     return str(page.relative_to(ROOT))
@@ -67,8 +64,7 @@ def test_a_command_parses(line: str) -> None:
 )
 def test_a_command_that_needs_no_hardware_succeeds(line: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Those of the README are run by its own tests."""
-    among = ["--among", "1-9"] if CHANGED.search(line) else []
-    assert main([*shlex.split(line)[1:], *among]) == 0, capsys.readouterr().err
+    assert main(shlex.split(line)[1:]) == 0, capsys.readouterr().err
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)

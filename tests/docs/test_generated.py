@@ -9,11 +9,13 @@ from types import ModuleType
 import pytest
 
 from motorbus.families.kst import Servo
-from scripts import feetech_registers, kst_reference, machine_file
+from scripts import feetech_registers, kst_reference, machine_file, stepper_reference
 
 
 @pytest.mark.parametrize(
-    "script", [machine_file, feetech_registers, kst_reference], ids=lambda one: one.__name__
+    "script",
+    [machine_file, feetech_registers, kst_reference, stepper_reference],
+    ids=lambda one: one.__name__,
 )
 def test_page_is_current(script: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.argv", [script.__name__, "--check"])

@@ -53,7 +53,7 @@ project = 2
 [motor]
 microsteps = 8
 step_angle = "1.8 deg"
-unit = "pulse"
+turn_distance = 1600
 [[step]]
 move = "1 turns"
 speed = "240 rpm"
@@ -148,8 +148,7 @@ def run_process(words: list[str], folder: Path) -> Ran:
 
 
 def shortened(line: str) -> str:
-    """The same for a shorter time, where it says one, and without most of the ids that nobody has."""
-    line = re.sub(r"^(motorbus set-id feetech.*)", r"\1 --among 1-9", line)
+    """The same for a shorter time, if it gives one, and fewer ids."""
     return re.sub(r"--seconds \d+", "--seconds 1", line).replace("--baud all", "--baud all --ids 1-6")
 
 

@@ -16,10 +16,10 @@ from motorbus.bus.policy import RETRIES
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Data
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown
-from motorbus.families.feetech import FAMILY, Servo, wire
-from motorbus.families.feetech.driver.exchanges import Block, acknowledged, write_block
+from motorbus.families.feetech import FAMILY, Servo, protocol
+from motorbus.families.feetech.driver.requests import Block, acknowledged, write_block
 from motorbus.families.kst.driver.requests import write_row
-from motorbus.families.stepper.table import ORDERS
+from motorbus.families.stepper import protocol as stepper
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.safety import Gate
 from tests.families.stepper.rig import Rig as StepperRig
@@ -55,13 +55,14 @@ def said_by(rig: Struck, act: Callable[[], Any]) -> tuple[Unanswered, MotorbusEr
 
 GOAL = 42
 STEP, GO, ID, BAUD, LOCK = (b"\x10\x00", b"\x00\x08", b"\x07", b"\x02", b"\x01")
+ONCE = Block(0, b"", repeatable=False)
 FEETECH_ONCE: dict[str, Callable[[Servo], Any]] = {
     "a relative move": lambda servo: write_block(servo, Block(GOAL, STEP, repeatable=False)),
-    "a write for later": lambda servo: acknowledged(servo, wire.reg_write(1, GOAL, GO)),
-    "the start of what waits": lambda servo: acknowledged(servo, wire.action(1)),
-    "a factory restore": lambda servo: acknowledged(servo, wire.factory_restore(1)),
-    "a calibration": lambda servo: acknowledged(servo, wire.calibrate(1)),
-    "forgetting turns": lambda servo: acknowledged(servo, wire.clear_turns(1)),
+    "a write for later": lambda servo: acknowledged(servo, protocol.reg_write(1, GOAL, GO), ONCE),
+    "the start of what waits": lambda servo: acknowledged(servo, protocol.action(1), ONCE),
+    "a factory restore": lambda servo: acknowledged(servo, protocol.factory_restore(1), ONCE),
+    "a calibration": lambda servo: acknowledged(servo, protocol.calibrate(1), ONCE),
+    "forgetting turns": lambda servo: acknowledged(servo, protocol.clear_turns(1), ONCE),
 }
 
 
@@ -102,7 +103,7 @@ def test_l18_a_change_of_id_or_baud_is_written_once(what: str, register: int) ->
     rig = Rig(ids=(1,))
 
     def is_it(data: bytes) -> bool:
-        return data[4:6] == bytes((wire.Instruction.WRITE, register))
+        return data[4:6] == bytes((protocol.Instruction.WRITE, register))
 
     rig.put(line := DeafTo(is_it))
     servo = Servo(
@@ -159,5 +160,5 @@ def test_l18_stepper_says_again_only_what_may_be(name: str) -> None:
     assert not ask(rig, name)
     assert line.lost > 0
     again = line.said.count(line.said[0]) > 1
-    assert again <= ORDERS[name].repeatable
-    assert ORDERS[name].repeatable or isinstance(rig.errors[-1], OutcomeUnknown)
+    assert again <= stepper.COMMANDS[name].repeatable
+    assert stepper.COMMANDS[name].repeatable or isinstance(rig.errors[-1], OutcomeUnknown)

@@ -13,8 +13,7 @@ from typing import NamedTuple
 import pytest
 
 from motorbus.core.request import Data
-from motorbus.families.stepper import wire
-from motorbus.families.stepper.table import EDITS, ORDERS
+from motorbus.families.stepper import protocol
 from motorbus.link.base import Delivery, PerfectLine, Side
 from tests.conftest import Figures
 from tests.families.stepper.rig import BYTE, KEPT, MOTIONS, STOPS, FalseWord, Rig
@@ -23,14 +22,14 @@ from tests.support.lines import ByteFault, ByteFaultLine
 
 EDGES = (0x00, 0x02, 0x5E, 0xEE, 0xFF)
 """Values that mean something somewhere in a reply."""
-COMMANDS = tuple(ORDERS)
+COMMANDS = tuple(protocol.COMMANDS)
 UNNAMED = ("set_segment_loop", "set_project_loop")
 """Their replies name a project that their requests do not: one that is none is an error, and not asked for again."""
 
 
 def ask(rig: Rig, name: str) -> bool:
     """Say this command once, with numbers drawn by lot, and judge what is told."""
-    if name in EDITS:
+    if protocol.COMMANDS[name].is_edit:
         return rig.edit(name)
     if name in KEPT or name in MOTIONS:
         return rig.keep(name) if name in KEPT else rig.motion(name)
@@ -45,7 +44,7 @@ def ask(rig: Rig, name: str) -> bool:
 
 
 def length_of(name: str) -> int:
-    return wire.DUMP_LENGTH if name == "read_project" else wire.REPLY_LENGTH
+    return protocol.DUMP_LENGTH if name == "read_project" else protocol.REPLY_LENGTH
 
 
 def every_fault(length: int, values: Iterable[int], places: Iterable[int] | None = None) -> list[ByteFault]:
@@ -89,7 +88,7 @@ def test_single_byte_faults_with_telling_values(name: str) -> None:
     total, succeeded, false = suffer(name, every_fault(length_of(name), EDGES), bytewise=True)
     assert false == []
     assert total == 6 * (2 + len(EDGES) - 1) + 7 * len(EDGES)
-    if ORDERS[name].repeatable and name not in STOPS:
+    if protocol.COMMANDS[name].repeatable and name not in STOPS:
         assert succeeded >= total - (name in UNNAMED), "what may be said again gets over any single fault"
     else:
         assert 0 < succeeded < total, "a byte too many in front does no harm"
@@ -141,7 +140,7 @@ class Inserting(PerfectLine):
     def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
         if sender is Side.DEVICE and isinstance(data, bytes) and not self.done:
             self.done = True
-            data = data[: self.place] + wire.NOTICE + data[self.place :]
+            data = data[: self.place] + protocol.NOTICE + data[self.place :]
         return super().carry(sender, data, at)
 
 
@@ -156,11 +155,11 @@ def test_a_notice_between_any_two_bytes_makes_no_value_and_no_acknowledgement(na
         rig.link.line = line = Inserting(place)
         done = ask(rig, name)
         assert line.done
-        assert done or not ORDERS[name].repeatable or name in STOPS
+        assert done or not protocol.COMMANDS[name].repeatable or name in STOPS
         assert done or 0 < place < whole, "before and behind a reply it is a notice like any other"
-        inside_a_dump = whole > wire.REPLY_LENGTH and 0 < place < whole
+        inside_a_dump = whole > protocol.REPLY_LENGTH and 0 < place < whole
         told = list(heard)
-        assert [one.data for one in told] in ([wire.NOTICE], []), "never more than there was"
+        assert [one.data for one in told] in ([protocol.NOTICE], []), "never more than there was"
         assert not (inside_a_dump and place > 5 and told), "what is inside a dump is no notice"
         rig.bus.notices.unsubscribe(heard)
         rig.link.line = PerfectLine()

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from math import nan, tau
+from math import nan
 from typing import Any
 
 from motorbus import stepper
 from motorbus.families.kst.profiles import SAVE
+from motorbus.families.stepper.parameters import encode_image
 from tests.golden.recording import Argument, Call, Case
 
 MODELS = {
@@ -24,10 +25,13 @@ VARIANTS = {"feetech": tuple(MODELS), "kst": PROFILES, "stepper": ("",)}
 
 EXCLUDED = {
     "feetech": {
-        "copyable": "lists table rows; sends nothing",
+        "forget_answers": "memory of the driver; sends nothing",
         "forget_settings": "memory of the driver; sends nothing",
-        "heard": "called by the driver with a reply",
+        "note_reply": "called by the driver with a reply",
+        "learn_settings": "called by the driver with settings that were read",
         "raw": "converts a value; sends nothing",
+        "refusal": "makes an error; sends nothing",
+        "row": "gives a table row; sends nothing",
         "value": "converts a value; sends nothing",
     },
     "kst": {
@@ -36,7 +40,6 @@ EXCLUDED = {
     },
     "stepper": {
         "raw": "converts a value; sends nothing",
-        "value": "converts a value; sends nothing",
     },
 }
 
@@ -52,6 +55,11 @@ def call(name: str, *args: Any, **kwargs: Any) -> Call:
 def shared(name: str, *args: Any, **kwargs: Any) -> Call:
     """A function of the family."""
     return Call(name, args, kwargs, on="family")
+
+
+def grouped(name: str, *args: Any, **kwargs: Any) -> Call:
+    """A method of a group of all devices."""
+    return Call(name, args, kwargs, on="group")
 
 
 # -- FEETECH ---------------------------------------------------------------------------------------------------------
@@ -72,7 +80,6 @@ FEETECH: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("read_raw", "present_position", "id"), "", PREPARED),
     (call("position"), "", PREPARED),
     (call("position"), "unprepared", ()),
-    (call("position", confirmed=True), "confirmed", PREPARED),
     (call("velocity"), "", PREPARED),
     (call("load"), "", PREPARED),
     (call("current"), "", PREPARED),
@@ -80,16 +87,15 @@ FEETECH: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("temperature"), "", PREPARED),
     (call("telemetry"), "", PREPARED),
     (call("alarms"), "", PREPARED),
-    (call("blockers"), "", PREPARED),
+    (call("why_not_moving"), "", PREPARED),
     (call("mode"), "", PREPARED),
     (call("zero"), "", PREPARED),
-    (call("many_turns"), "", PREPARED),
     (call("write", acceleration=10.0), "ram", PREPARED),
     (call("write", max_temperature=60.0), "eeprom", PREPARED),
     (call("write", goal_position=2.5), "goal", TORQUE_ON),
     (call("write", goal_position=99.0), "out_of_range", TORQUE_ON),
     (call("write", present_position=1.0), "read_only", PREPARED),
-    (call("rewrite", max_temperature=70.0), "", PREPARED),
+    (call("write", force=True, max_temperature=70.0), "force", PREPARED),
     (call("reg_write", goal_position=2.5), "", TORQUE_ON),
     (call("action"), "", (*TORQUE_ON, call("reg_write", goal_position=2.5))),
     (call("enable_torque"), "", PREPARED),
@@ -104,17 +110,19 @@ FEETECH: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("set_mode", "current"), "current", PREPARED),
     (call("set_velocity", 1.0, acceleration=5.0), "", VELOCITY),
     (call("set_velocity", 1.0), "wrong_mode", TORQUE_ON),
+    (call("jog", 1.0, 0.2), "", VELOCITY),
+    (call("jog", 1.0, 0.2), "wrong_mode", TORQUE_ON),
     (call("set_duty", 0.2), "", PWM),
     (call("set_current", 0.1), "", CURRENT),
     (call("step", 0.2, wait=False), "", STEP),
-    (call("set_id", 7, among=(1, 2, 3)), "", PREPARED),
-    (call("set_baud", 500_000, among=(1, 2, 3)), "", PREPARED),
+    (call("set_id", 7), "", PREPARED),
+    (call("set_baud", 500_000), "", PREPARED),
     (call("recover", "set_id", NO_FACTS), "no_facts", PREPARED),
     (call("factory_restore"), "", PREPARED),
     (call("calibrate"), "", PREPARED),
     (call("calibrate", 1.0), "to", PREPARED),
     (call("clear_turns"), "", PREPARED),
-    (call("set_many_turns", True), "on", PREPARED),
+    (call("set_multi_turn", True), "on", PREPARED),
     (call("cap_torque", 0.5), "", PREPARED),
     (call("cap_current", 0.5), "", PREPARED),
     (call("recover_overload"), "", TORQUE_ON),
@@ -124,18 +132,16 @@ FEETECH: list[tuple[Call, str, tuple[Call, ...]]] = [
 ]
 FEETECH_GROUP: list[tuple[Call, str]] = [
     (shared("prepare_all", DEVICES), ""),
-    (shared("read_positions", DEVICES), ""),
-    (shared("sync_read_positions", DEVICES), ""),
-    (shared("sync_read_states", DEVICES), ""),
-    (shared("sync_read_raw", 40, 2, DEVICES), ""),
+    (grouped("positions"), ""),
+    (grouped("read", "present_position", "present_velocity"), "group"),
     (
         shared(
             "sync_write", {1: {"goal_position": 2.5}, 2: {"goal_position": 2.6}, 3: {"goal_position": 2.7}}
         ),
         "",
     ),
-    (Call("sync_writer", (DEVICES, "goal_position"), {"values": (2.5, 2.6, 2.7)}, on="kept"), ""),
-    (shared("sync_write_positions", DEVICES, (2.5, 2.6, 2.7)), ""),
+    (grouped("write", "goal_position", values=(2.5, 2.6, 2.7)), "group"),
+    (grouped("write", "goal_position", "goal_velocity", values=[(2.5, 1.0)] * 3), "group_two"),
     (shared("reg_write_all", {1: {"goal_position": 2.5}, 2: {"goal_position": 2.6}}), ""),
     (shared("action_all"), ""),
     (shared("disable_torque_all", (1, 2, 3)), ""),
@@ -173,7 +179,7 @@ FEETECH_STATES: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("reg_write", goal_position=2.5), "not_acknowledged", (*SILENT, call("enable_torque"))),
     (call("position"), "offset", TURNED),
     (call("position"), "offset_in_velocity_mode", (*TURNED, *VELOCITY[:1])),
-    (call("move", 8.0, wait=False), "many_turns", (call("set_many_turns", True), call("enable_torque"))),
+    (call("move", 8.0, wait=False), "many_turns", (call("set_multi_turn", True), call("enable_torque"))),
     (call("position"), "resolution", (call("write", angular_resolution=2),)),
     (
         call("move", 5.0, wait=False),
@@ -236,24 +242,16 @@ FEETECH_GROUP_REFUSED: list[tuple[Call, str]] = [
     (shared("sync_write", {1: {"goal_position": 2.5}, 2: {"goal_position": nan}}), "nan"),
     (shared("sync_write", {1: {"goal_position": 2.5}, 2: {"goal_position": 99.0}}), "out_of_range"),
     (shared("sync_write", {1: {"max_temperature": 60.0}}), "eeprom"),
-    (shared("sync_write_positions", DEVICES, (2.5, 2.6)), "too_few"),
-    (shared("sync_write_positions", DEVICES, (2.5, 2.6, nan)), "nan"),
-    (Call("sync_writer", (DEVICES, "goal_position"), {"values": (2.5, 2.6)}, on="kept"), "too_few"),
-    (Call("sync_writer", (DEVICES, "goal_position"), {"values": (2.5, 2.6, nan)}, on="kept"), "nan"),
-    (
-        Call("sync_writer", (DEVICES, "goal_position"), {"values": {3: 2.5, 2: 2.6, 1: 2.7}}, on="kept"),
-        "no_order",
-    ),
+    (grouped("write", "goal_position", values=(2.5, 2.6)), "group_too_few"),
+    (grouped("write", "goal_position", values=(2.5, 2.6, nan)), "group_nan"),
+    (grouped("write", "goal_position", values={3: 2.5, 2: 2.6, 1: 2.7}), "group_no_order"),
     (shared("reg_write_all", {1: {"goal_position": 2.5}, 9: {"goal_position": 2.5}}), "one_silent"),
     (shared("sync_read", ("nonsense",), DEVICES), "unknown"),
     (shared("disable_torque_all", (1, 9)), "one_silent"),
 ]
 FEETECH_UNPREPARED: list[Call] = [
-    shared("read_positions", DEVICES),
-    shared("sync_read_positions", DEVICES),
-    shared("sync_read_states", DEVICES),
-    shared("sync_write_positions", DEVICES, (2.5, 2.6, 2.7)),
-    Call("sync_writer", (DEVICES, "goal_position"), {"values": (2.5, 2.6, 2.7)}, on="kept"),
+    grouped("positions"),
+    grouped("write", "goal_position", values=(2.5, 2.6, 2.7)),
 ]
 
 
@@ -408,7 +406,7 @@ start = "400 Hz"
 ALIVE = (call("ping"),)
 SELECTED = (call("ping"), call("select_project", 2, 2))
 WRITTEN = (call("write_project", PROGRAM),)
-BACKUP = stepper.Backup(dumps={2: PROGRAM.dump()})
+BACKUP = stepper.Backup(dumps={2: bytes.fromhex("ffaa3e020000") + encode_image(PROGRAM.project)})
 SWITCH_AT_HOME = {"home_switch": "wired", "home_at": -800}
 
 STEPPER: list[tuple[Call, str, tuple[Call, ...]]] = [
@@ -427,9 +425,10 @@ STEPPER: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("write_project", PROGRAM), "", ALIVE),
     (call("write_project", PROGRAM, save=False), "unsaved", ALIVE),
     (call("write", project=1, step_1_delay=0.5), "", ALIVE),
-    (call("select", 1), "", ALIVE),
     (call("save", 2), "", (call("write_project", PROGRAM, save=False),)),
     (call("clear", 3), "", ALIVE),
+    (call("save_project", 2), "", SELECTED),
+    (call("clear_project", 3), "", ALIVE),
     (call("start_project", 2), "", WRITTEN),
     (call("run", 2), "", WRITTEN),
     (call("stop"), "", ALIVE),
@@ -442,8 +441,6 @@ STEPPER: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("jog_forward", 0.5), "", ALIVE),
     (call("jog_reverse", 0.5), "", ALIVE),
     (call("move_by", 3.0, velocity=6.0), "", ALIVE),
-    (call("move_by", -tau, wait=False), "no_wait", ALIVE),
-    (call("move_by", 3.0, wait=False), "borrow_no_wait", ALIVE),
     (call("run_once"), "", ALIVE),
     (call("home", deadline=8.0), "", ALIVE),
     (call("home", deadline=8.0, velocity=12.0), "velocity", ALIVE),

@@ -27,7 +27,8 @@ Frames = list[list[Any]]
 
 class Call(NamedTuple):
     """A device command `name`; with `on="family"` a function of the family that is run on the bus, with `on="kept"` one
-    that gives a function to call in each cycle of a loop: `args` are its arguments, `kwargs["values"]` is one cycle."""
+    that gives a function to call in each cycle of a loop: `args` are its arguments, `kwargs["values"]` is one cycle.
+    With `on="group"` a method of a group of all devices, called with `args`, and its result with `kwargs["values"]`."""
 
     name: str
     args: tuple[Any, ...] = ()
@@ -81,8 +82,10 @@ class Bench:
     def run(self, call: Call) -> Any:
         args = [self._made(value) for value in call.args]
         kwargs = {name: self._made(value) for name, value in call.kwargs.items()}
-        if call.on == "kept":
-            return self.bus.run(getattr(self.family, call.name)(*args)(kwargs["values"]))
+        if call.on == "group":
+            made = getattr(self.family.ServoGroup(list(self.devices.values())), call.name)
+            made = made(*args) if args else made
+            return self.bus.run(made(kwargs["values"]) if kwargs else made)
         if call.on == "family":
             return self.bus.run(getattr(self.family, call.name)(*args, **kwargs))
         return getattr(next(iter(self.devices.values())), call.name)(*args, **kwargs)

@@ -12,8 +12,10 @@ import pytest
 
 import motorbus
 from motorbus import feetech
-from motorbus.families.feetech import wire
-from motorbus.families.feetech.table import CONTROL, TABLES
+from motorbus.core.request import Reply
+from motorbus.families.feetech import protocol
+from motorbus.families.feetech.registers import TABLES
+from motorbus.families.feetech.traits import TRAITS
 from motorbus.simulation.pty import PtyMaster
 from tests.interop.feetech import sdk
 from tests.interop.feetech.peer import NEW_SDK, OLD_SDK, RUSTYPOT, Library, Peer
@@ -69,7 +71,7 @@ def test_we_name_every_alarm_where_they_name_the_first(kind: Kind, folder: Path)
 
 @pytest.mark.parametrize("library", SDKS, ids=lambda library: library.name)
 def test_an_error_byte_above_0x7f_is_noise_to_them(library: Library, terminal: PtyMaster) -> None:
-    packet = wire.encode_status(1, UNDEFINED, b"\x02")
+    packet = protocol.frame(1, UNDEFINED, b"\x02")
     with Peer(library) as peer:
         one = Sdk(library, STS)
         sdk.prepare(peer, one, terminal.slave_name)
@@ -77,17 +79,15 @@ def test_an_error_byte_above_0x7f_is_noise_to_them(library: Library, terminal: P
         peer.tell("call", "handler", call.name, list(call.arguments))
         answer(terminal, packet)
         assert peer.heard()[1] in (TIMEOUT, CORRUPT)
-    status = wire.Splitter("status").feed(packet)
-    assert [(one.id, one.error, one.parameters) for one in status if isinstance(one, wire.StatusPacket)] == [
-        (1, UNDEFINED, b"\x02")
-    ]
+    assert protocol.receiver().feed(packet) == [Reply(0, 1, packet)]
+    assert protocol.decode(packet) == (1, UNDEFINED, b"\x02")
 
 
 def test_rustypot_takes_an_error_byte_above_0x7f(terminal: PtyMaster) -> None:
     with Peer(RUSTYPOT) as peer:
         peer.new("controller", "Sts3215PyController", terminal.slave_name, 1_000_000, 10.0)
         peer.tell("call", "controller", "read_raw_data_with_error", [1, 21, 1])
-        answer(terminal, wire.encode_status(1, UNDEFINED, b"\x02"))
+        answer(terminal, protocol.frame(1, UNDEFINED, b"\x02"))
         assert peer.heard() == [[2], UNDEFINED]
 
 
@@ -111,7 +111,7 @@ def test_the_newer_sdk_moves_a_servo_to_its_goal(kind: Kind, folder: Path) -> No
 def test_an_hls_moves_for_whoever_gives_it_a_torque(folder: Path) -> None:
     """The class for STS writes 0 there and it stays; the same burst with a current in it moves it."""
     goal = HLS.middle + 100
-    assert CONTROL["hls"].current == "goal_torque"
+    assert TRAITS["hls"].current == "goal_torque"
     row = TABLES["hls"]["goal_torque"]
     with Twin(folder, HLS) as twin, Peer(NEW_SDK) as peer:
         sdk.prepare(peer, Sdk(NEW_SDK, HLS), twin.port)

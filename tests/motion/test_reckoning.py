@@ -10,15 +10,23 @@ import pytest
 
 from motorbus import AsyncRobot, Interrupted, LimitExceeded, MotorbusError, NotHomed, RequestError, Robot
 from motorbus.core.steps import Sleep, catch, gather
+from motorbus.families.stepper.parameters import Project, Step, with_steps
 from motorbus.motion import capabilities as verbs
 from motorbus.motion import reckoning
 from motorbus.motion.parallel import Parallel
 from motorbus.motion.reckoning import Movement, Reckoning, is_reckoned
-from tests.families.stepper.runs import TURN
-from tests.families.stepper.runs import made as built
 from tests.support.machines import listened, machine, said
 
+TURN = Step(distance=1600, speed=60, start_frequency=400, acceleration=100)
+"""A turn in a little more than a second."""
 FAR = {"lift": {"low": "0 mm", "high": "2000 mm", "max_step": "500 mm"}}
+
+
+def built(step: Step) -> Project:
+    """Project 1 with this step; a unit is a pulse."""
+    return with_steps(
+        Project(number=1, microsteps=8, step_angle=180, turn_distance=1600, stop_mode=1), (step,)
+    )
 
 
 def test_it_begins_unknown_and_is_what_was_declared_and_what_came_after() -> None:

@@ -128,14 +128,8 @@ def test_a_place_to_park_beyond_the_device_is_refused_before_anything_moves(
         (
             "sm60-360m",
             {"min_position_limit": 0, "max_position_limit": 0},
-            "both position limits of node 1 are 0, and nobody has published what that means on smcl",
-            "a greatest position above the least",
-        ),
-        (
-            "sts3215",
-            {"firmware_major": 99},
-            "node 1 is STS3215 with firmware 99.10, whose register map is not described",
-            "a servo with one of the maps",
+            "node 1 has position limits of 0 and 0, which has no known meaning in its map",
+            "a device that tells its limits",
         ),
     ],
 )

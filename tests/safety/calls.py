@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from motorbus.core.steps import catch, gather
 from motorbus.errors import MotorbusError
-from motorbus.families.feetech import sync_write, sync_write_positions
+from motorbus.families.feetech import ServoGroup, sync_write
 from motorbus.families.kst import broadcast_write, settings_of
 from motorbus.session.robot import Robot
 from motorbus.simulation.named import Simulation
@@ -239,8 +239,8 @@ class Caller:
             values = {one: {"goal_position": first}, two: {"goal_position": second}}
             return Call("sync_write", lambda: bus.run(sync_write(values)), goals)  # type: ignore[arg-type]
         return Call(
-            "sync_write_positions",
-            lambda: bus.run(sync_write_positions([one, two], [first, second])),  # type: ignore[list-item]
+            "ServoGroup.write",
+            lambda: bus.run(ServoGroup([one, two]).write("goal_position")([first, second])),
             goals,
         )
 

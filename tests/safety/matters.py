@@ -14,7 +14,7 @@ from typing import Any
 import motorbus
 from motorbus.core.request import Effect, Request
 from motorbus.errors import MotorbusError
-from motorbus.families.feetech import action_all, sync_write, sync_write_positions, wire
+from motorbus.families.feetech import ServoGroup, action_all, protocol, sync_write
 from motorbus.families.kst import broadcast_write, settings_of
 from motorbus.motion.safety.lease import Lease
 from motorbus.session.robot import Robot
@@ -106,7 +106,7 @@ class Matters(Courses):
             lambda: device.reg_write(goal_position=goal),
             lambda: motorbus.feetech.Servo(bus, spot[1]).write(goal_position=goal),
             lambda: bus.run(sync_write({device: {"goal_position": goal}, other: {"goal_position": there}})),
-            lambda: bus.run(sync_write_positions([other, device], [there, goal])),
+            lambda: bus.run(ServoGroup([other, device]).write("goal_position")([there, goal])),
             lambda: self.robot[name].enable_torque(),
             lambda: device.enable_torque(),
         ]
@@ -251,7 +251,7 @@ class Matters(Courses):
         """Bytes to the goal register, of which nobody says what they mean."""
         node, goal = self.spot("arm")[1], self.chance.randrange(1 << 16)
         bus: Any = self.robot.buses["arm"]
-        request = wire.write(node, 42, goal.to_bytes(2, "little"))
+        request = protocol.write(node, 42, goal.to_bytes(2, "little"))
         return Call(
             "bytes",
             lambda: bus.run(Request[Any](request, (), lane=node, effect=Effect.MOTION)),

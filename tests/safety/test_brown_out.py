@@ -36,14 +36,14 @@ class Served(NamedTuple):
             assert client.makefile().readline() == "ok\n"
 
 
-@pytest.fixture(params=["yes", "no"])
+@pytest.fixture(params=["sts3215", "sm85blhv"])
 def served(
     request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[Served]:
     """Three servos in a process of their own, whose torque comes back with the next goal, or does not."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     control, file = tmp_path / "a.sock", tmp_path / "motorbus.toml"
-    switches: dict[str, Any] = {"control": str(control), "goal-enables-torque": str(request.param)}
+    switches: dict[str, Any] = {"control": str(control), "model": str(request.param), "servo-baud": "1000000"}
     with Simulated("feetech", ids="1-3", link=tmp_path / "arm", **switches) as arm:
         file.write_text(described({"arm": arm.bus}, "1-3", "", False, {}, {}), encoding="utf-8")
         yield Served(file, control)

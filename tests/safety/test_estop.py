@@ -18,10 +18,10 @@ from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Data, Effect, Request
 from motorbus.core.setpoint import Setpoint
 from motorbus.errors import MotorbusError
-from motorbus.families.feetech import wire as feetech
-from motorbus.families.feetech.driver.exchanges import read_block
+from motorbus.families.feetech import protocol as feetech
+from motorbus.families.feetech.driver.requests import read_block
 from motorbus.families.kst.driver.feedback import position
-from motorbus.families.stepper import wire as stepper
+from motorbus.families.stepper import protocol as stepper
 from tests.support.noisy_line import NoisyLine
 from tests.support.world import Bus, Queue
 

@@ -11,7 +11,7 @@ from motorbus.core.family import IdChanged
 from motorbus.core.request import Effect, Request, Response
 from motorbus.core.setpoint import Setpoint
 from motorbus.errors import LimitExceeded, NoReply, Refused
-from motorbus.families.feetech import sync_write_positions
+from motorbus.families.feetech import ServoGroup
 from motorbus.motion.safety.fence import bounds, follow
 from motorbus.motion.safety.gate import Gate
 from motorbus.motion.safety.guard import Bounds
@@ -93,7 +93,7 @@ def test_an_order_that_was_kept_is_looked_after_too_and_refused_once_nobody_answ
     with machine(arm="1") as (made, sims), Robot.of(made) as robot:
         axis = robot["a1"]
         axis.enable_torque()
-        kept = sync_write_positions([axis.device], [pi + 0.1])
+        kept = ServoGroup([axis.device]).write("goal_position")([pi + 0.1])
         axis.bus.run(kept)
         axis.bus.link.advance(2.0)
         axis.bus.run(kept)

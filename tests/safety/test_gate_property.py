@@ -27,7 +27,7 @@ ORDERS = (
     "write",
     "reg_write",
     "sync_write",
-    "sync_write_positions",
+    "ServoGroup.write",
     "broadcast",
     "two",
     "raw",

@@ -72,7 +72,9 @@ FACES: dict[str, Callable[[Robot], object]] = {
     "servo action": lambda robot: robot["a1"].device.action(),
     "servo velocity": lambda robot: robot["a1"].device.set_velocity(0.1),
     "can move": lambda robot: robot["c1"].device.move(0.1),
-    "sync write": lambda robot: _on(robot, "arm", feetech.sync_write_positions([_known(robot)], [3.14])),
+    "sync write": lambda robot: _on(
+        robot, "arm", feetech.ServoGroup([_known(robot)]).write("goal_position")([3.14])
+    ),
     "reg write all": lambda robot: _on(
         robot, "arm", feetech.reg_write_all({_known(robot): {"goal_position": 3.1}})
     ),

@@ -17,7 +17,7 @@ import motorbus
 from motorbus.core.request import Data
 from motorbus.core.steps import Sleep
 from motorbus.errors import LimitExceeded, MotorbusError, Refused, RequestError
-from motorbus.families.feetech import sync_write, sync_write_positions
+from motorbus.families.feetech import ServoGroup, sync_write
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.safety.standstill import Rest, stopped
 from motorbus.session.robot import Robot
@@ -56,7 +56,7 @@ def test_01_torque_on_moves_by_a_count_at_most(node: int) -> None:
 
 def test_02_unknown_is_not_safe_and_a_stop_is_allowed_all_the_same() -> None:
     with machine(arm="1") as (made, sims), Robot.of(made) as robot:
-        kept = sync_write_positions([known(robot["a1"])], [pi + 0.1])
+        kept = ServoGroup([known(robot["a1"])]).write("goal_position")([pi + 0.1])
         sims["arm"][1].unplug()
         with pytest.raises(Refused) as caught:
             robot.buses["arm"].run(kept)  # type: ignore[attr-defined]
@@ -75,7 +75,7 @@ def spellings(robot: Any, to: float) -> dict[str, Callable[[], object]]:
         "the device": lambda: device.move(to, velocity=1.0, wait=False),
         "a register": lambda: device.write(goal_position=to),
         "a group": lambda: bus.run(sync_write({device: {"goal_position": to}})),
-        "a prepared group": lambda: bus.run(sync_write_positions([device], [to])),
+        "a prepared group": lambda: bus.run(ServoGroup([device]).write("goal_position")([to])),
         "a buffer": lambda: device.reg_write(goal_position=to),
         "another object": lambda: motorbus.feetech.Servo(bus, 1).move(to, velocity=1.0, wait=False),
     }

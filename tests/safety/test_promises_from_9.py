@@ -10,7 +10,7 @@ import pytest
 import motorbus
 from motorbus.core.steps import Emit
 from motorbus.errors import Faulted, LimitExceeded, MotorbusError, Overloaded, Refused, RequestError
-from motorbus.families.feetech import action_all, reg_write_all, sync_write_positions
+from motorbus.families.feetech import ServoGroup, reg_write_all
 from motorbus.motion.safety.gate import Gate
 from motorbus.session.robot import Robot
 from tests.conformance.cuts import Kind, violations
@@ -111,7 +111,7 @@ def test_13_a_synchronous_move_is_all_or_nothing(wrong: float) -> None:
         for values in ([pi, pi, pi + wrong], [pi + wrong, pi, pi]):
             devices = [robot[name].device for name in ("a1", "a2", "a3")]
             with pytest.raises(LimitExceeded):
-                robot.buses["arm"].run(sync_write_positions(devices, values))  # type: ignore[attr-defined]
+                robot.buses["arm"].run(ServoGroup(devices).write("goal_position")(values))  # type: ignore[attr-defined]
         assert [data for data in sent(sims) if not asks(data)] == []
 
 
@@ -122,8 +122,6 @@ def test_13_buffered_writes_are_released_by_all_acknowledgements_or_not_at_all()
         sims["arm"][2].unplug()
         with pytest.raises(MotorbusError):
             robot.buses["arm"].run(reg_write_all({one: {"goal_position": pi + 0.1} for one in devices}))  # type: ignore[attr-defined]
-        sims["arm"][2].plug()
-        robot.buses["arm"].run(action_all())  # type: ignore[attr-defined]  # and if somebody released them all the same
         robot.buses["arm"].link.advance(2.0)  # type: ignore[attr-defined]
         assert [sims["arm"][node].raw_position for node in (1, 2, 3)] == [2048] * 3
 

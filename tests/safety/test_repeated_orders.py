@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from motorbus.errors import LimitExceeded
-from motorbus.families.feetech import sync_read_positions, sync_write_positions, sync_writer
+from motorbus.families.feetech import ServoGroup
 from motorbus.session.robot import Robot
 from tests.safety.points import known, sent
 from tests.support.machines import listened, machine
@@ -19,7 +19,7 @@ AXES = {name: {"low": "-60 deg", "high": "60 deg", "max_step": "15 deg"} for nam
 SYNC_WRITE = 0x83
 WAYS: dict[str, Callable[[Any, Any, Any], object]] = {
     "alone": lambda bus, order, nodes: bus.run(order),
-    "with a read": lambda bus, order, nodes: bus.exchange((order, sync_read_positions(nodes))),
+    "with a read": lambda bus, order, nodes: bus.exchange((order, ServoGroup(nodes).positions)),
 }
 
 
@@ -38,7 +38,7 @@ def ordered() -> Iterator[tuple[Any, Any, Any, Any]]:
     with machine(arm="1-2", axes=AXES) as (made, sims), Robot.of(made) as robot:
         listened(sims)
         nodes = [known(robot["a1"]), known(robot["a2"])]
-        writer = sync_writer(nodes, "goal_position")
+        writer = ServoGroup(nodes).write("goal_position")
         robot.positions()
         robot.buses["arm"].run(writer([pi, pi]))  # type: ignore[attr-defined]
         robot.positions()
@@ -76,7 +76,7 @@ def test_a_limit_of_the_device_inside_that_of_the_axis_counts() -> None:
             bus: Any = robot.buses["arm"]
             device = known(robot["a1"])
             robot.positions()
-            bus.run(sync_write_positions([device], [pi + 0.02]))
+            bus.run(ServoGroup([device]).write("goal_position")([pi + 0.02]))
             robot.positions()
             with pytest.raises(LimitExceeded):
-                bus.run(sync_write_positions([device], [pi + 0.4]))
+                bus.run(ServoGroup([device]).write("goal_position")([pi + 0.4]))

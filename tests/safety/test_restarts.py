@@ -186,9 +186,13 @@ def test_nothing_that_moves_it_or_gives_it_torque_leaves_after_the_fault_was_see
         assert not sim[1].memory["torque_enable"]
 
 
-@pytest.mark.parametrize("comes_back", ["yes", "no"])
-def test_in_a_quick_movement_the_fault_is_seen_before_it_is_taken_for_a_stall(comes_back: str) -> None:
-    options = {"arm": {"goal_enables_torque": comes_back}}
+RETURNS = {"sts3215": True, "sm85blhv": False}
+"""Model -> whether a goal switches its torque on."""
+
+
+@pytest.mark.parametrize("model", RETURNS)
+def test_in_a_quick_movement_the_fault_is_seen_before_it_is_taken_for_a_stall(model: str) -> None:
+    options = {"arm": {"model": model, "servo_baud": 1_000_000}}
     for moment in (0.30, 0.34, 0.38, 0.42, 0.46):
         with (
             machine(arm="1-2", options=options, max_velocity="240 deg/s") as (made, sims),
@@ -200,9 +204,9 @@ def test_in_a_quick_movement_the_fault_is_seen_before_it_is_taken_for_a_stall(co
                 robot.move({"a1": 2.0, "a2": 2.0})
 
 
-@pytest.mark.parametrize("comes_back", ["yes", "no"])
-def test_torque_that_comes_back_with_the_next_goal_hides_no_restart(comes_back: str) -> None:
-    options = {"arm": {"goal_enables_torque": comes_back}}
+@pytest.mark.parametrize("model", RETURNS)
+def test_torque_that_comes_back_with_the_next_goal_hides_no_restart(model: str) -> None:
+    options = {"arm": {"model": model, "servo_baud": 1_000_000}}
     with machine(arm="1-2", options=options) as (made, sims), Robot.of(made) as robot:
         sim, bus = sims["arm"], robot.buses["arm"]
         line = sim.line = At(bus.link.now() + 0.7, sim[1].power_cycle)
@@ -210,7 +214,7 @@ def test_torque_that_comes_back_with_the_next_goal_hides_no_restart(comes_back: 
             robot.move({"a1": 0.6, "a2": 0.6}, duration=2.0)
         assert told.value.reason == "restart"
         assert bus.link.now() - line.moment < 2 * HEALTH
-        assert bool(sim[1].memory["torque_enable"]) is (comes_back == "yes")
+        assert bool(sim[1].memory["torque_enable"]) is RETURNS[model]
 
 
 class Boots(At):

@@ -17,7 +17,7 @@ from motorbus import families
 from motorbus.core.family import Quality
 from motorbus.core.request import Data
 from motorbus.errors import MotorbusError
-from motorbus.families.feetech.table import SCS_COUNT
+from motorbus.families.feetech.registers.rows import SCS_COUNT
 from motorbus.link.base import Delivery, Side
 from motorbus.motion.safety.standstill import READS, SPAN, STILL, Rest, Standstill, Stopped, seen, stopped
 from motorbus.motion.safety.track import Sample

@@ -250,9 +250,9 @@ def test_an_unfinished_change_is_told_at_open_and_hinders_nothing_else() -> None
 
 def test_nothing_of_a_simulated_bus_is_on_the_disk(path: Path) -> None:
     with motorbus.open("feetech:sim,ids=3") as bus:
-        motorbus.feetech.Servo(bus, 3).set_id(7, among=[3])
+        motorbus.feetech.Servo(bus, 3).set_id(7)
     with motorbus.simulate("feetech", ids="3") as simulation, motorbus.open(simulation.url) as bus:
-        motorbus.feetech.Servo(bus, 3).set_id(7, among=[3])
+        motorbus.feetech.Servo(bus, 3).set_id(7)
     assert not list(state_folder().glob("*.journal"))
 
 

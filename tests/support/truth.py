@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Mapping
+from math import inf
 from typing import Any, NamedTuple
 
 from motorbus.core.family import Simulator
@@ -104,7 +105,10 @@ def _piece(node: Any) -> tuple[object, Callable[[float], float]]:
     """What moves it now, and where that is at a moment."""
     if hasattr(node, "shaft"):
         return node.shaft.motion, node.shaft.motion.position
-    if hasattr(node, "travel"):
-        state, offset = node.state, node.travel.offset
-        return state, lambda at: state.position(at) + offset
+    if hasattr(node, "machine"):
+        machine, start = node.machine, node.machine.base + node.offset
+        move, since, until = machine.motion, machine.since, machine.until
+        if move is None:
+            return "rest", lambda at: start
+        return move, lambda at: start + move.sign * move.done((inf if at >= until else at) - since)
     return node.motion, node.motion.position

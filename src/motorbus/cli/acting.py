@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from motorbus.cli import dry
 from motorbus.cli.consent import consent_to
-from motorbus.cli.exits import Unforeseeable
 from motorbus.cli.identity import carried_out
 from motorbus.cli.target import face, takes
 
@@ -35,11 +34,7 @@ def acted(
     takes(one, verb, extra)
     rehearse = partial(getattr(one, verb), *args, **extra)
     if dry_run:
-        try:
-            rehearse()
-        except Unforeseeable as error:
-            output.note(f"note: {error.summary}; what is shown is as far as it can be foreseen")
-        dry.show(rehearsal, output)
+        dry.rehearse(rehearsal, rehearse, output)
         return None
     consent_to(question, output, yes=not question, rehearse=rehearse)
     return carried_out(bus, node, verb, *args, output=output, **extra)

@@ -33,7 +33,6 @@ Examples:
 
     motorbus calibrate feetech:/dev/ttyACM0#3 --yes
     motorbus calibrate feetech:/dev/ttyACM0#3 --to 90deg --yes
-    motorbus calibrate feetech:/dev/ttyACM0#3 --to 0 --how offset --yes
     motorbus calibrate feetech:/dev/ttyACM0#3 --show
     motorbus calibrate feetech:/dev/ttyACM0#3 --dry-run""",
 )
@@ -45,7 +44,6 @@ def calibrate(
     /,
     *,
     to: str = "",
-    how: str = "",
     show: Flag = False,
     yes: Flag = False,
     dry_run: DryRun = False,
@@ -60,8 +58,6 @@ def calibrate(
         FAMILY:PORT#ID, as feetech:/dev/ttyACM0#3
     to
         What it shall read, in rad or as 90deg; the middle of its turn when left out.
-    how
-        The way to do it, where a device has several: for feetech auto, switch, instruction or offset.
     show
         Only tell where its zero is.
     yes
@@ -71,9 +67,9 @@ def calibrate(
     """
     bus, family, (node,) = device(device_)
     offers(family, "calibrate")
-    if show and (to or how or dry_run):
-        raise RequestError("--show only reads", expected="no --to, --how or --dry-run beside it")
-    wanted = {**({"to": units.parse(to, "position")} if to else {}), **({"how": how} if how else {})}
+    if show and (to or dry_run):
+        raise RequestError("--show only reads", expected="no --to or --dry-run beside it")
+    wanted = {"to": units.parse(to, "position")} if to else {}
     with opened(bus, options, output) as opening:
         one = face(opening, node)
         if show:
@@ -92,8 +88,7 @@ def _calibrated(one: Any, wanted: Mapping[str, Any], output: Output, *, yes: boo
     rehearsal = dry.DryBus(one.bus)
     rehearse = partial(face(rehearsal, one.node).calibrate, **wanted)
     if dry_run:
-        rehearse()
-        dry.show(rehearsal, output)
+        dry.rehearse(rehearsal, rehearse, output)
         return None
     what = f"move the zero of #{one.node} for good, and let it go limp"
     consent_to(what, output, yes=yes, rehearse=rehearse)

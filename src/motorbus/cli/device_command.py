@@ -73,9 +73,7 @@ class DeviceCommand(Generic[D]):
                 agreed = self.yes or not question
                 consent_to(f"{self.label}: {question}", self.output, yes=agreed, rehearse=rehearse)
                 return action(self.kind(bus, self.node))
-            result = rehearse()
-        dry.show(rehearsal, self.output)
-        return result
+            return dry.rehearse(rehearsal, rehearse, self.output)  # type: ignore[return-value]
 
     def show(self, facts: Mapping[str, object], text: str = "", **columns: str) -> Exit:
         """Show the result: as JSON, or as text or a table. A dry run has none."""

@@ -203,6 +203,17 @@ def _answering(exchange: Request[Any]) -> set[int]:
     return set() if exchange.expected is ANY else {due.node for due in exchange.expected}
 
 
+def rehearse(dry: DryBus, work: Callable[[], T], output: Output) -> T | None:
+    """Run `work` on this bus and show what was withheld, as far as it can be foreseen."""
+    result = None
+    try:
+        result = work()
+    except Unforeseeable as error:
+        output.note(f"note: {error.summary}; what is shown is as far as it can be foreseen")
+    show(dry, output)
+    return result
+
+
 def show(dry: DryBus, output: Output) -> None:
     """Print what was withheld, each frame explained; that there was nothing, where that is so."""
     explained = [(one, _meaning(one)) for frame in dry.frames for one in dry.driver.decode(frame)]

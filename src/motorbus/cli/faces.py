@@ -18,10 +18,6 @@ common commands it may offer
     planned(event)                                             what an event of `write` says of what is about to be
                                                                written and what that takes, "" if nothing
     written(told)                                              what `write` returned, as plain data
-    torque_after_write(one, values)                            what a write of these registers does to the torque,
-                                                               for the question before it, "" if nothing
-    torque_told(event)                                         what an event of `write` says of the torque after it:
-                                                               {"on", "why", "text"}, None if nothing
     CUT_OFF                                                    what to do about a change that was cut off, where no
                                                                journal is kept
     COMMANDS                                                   what errors call -> the command that does the same

@@ -31,14 +31,9 @@ def id_said(text: str) -> int:
         ) from None
 
 
-def said_of_others(among: str, timeout: str) -> dict[str, object]:
-    """--among and --timeout as the verbs take them, where they were said. Raises RequestError."""
-    from motorbus import session
-
-    return {
-        **({"among": session.parse_ids(among)} if among else {}),
-        **({"timeout": units.parse(timeout, "time")} if timeout else {}),
-    }
+def parse_timeout(timeout: str) -> dict[str, object]:
+    """--timeout as an argument of a verb, if it is given. Raises RequestError."""
+    return {"timeout": units.parse(timeout, "time")} if timeout else {}
 
 
 def rehearsed(

@@ -12,7 +12,7 @@ from motorbus.cli.consent import consent_to
 from motorbus.cli.exits import Exit, Unforeseeable
 from motorbus.cli.identity import address, carried_out
 from motorbus.cli.parameters import DryRun, Flag, Silent
-from motorbus.cli.target import face, offers, opened, takes, target
+from motorbus.cli.target import face, offers, opened, target
 from motorbus.core.steps import OUTCOME, JournalEntry
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.journal import Change
@@ -33,16 +33,14 @@ app = App(
 killed or the power goes in the middle, this finds the device, finishes the
 change or takes it back, and says which: a servo is locked again, a stepper
 controller is told to stop and has its project 1 back. It may be said again at
-any time. A device that answers under no id any more hears broadcasts at the
-most: --alone allows them, when it is the only one on its bus. --forget gives
-the change up without touching the device, as when it is gone. --of is for a
-port that has another name since, as after the adapter was plugged in again.
+any time. --forget gives the change up without touching the device, as when it
+is gone. --of is for a port that has another name since, as after the adapter
+was plugged in again.
 
 Examples:
 
     motorbus recover
     motorbus recover feetech:/dev/ttyACM0 --yes
-    motorbus recover feetech:/dev/ttyACM0 --alone --yes
     motorbus recover stepper:/dev/ttyUSB0 --yes
     motorbus recover feetech:/dev/ttyACM1 --of feetech:/dev/ttyACM0 --yes
     motorbus recover feetech:/dev/ttyACM0 --forget --yes""",
@@ -56,7 +54,6 @@ def recover(
     bus: Annotated[str, Parameter(name="BUS")] = "",
     /,
     *,
-    alone: Flag = False,
     forget: Flag = False,
     of: str = "",
     yes: Flag = False,
@@ -70,8 +67,6 @@ def recover(
     ----------
     bus
         FAMILY:PORT, as feetech:/dev/ttyACM0; every unfinished change is listed when left out.
-    alone
-        The device is the only one on this bus, so it may be called by broadcast.
     forget
         Give the change up: nothing is sent, and the bus may be changed again.
     of
@@ -82,7 +77,7 @@ def recover(
         Any option of the bus string, as a flag.
     """
     if not bus:
-        return _listed(output, more=bool(alone or forget or of or dry_run or options))
+        return _listed(output, more=bool(forget or of or dry_run or options))
     bus, family, _ = target(bus)
     _keeps_journals(family)
     if forget:
@@ -91,15 +86,11 @@ def recover(
         change = _unfinished(opening, kept)
         if change is None:
             return _nothing(of or bus, output)
-        extra = {"alone": True} if alone else {}
-        takes(face(opening, change.node), "recover", extra)
         if dry_run:
-            _rehearsed(opening, change, output, **extra)
+            _rehearsed(opening, change, output)
             return Exit.OK
         consent_to(_ending(change), output, yes=yes)
-        outcome = carried_out(
-            opening, change.node, "recover", change.verb, change.facts, output=output, **extra
-        )
+        outcome = carried_out(opening, change.node, "recover", change.verb, change.facts, output=output)
         _closed(kept, change, outcome)
     return _told(bus, change, outcome, output, family)
 

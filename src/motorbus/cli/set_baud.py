@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, Parameter
 
 from motorbus.cli.exits import Exit, Partial
-from motorbus.cli.identity import address, agreed, carried_out, rehearsed, said_of_others
+from motorbus.cli.identity import address, agreed, carried_out, parse_timeout, rehearsed
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.target import everyone, face, offers, opened, takes, target
 from motorbus.cli.wording import in_words_of_the_shell
@@ -41,7 +41,6 @@ def set_baud(
     rate: Annotated[str, Parameter(name="RATE")],
     /,
     *,
-    among: str = "",
     timeout: str = "",
     yes: Flag = False,
     dry_run: DryRun = False,
@@ -56,8 +55,6 @@ def set_baud(
         FAMILY:PORT for every device that answers, or FAMILY:PORT#IDS for some.
     rate
         In bit/s, as 500000, 500k or 1M.
-    among
-        Ids that other devices on this bus may have, as 1-20; every id is asked when left out.
     timeout
         How long to wait for a power cycle, where one is needed; 120s when left out.
     yes
@@ -68,12 +65,10 @@ def set_baud(
     bus, family, named = target(devices)
     offers(family, "set_baud")
     wanted = units.rate(rate)
-    extra = said_of_others(among, timeout)
+    extra = parse_timeout(timeout)
     with opened(bus, options, output) as opening:
         nodes = everyone(bus, opening, named, output)
         takes(face(opening, nodes[0]), "set_baud", extra)
-        if not named and not among:  # everyone has been asked just now
-            extra |= _among(opening, nodes)
         if dry_run:
             rehearsed(opening, nodes, "set_baud", wanted, extra, output)
             return Exit.OK
@@ -83,14 +78,6 @@ def set_baud(
             agreed(opening, nodes[0], "set_baud", wanted, extra, what, output)
         done, errors = _each(opening, nodes, wanted, extra, output, bus)
     return _told(bus, opening, done, errors, wanted, output)
-
-
-def _among(bus: Bus, nodes: tuple[int, ...]) -> dict[str, object]:
-    try:
-        takes(face(bus, nodes[0]), "set_baud", ["among"])
-    except MotorbusError:
-        return {}
-    return {"among": nodes}
 
 
 def _each(

@@ -7,7 +7,7 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from motorbus.cli.exits import Exit
-from motorbus.cli.identity import address, agreed, carried_out, id_said, rehearsed, said_of_others
+from motorbus.cli.identity import address, agreed, carried_out, id_said, parse_timeout, rehearsed
 from motorbus.cli.parameters import DryRun, Flag, Silent
 from motorbus.cli.target import device, face, id_shown, offers, opened, takes
 
@@ -22,7 +22,7 @@ one. A device with torque goes limp. What is cut off in the middle is ended by
 Examples:
 
     motorbus set-id feetech:/dev/ttyACM0#1 7
-    motorbus set-id feetech:/dev/ttyACM0#1 7 --yes --among 1-20
+    motorbus set-id feetech:/dev/ttyACM0#1 7 --yes
     motorbus set-id kst:can://slcan/dev/ttyACM0#0x25 0x26 --timeout 60s
     motorbus set-id feetech:/dev/ttyACM0#1 7 --dry-run""",
 )
@@ -34,7 +34,6 @@ def set_id(
     new: Annotated[str, Parameter(name="NEW")],
     /,
     *,
-    among: str = "",
     timeout: str = "",
     yes: Flag = False,
     dry_run: DryRun = False,
@@ -49,8 +48,6 @@ def set_id(
         FAMILY:PORT#ID, as feetech:/dev/ttyACM0#1
     new
         Its new id, which nobody may have.
-    among
-        Ids that other devices on this bus may have, as 1-20; every id is asked when left out.
     timeout
         How long to wait for a power cycle, where one is needed; 120s when left out.
     yes
@@ -62,7 +59,7 @@ def set_id(
     offers(family, "set_id")
     wanted = id_said(new)
     family.devices.blocking(None, wanted)  # raises when it is no id
-    extra = said_of_others(among, timeout)
+    extra = parse_timeout(timeout)
     with opened(bus, options, output) as opening:
         takes(face(opening, node), "set_id", extra)
         if dry_run:

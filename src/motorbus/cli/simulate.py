@@ -36,7 +36,7 @@ app = App(
 removes its link and its control socket. Told no way to the bus, it says which
 pseudo-terminal it has made. --tcp without a host binds 127.0.0.1; there is no
 login. The control socket takes one order a line and replies with JSON:
-status, power-cycle [ID], unplug ID, plug ID, supply ID VOLTS, heat ID CELSIUS,
+status, power-cycle [ID], unplug ID, plug ID, supply ID VOLTS, heat ID DEGREES,
 set-input ID INPUT on|off, faults [SCRIPT|off], help, and for the shaft of a
 FEETECH servo block ID [LOW HIGH], push ID ANGLE, load ID PERCENT, release ID
 (of a KST servo load and release).

@@ -191,7 +191,11 @@ def check_names(family: Family, names: Iterable[str]) -> None:
     tables = list(family.registers.values())
     for name in names:
         if not any(name in table for table in tables):
-            tables[0][name]
+            try:
+                tables[0][name]
+            except RequestError as error:
+                error.summary = f"{family.name} devices have no register {name!r}"
+                raise
 
 
 def everyone(name: str, bus: Bus, nodes: tuple[int, ...], output: Output) -> tuple[int, ...]:

@@ -24,7 +24,6 @@ COMMANDS: Final[Mapping[str, str]] = {
     "set_id()": "`motorbus set-id`",
     "set_baud()": "`motorbus set-baud`",
     "recover()": "`motorbus recover BUS`",
-    "recover(alone=True)": "`motorbus recover BUS --alone`",
     "speed=0.5": "`--speed 50%`",
     "smoothed(5)": "`--smooth 5`",
 }

@@ -37,8 +37,7 @@ something, and sends none of those.
 
 A FEETECH servo has no torque while its EEPROM is written, so an arm sags. It
 gets its torque back where it is then, unless what a goal means has changed,
-it stands outside its limits, or it was stopped or does not answer: the
-question and the result say when the torque stays off.
+it stands outside its limits, or it was stopped or does not answer.
 
 Examples:
 
@@ -96,23 +95,19 @@ def write(
         orders = _orders(one, wanted, raw)
         values = {order.entry.name: order.value for order in orders}
         tell = _Plan(opening, output)
-        rehearse = partial(_write, face(rehearsal, node), values, tell)
+        rehearse = partial(_write, face(rehearsal, node), values, tell.plan)
         memory = faces.offer(family.name, "KEPT") or Storage.EEPROM.value
-        torque = faces.offer(family.name, "torque_after_write")
         kept = [order.entry.name for order in orders if order.entry.storage is Storage.EEPROM]
-        after = torque(one, values) if kept and torque and (dry_run or not yes) else ""
-        what = f"write {', '.join(kept)} to {memory}, where it survives power-off" + (after and f"; {after}")
+        what = f"write {', '.join(kept)} to {memory}, where it survives power-off"
         with quantity.as_typed({node: assignments[0]} if len(assignments) == 1 else {}):
             _permit(orders, output, rehearse, what=what if kept else "", expert=expert, yes=yes or dry_run)
             ways = goals_among(one, [order.entry for order in orders], values)
             consent_to_ways(ways, output, yes=yes or dry_run, rehearse=rehearse)
-            told = _write(one, values, tell)
+            told = _write(one, values, tell.plan if dry_run else tell)
     if dry_run:
         dry.show(rehearsal, output)
-        if after:
-            output.note(f"note: {after}; the frame for that is made from what is read then")
     else:
-        _show(one, orders, told, tell.torque, output)
+        _show(one, orders, told, output)
     return Exit.OK
 
 
@@ -124,22 +119,21 @@ class _Plan:
         self._report = bus.report
         self._output = output
         self._said = False
-        self._torque = faces.offer(bus.family.name, "torque_told")
-        self.torque: dict[str, Any] | None = None
 
     def __call__(self, event: object) -> None:
-        if self._torque is not None and (torque := self._torque(event)):
-            self.torque = torque
-            return
+        if not self.plan(event) and self._report is not None:
+            self._report(event)
+
+    def plan(self, event: object) -> bool:
+        """Print what is about to be written, once; whether the event says that."""
         text = self._planned(event) if self._planned is not None else ""
         if text and not self._said:
             self._said = True
             self._output.text(text)
-        elif not text and self._report is not None:
-            self._report(event)
+        return bool(text)
 
 
-def _write(one: Any, values: Mapping[str, Value], tell: Callable[[object], None]) -> Any:
+def _write(one: Any, values: Mapping[str, Value], tell: Callable[[object], object]) -> Any:
     """What the verb returns, None of most families."""
     return one.bus.run(type(one).write.function(one, **values), report=tell)
 
@@ -220,19 +214,13 @@ def _permit(
         consent_to(what, output, yes=yes, rehearse=rehearse)
 
 
-def _show(
-    one: Any, orders: Sequence[Order], told: Any, torque: dict[str, Any] | None, output: Output
-) -> None:
+def _show(one: Any, orders: Sequence[Order], told: Any, output: Output) -> None:
     rows = registers.facts(
         one, [order.entry for order in orders], {order.entry.name: order.value for order in orders}
     )
     written = faces.offer(one.bus.family.name, "written")
     facts = {} if written is None else {"result": written(told)}
-    if torque is not None:
-        facts["torque"] = {"on": torque["on"], "why": torque["why"]}
     output.document("motorbus.write/1", {"id": one.node, "registers": rows, **facts})
     registers.show(f"Written to #{one.node}", rows, output)
     if written is not None:
         output.text(str(told))
-    if torque is not None:
-        output.text(torque["text"])

@@ -26,6 +26,7 @@ class MoveLogic(Generic[D]):
 
     tolerance: float = 0.01  # rad
     slowest: float = 1.0  # rad/s that each device reaches
+    stall_time: float = STALL_TIME  # s
 
     @abstractmethod
     async def check(self, device: D, to: float) -> Setpoint:
@@ -125,7 +126,7 @@ async def wait_in_position(
             return
         if abs(here - mark) >= PROGRESS:
             mark, progressed = here, state.at
-        elif state.at - progressed > STALL_TIME and not looks:
+        elif state.at - progressed > logic.stall_time and not looks:
             raise logic.stalled(device, state, goal)
         if state.at - begun > longest:
             raise MotionError(

@@ -68,8 +68,8 @@ WORDS: Final = {
     "push": Word("ANGLE", "push_shaft", (_ANGLE,)),
     "load": Word("PERCENT", "load_shaft", (_quantity("load", "50%"),)),
     "release": Word("", "release_shaft"),
-    "supply": Word("VOLTS", "voltage", (_quantity("voltage", "7.4V"),)),
-    "heat": Word("CELSIUS", "temperature", (_quantity("temperature", "75C"),)),
+    "supply": Word("VOLTS", "voltage", (partial(units.parse, quantity="voltage"),)),
+    "heat": Word("DEGREES", "temperature", (partial(units.parse, quantity="temperature"),)),
     "set-input": Word("INPUT on|off", "set_input", (_number, _switch)),
 }
 HELP: Final = " | ".join(

@@ -1,6 +1,6 @@
-"""Every command that writes, with --dry-run, to servos nobody has asked yet, of every map and of none: nothing is sent.
+"""Every command that writes, with --dry-run, to servos of every map and of none: nothing is sent.
 
-They acknowledge nothing (status return level 0), so that no reply tells whom a write was meant for.
+They acknowledge nothing (status return level 0), so no reply identifies the receiver of a write.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import pytest
 
 import motorbus
 from tests.cli.conftest import Run
-from tests.families.feetech.maps import MODELS
+from tests.cli.feetech.models import MODELS
 
 COMMANDS = """
 write BUS#1 max_temperature=65
@@ -28,7 +28,7 @@ set-baud BUS#1 500k
 recover BUS
 calibrate BUS#1
 calibrate BUS#1 --to 90deg
-feetech factory-restore BUS#1
+feetech reset BUS#1
 feetech mode BUS#1 position
 feetech mode BUS#1 velocity
 feetech mode BUS#1 pwm
@@ -37,12 +37,12 @@ feetech mode BUS#1 current
 feetech recover-overload BUS#1
 """.strip().splitlines()
 ALWAYS = ("torque on", "stop", "calibrate", "set-id", "feetech mode")
-NOBODY = {"firmware": "9.9"}
+UNKNOWN = {"firmware": "9.9"}
 
 
-@pytest.mark.parametrize("name", [*MODELS, "nobody's"])
+@pytest.mark.parametrize("name", [*MODELS, "unknown"])
 def test_it_sends_nothing_and_has_no_defect(name: str, run: Run, state_folder: Path) -> None:
-    model, options = MODELS.get(name, "sts3215"), {} if name in MODELS else NOBODY
+    model, options = MODELS.get(name, "sts3215"), {} if name in MODELS else UNKNOWN
     with motorbus.simulate("feetech", ids="1-2", model=model, servo_baud=1_000_000, **options) as servos:
         for one in (servos[1], servos[2]):
             one.memory["status_return_level"] = 0
@@ -56,7 +56,7 @@ def test_it_sends_nothing_and_has_no_defect(name: str, run: Run, state_folder: P
 
 
 def test_what_was_withheld_from_one_device_hides_nothing_of_the_next(run: Run) -> None:
-    """A write that nobody acknowledges names nobody: the next device is asked all the same."""
+    """A write without a reply names no device: the next device is asked all the same."""
     with motorbus.simulate("feetech", ids="1-2") as servos:
         for node in (1, 2):
             servos[node].memory["status_return_level"] = 0

@@ -1,4 +1,4 @@
-"""Common commands with a servo of every map: told, read, written, moved and let go; a stranger is read and let go."""
+"""Common commands with a servo of every map: read, written, moved and limp; a stranger is read and limp."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator
 import pytest
 
 import motorbus
-from motorbus.families.feetech.table import TABLES
+from motorbus.families.feetech.registers import TABLES
 from motorbus.simulation.named import Simulation
 from tests.cli.conftest import Ran, Run
-from tests.families.feetech.maps import MODELS
+from tests.cli.feetech.models import MODELS
 
 Say = Callable[..., Ran]
 RATES = {"smbl": 115_200, "smcl": 115_200}
@@ -80,7 +80,7 @@ def test_hls_is_read_in_its_own_units(run: Run) -> None:
         assert "table hls has no register" in ran.err
 
 
-# --- a servo whose map nobody knows -------------------------------------------------------------------------
+# --- a servo of an unknown map -------------------------------------------------------------------------
 
 REFUSED = (
     "write BUS#1 led_mask=1 --yes",
@@ -90,7 +90,7 @@ REFUSED = (
     "move BUS#1=0.5 BUS#2=3.0 --yes",
     "torque on BUS#1",
     "stop BUS#1",
-    "feetech factory-restore BUS#1 --yes",
+    "feetech reset BUS#1 --yes",
 )
 
 
@@ -106,7 +106,7 @@ def test_a_stranger_is_not_written_and_nothing_changes(command: str, run: Run, s
     before = bytes(stranger[1].memory.live), bytes(stranger[2].memory.live[40:56])
     ran = run(*command.replace("BUS", stranger.url).split())
     assert ran.code == 7, ran.err
-    assert "register map is not described" in ran.err
+    assert "register map is unknown" in ran.err
     assert (bytes(stranger[1].memory.live), bytes(stranger[2].memory.live[40:56])) == before
 
 

@@ -12,13 +12,40 @@ import pytest
 
 from motorbus.core.request import Data
 from motorbus.errors import MotorbusError, OutcomeUnknown, VerificationFailed
-from motorbus.families.feetech import Servo, wire
-from motorbus.families.feetech.table import ALARM_BITS, alarms
+from motorbus.families.feetech import FAMILY, Servo
+from motorbus.families.feetech.protocol import Instruction
+from motorbus.families.feetech.registers.codes import ALARM_BITS, alarms
 from motorbus.link.base import Delivery, PerfectLine, Side
-from tests.support.rigs.feetech import IDS, Rig
+from motorbus.link.memory import MemoryLink
+from tests.support.world import make_bus
+
+IDS = (1, 2, 3)
 
 ACKNOWLEDGED_TOO = 1
 """Status return level at which everything is answered; at 0 a PING and a READ are."""
+
+
+class Rig:
+    """A bus, its simulated servos, and a counter that makes every value another one."""
+
+    def __init__(self) -> None:
+        simulator = FAMILY.simulator(IDS, "sts3215")
+        self.servos: Any = simulator.nodes
+        self.link = MemoryLink(simulator, line=PerfectLine())
+        self.bus = make_bus(self.link, FAMILY.open())
+        self.count = 0
+
+    def put(self, line: PerfectLine) -> None:
+        """Another line between host and servos."""
+        self.link.line = line
+
+    def stir(self) -> int:
+        """Give every servo a position that it has not had lately; returns it."""
+        self.count += 1
+        raw = 17 + self.count * 7919 % 4000
+        for servo in self.servos.values():
+            servo.raw_position = raw
+        return raw
 
 
 def goal_time(rig: Rig, servo: Servo) -> float:
@@ -80,7 +107,7 @@ def test_d4_alarm_bits_spoil_no_answer_and_are_told(what: str) -> None:
     rig = Rig()
     servo = Servo(rig.bus, 1)
     servo.prepare()
-    for bit in ALARM_BITS:
+    for bit in ALARM_BITS["sts"]:
         rig.servos[1].alarm = 1 << bit
         ANSWERED[what](rig, servo)
         assert servo.alarm == alarms(1 << bit) != ()
@@ -119,7 +146,7 @@ class Lost(PerfectLine):
 
     def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
         assert isinstance(data, bytes)
-        if sender is Side.HOST and data[4] == wire.Instruction.WRITE and self.lost < self.most:
+        if sender is Side.HOST and data[4] == Instruction.WRITE and self.lost < self.most:
             self.lost += 1
             return []
         return super().carry(sender, data, at)

@@ -7,18 +7,22 @@ command leaves it; a value is right when the controller has it at that moment. E
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 from random import Random
 from typing import Any
 
 from motorbus.core.request import Data, Priority, Request
+from motorbus.core.setpoint import Setpoint
 from motorbus.core.steps import Runnable
 from motorbus.errors import MotorbusError
-from motorbus.families.stepper import FAMILY, Controller, wire
-from motorbus.families.stepper.driver import commands, goals
-from motorbus.families.stepper.driver.reading import READINGS, agreed, dump_once, read_input, readings
-from motorbus.families.stepper.execution import Phase
+from motorbus.families.stepper import FAMILY, Controller
+from motorbus.families.stepper.driver.io import read_input
+from motorbus.families.stepper.driver.projects import READINGS, dump, dump_once
+from motorbus.families.stepper.driver.requests import command, ignore
+from motorbus.families.stepper.execution.machine import Phase
+from motorbus.families.stepper.parameters import PARAMETERS, Project
+from motorbus.families.stepper.protocol import COMMANDS, REPLY_LENGTH
 from motorbus.families.stepper.simulator import simulate
-from motorbus.families.stepper.table import BLANK, ORDERS, PARAMETERS, decode_image
 from motorbus.link.base import Delivery, Line, PerfectLine, Side
 from motorbus.link.memory import MemoryLink
 from tests.support.world import RETRIES, make_bus
@@ -30,7 +34,7 @@ ACTIVE = (2, 5)
 STOPS = ("stop_project", "stop_motor")
 MOTIONS = ("jog_forward", "jog_reverse", "run_once", "home", "start_project")
 KEPT = ("save_project", "clear_project")
-UNMOVED = (Phase.IDLE, Phase.RAMPDOWN)
+UNMOVED = (Phase.IDLE, Phase.SLOWING)
 
 
 class FalseWord(AssertionError):
@@ -58,7 +62,7 @@ class Rig:
         self.link = MemoryLink(self.simulator, rate=9600, line=line, pace=pace)
         self.bus = make_bus(self.link, FAMILY.open(), report=lambda event: None)
         self.device = Controller(self.bus)
-        self.there = self.simulator.nodes[1]
+        self.there = self.simulator.controller
         self.random = Random(seed)
         self.errors: list[MotorbusError] = []
         for port in ACTIVE:
@@ -90,30 +94,26 @@ class Rig:
         return done is not None
 
     def _level(self, port: int) -> bool:
-        return port in self.there.state.inputs
+        return port in self.there.machine.inputs
 
     def dump(self) -> bool:
         """A project, as the driver reads it: as it was at some moment of the call, for a power cut may change it."""
         project = self.random.randrange(1, 5)
         true = [self.there.store.image(project)]
-        seen: list[bytes] = []
-
-        async def as_read() -> Any:
-            seen.extend(await readings(self.device, project))
-            return agreed(self.device, project, seen)
-
-        told = self._judged("dump", as_read(), READINGS * _longest(dump_once(self.device, 1)))
+        told = self._judged(
+            "dump", dump(self.device, project), READINGS * _longest(dump_once(self.device, 1))
+        )
         true.append(self.there.store.image(project))
-        if told is not None and told[wire.REPLY_LENGTH :] not in true:
+        if told is not None and told[REPLY_LENGTH:] not in true:
             raise FalseWord(f"the dump of project {project} is not what it holds")
         return told is not None
 
     def edit(self, name: str) -> bool:
         """One of the commands that set parameters, with numbers that are possible."""
         values = self._numbers(name)
-        if not self._acknowledged(getattr(commands, name)(self.device, **values), name):
+        if not self._acknowledged(_command(self.device, name, **values), name):
             return False
-        project = decode_image(self.there.store.working)
+        project = self.there.store.working
         step = project.step(values.get("step", 1))
         for field, value in values.items():
             holder = step if "step" in values else project
@@ -124,14 +124,10 @@ class Rig:
 
     def _numbers(self, name: str) -> dict[str, int]:
         values = {}
-        for place in ORDERS[name].command.places:
-            row = PARAMETERS[place.name]
-            likely = (
-                [raw for raw in row.choices if raw <= row.high] if place.name.endswith("_input") else None
-            )
-            values[place.name] = (
-                self.random.choice(likely) if likely else self.random.randint(row.low, row.high)
-            )
+        for field in COMMANDS[name].fields:
+            row = PARAMETERS[field]
+            likely = [raw for raw in row.choices if raw <= row.high] if field.endswith("_input") else None
+            values[field] = self.random.choice(likely) if likely else self.random.randint(row.low, row.high)
         if "loop_first" in values:
             values["loop_first"], values["loop_last"] = sorted(self.random.sample(range(1, 11), 2))
         return values
@@ -139,24 +135,21 @@ class Rig:
     def output(self) -> bool:
         """Switch one, or all, or the LEDs."""
         port, level = self.random.randrange(1, 6), self.random.randrange(2)
-        if not self._acknowledged(commands.set_output(self.device, port, level), "set_output"):
+        if not self._acknowledged(
+            command(self.device, "set_output", ignore, port=port, level=level), "set_output"
+        ):
             return False
-        state = self.there.state
-        told = (
-            [state.leds]
-            if port == 5
-            else [*self.there.outputs]
-            if port == 4
-            else [self.there.outputs[port - 1]]
-        )
+        machine = self.there.machine
+        outputs = [bool(machine.outputs >> bit & 1) for bit in range(3)]
+        told = [machine.leds] if port == 5 else outputs if port == 4 else [outputs[port - 1]]
         if set(told) != {bool(level)}:
             raise FalseWord(f"output {port} was acknowledged as {level} and is not")
         return True
 
     def stop_by(self, name: str) -> bool:
         """One of the two commands that stop."""
-        done = self._acknowledged(getattr(commands, name)(self.device), name)
-        state = self.there.state
+        done = self._acknowledged(command(self.device, name, ignore), name)
+        state = self.there.machine
         if done and name != "stop_motor" and state.run is not None and state.phase not in UNMOVED:
             raise FalseWord(f"{name} was acknowledged and project {state.run.project.number} goes on")
         if done and name != "stop_project" and state.phase not in UNMOVED:
@@ -169,19 +162,20 @@ class Rig:
 
     def motion(self, name: str) -> bool:
         """A command that moves the motor, from rest."""
-        project = decode_image(self.there.store.image(1))
-        there = goals.of_jog(self.device, project, 1)
+        goals = (Setpoint(1, "velocity", 1.0, -10.0, 10.0),)
         if name == "start_project":
-            return self._acknowledged(commands.motion(self.device, name, there, project=1), name)
-        return self._acknowledged(commands.motion(self.device, name, there), name)
+            request = command(self.device, name, ignore, setpoints=goals, project=1)
+        else:
+            request = command(self.device, name, ignore, setpoints=goals)
+        return self._acknowledged(request, name)
 
     def keep(self, name: str) -> bool:
         """Save or clear, which write what is kept."""
         project = self.random.randrange(1, 5)
-        if not self._acknowledged(getattr(commands, name)(self.device, project), name):
+        if not self._acknowledged(command(self.device, name, ignore, project=project), name):
             return False
         store = self.there.store
-        due = BLANK if name == "clear_project" else store.as_saved(project)
+        due = Project() if name == "clear_project" else replace(store.working, number=project)
         if store.stored[project] != due:
             raise FalseWord(f"{name} of project {project} was acknowledged and not done")
         return True
@@ -214,6 +208,10 @@ class Rig:
     def tried_again(self) -> int:
         """How often the bus has had to say something twice, or to ask whom it may believe."""
         return sum(ledger.retries for ledger in self.bus.statistics.nodes.values())
+
+
+def _command(device: Controller, name: str, **values: Any) -> Request[None]:
+    return command(device, name, ignore, **values)
 
 
 async def _sent(request: Request[None]) -> Any:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from motorbus.families.feetech import wire
+from motorbus.families.feetech import protocol
 
 
 class Request(NamedTuple):
@@ -23,25 +23,25 @@ class Request(NamedTuple):
     def packet(self) -> bytes:
         """As we send it."""
         if self.kind == "ping":
-            return wire.ping(self.node)
+            return protocol.ping(self.node)
         if self.kind == "action":
-            return wire.action(self.node)
+            return protocol.action(self.node)
         if self.kind == "read":
-            return wire.read(self.node, self.address, self.size)
+            return protocol.read(self.node, self.address, self.size)
         if self.kind == "sync_read":
-            return wire.sync_read(self.address, self.size, self.nodes)
+            return protocol.sync_read(self.address, self.size, self.nodes)
         if self.kind == "sync_write":
             size = len(self.data) // len(self.nodes)
             shares = [self.data[place * size : (place + 1) * size] for place in range(len(self.nodes))]
-            return wire.sync_write(self.address, list(zip(self.nodes, shares, strict=True)))
-        made = wire.write if self.kind == "write" else wire.reg_write
+            return protocol.sync_write(self.address, list(zip(self.nodes, shares, strict=True)))
+        made = protocol.write if self.kind == "write" else protocol.reg_write
         return made(self.node, self.address, self.data)
 
     def due(self) -> tuple[tuple[int, int], ...]:
         """Node and length of each reply."""
         if self.kind == "sync_read":
-            return tuple((node, self.size + wire.OVERHEAD) for node in self.nodes)
-        return ((self.node, wire.OVERHEAD + (self.size if self.kind == "read" else 0)),)
+            return tuple((node, self.size + protocol.OVERHEAD) for node in self.nodes)
+        return ((self.node, protocol.OVERHEAD + (self.size if self.kind == "read" else 0)),)
 
 
 class Case(NamedTuple):

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from random import Random
 from typing import Final
 
-from motorbus.families.feetech import wire
+from motorbus.families.feetech import protocol
 from tests.interop.differential.cases import Case, Request
 from tests.interop.differential.judging import UNEXPLAINED
 from tests.interop.differential.outside import Decoder
@@ -33,11 +33,13 @@ def _request(random: Random) -> Request:
     if kind in ("write", "reg_write"):
         return Request(kind, node, address, data=random.randbytes(size))
     if kind == "sync_read":
-        return Request(kind, wire.BROADCAST, address, size, nodes=nodes)
+        return Request(kind, protocol.BROADCAST, address, size, nodes=nodes)
     if kind == "sync_write":
         size = min(size, 8)
-        return Request(kind, wire.BROADCAST, address, data=random.randbytes(size * len(nodes)), nodes=nodes)
-    return Request(kind, wire.BROADCAST if kind == "action" else node)
+        return Request(
+            kind, protocol.BROADCAST, address, data=random.randbytes(size * len(nodes)), nodes=nodes
+        )
+    return Request(kind, protocol.BROADCAST if kind == "action" else node)
 
 
 def _answer(request: Request) -> bytes:
@@ -45,7 +47,7 @@ def _answer(request: Request) -> bytes:
     if request.kind in ("sync_write", "action"):
         return b""
     return b"".join(
-        wire.encode_status(node, 0, bytes(length - wire.OVERHEAD)) for node, length in request.due()
+        protocol.frame(node, 0, bytes(length - protocol.OVERHEAD)) for node, length in request.due()
     )
 
 

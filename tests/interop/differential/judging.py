@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, Final, NamedTuple
 
-from motorbus.families.feetech import wire
+from motorbus.families.feetech import protocol
 from tests.interop.differential.cases import Case, Outcome
 from tests.interop.differential.outside import NEW, OLD, RUST, Decoder
 
@@ -30,11 +30,11 @@ class Packet(NamedTuple):
 def packets(stream: bytes) -> list[Packet]:
     """All there are, those inside others too."""
     found = []
-    for at in range(len(stream) - wire.OVERHEAD + 1):
+    for at in range(len(stream) - protocol.OVERHEAD + 1):
         end = at + stream[at + 3] + 4
         packet = stream[at:end]
-        whole = packet[:2] == wire.HEADER and packet[3] > 1 and len(packet) == end - at
-        if whole and packet[2] <= wire.MAX_ID and wire.is_sound(packet):
+        whole = packet[:2] == protocol.HEADER and packet[3] > 1 and len(packet) == end - at
+        if whole and packet[2] <= protocol.MAX_ID and protocol.is_valid(packet):
             found.append(Packet(at, packet[2], packet[4], list(packet[5:-1]), end))
     return found
 
@@ -76,7 +76,7 @@ def _class(
 
 def _taken(decoder: Decoder, case: Case, node: int, value: Any, why: str) -> Iterator[str]:
     request, stream = case.request, case.stream
-    size = dict(request.due())[node] - wire.OVERHEAD
+    size = dict(request.due())[node] - protocol.OVERHEAD
     said = [one for one in packets(stream) if one.node == node]
     if request.packet() in stream:
         yield "echo"
@@ -116,7 +116,7 @@ def _begins(case: Case, packet: Packet, value: Any, stream: bytes) -> bool:
 
 def _left(decoder: Decoder, case: Case, node: int, value: Any, others: Mapping[int, Any]) -> Iterator[str]:
     stream = case.stream
-    size = dict(case.request.due())[node] - wire.OVERHEAD
+    size = dict(case.request.due())[node] - protocol.OVERHEAD
     said = [
         one
         for one in packets(stream)
@@ -130,7 +130,7 @@ def _left(decoder: Decoder, case: Case, node: int, value: Any, others: Mapping[i
         yield "error-above-0x7f"
     if case.request.kind == "sync_read":
         yield from _left_in_group(decoder, case, node, others, said[0])
-    elif said[0].at and (decoder is RUST or wire.HEADER in stream[: said[0].at + 1]):
+    elif said[0].at and (decoder is RUST or protocol.HEADER in stream[: said[0].at + 1]):
         yield "something-in-front" if decoder is RUST else "false-beginning"
 
 
@@ -148,5 +148,5 @@ def _left_in_group(
         yield "out-of-order"
     if decoder is NEW and said.end > due:
         yield "counted-bytes"
-    if wire.HEADER in case.stream[: said.at + 1]:
+    if protocol.HEADER in case.stream[: said.at + 1]:
         yield "false-beginning"

@@ -1,4 +1,4 @@
-"""How motorbus decodes a case: the receivers of `wire` and the rules of the bus, without a link and without a clock.
+"""How motorbus decodes a case: the receiver of the family and the rules of the bus, without a link and without a clock.
 
 Only the first try is judged: other libraries do not wait for quiet, probe or retry either.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from motorbus.core.request import Expected, Request, Response
 from motorbus.families.feetech import FAMILY as FEETECH
-from motorbus.families.feetech import wire
+from motorbus.families.feetech import protocol
 from tests.interop.differential.cases import Case, Outcome
 from tests.support.world import Tries
 
@@ -21,9 +21,9 @@ def decoded(case: Case) -> Outcome:
     answer, fault = Tries(FEETECH, 1_000_000).answered(exchange, [case.stream])
     if answer is None:
         return Outcome(None, fault)
-    replies = [wire.decode_status(reply.data) for reply in answer.replies]
+    replies = [protocol.decode(reply.data) for reply in answer.replies]
     if request.kind == "sync_read":
         found = {str(reply.id): list(reply.parameters) for reply in replies}
         return Outcome(found) if found else Outcome(None, fault)
     (reply,) = replies
-    return Outcome([list(reply.parameters), reply.error] if request.kind == "read" else reply.error)
+    return Outcome([list(reply.parameters), reply.code] if request.kind == "read" else reply.code)

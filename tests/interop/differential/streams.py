@@ -13,9 +13,10 @@ from typing import Final
 
 from motorbus.core import request as core_request
 from motorbus.core.request import Expected
-from motorbus.families.feetech import FAMILY, wire
+from motorbus.families.feetech import FAMILY, protocol
+from motorbus.families.feetech.registers import TABLES
 from motorbus.families.feetech.simulator import MODELS
-from motorbus.families.feetech.table import CONTROL, TABLES
+from motorbus.families.feetech.traits import TRAITS
 from motorbus.link.memory import MemoryLink
 from tests.interop.differential.cases import Case, Request
 from tests.support.world import make_bus
@@ -33,7 +34,7 @@ def recorded() -> tuple[Case, ...]:
 def _session(name: str) -> Iterator[Case]:
     model = next(model for model in sorted(MODELS) if MODELS[model].table.name == name)
     bus = make_bus(
-        MemoryLink(FAMILY.simulator(IDS, model), rate=MODELS[model].shipped_rate), FAMILY.open(), gate=False
+        MemoryLink(FAMILY.simulator(IDS, model), rate=MODELS[model].rate), FAMILY.open(), gate=False
     )
     trace = bus.trace.subscribe()
     for request in _requests(name):
@@ -49,7 +50,7 @@ def _session(name: str) -> Iterator[Case]:
 
 
 def _requests(name: str) -> Iterator[Request]:
-    table, control = TABLES[name], CONTROL[name]
+    table, control = TABLES[name], TRAITS[name]
     position, gain = table["present_position"], table["position_p"]
     yield Request("ping", 1)
     yield Request("read", 1, position.address, position.size)
@@ -60,8 +61,8 @@ def _requests(name: str) -> Iterator[Request]:
     yield Request("write", 2, table["goal_velocity"].address, data=b"\xf4\x01")
     yield Request("reg_write", 3, gain.address, data=b"\x22")
     if control.sync_read:
-        yield Request("sync_read", wire.BROADCAST, position.address, 2, nodes=IDS)
-        yield Request("sync_read", wire.BROADCAST, position.address, 8, nodes=IDS[::-1])
+        yield Request("sync_read", protocol.BROADCAST, position.address, 2, nodes=IDS)
+        yield Request("sync_read", protocol.BROADCAST, position.address, 8, nodes=IDS[::-1])
 
 
 # --- what becomes of an answer ----------------------------------------------------------------------------------------
@@ -123,43 +124,46 @@ def _noise_behind(random: Random, request: Request, reply: bytes) -> bytes:
     return reply + random.randbytes(random.randrange(1, 9))
 
 
-def _remade(reply: bytes, make: Callable[[wire.StatusPacket], bytes]) -> bytes:
+def _packets(reply: bytes) -> list[bytes]:
+    return [data for data, fault in protocol.parser(protocol.MAX_ID).feed(reply) if not fault]
+
+
+def _remade(reply: bytes, make: Callable[[protocol.Packet], bytes]) -> bytes:
     """Each packet made anew, with a right checksum."""
-    packets = wire.Splitter("status").feed(reply)
-    return b"".join(make(one) for one in packets if isinstance(one, wire.StatusPacket))
+    return b"".join(make(protocol.decode(one)) for one in _packets(reply))
 
 
 def _of_another(random: Random, request: Request, reply: bytes) -> bytes:
     return _remade(
-        reply, lambda one: wire.frame((one.id + random.randrange(1, 250)) % 254, one.error, one.parameters)
+        reply, lambda one: protocol.frame((one.id + random.randrange(1, 250)) % 254, one.code, one.parameters)
     )
 
 
 def _foreign_in_front(random: Random, request: Request, reply: bytes) -> bytes:
-    return wire.encode_status(random.randrange(4, 254), 0, random.randbytes(random.randrange(4))) + reply
+    return protocol.frame(random.randrange(4, 254), 0, random.randbytes(random.randrange(4))) + reply
 
 
 def _longer(random: Random, request: Request, reply: bytes) -> bytes:
-    return _remade(reply, lambda one: wire.frame(one.id, one.error, one.parameters + random.randbytes(1)))
+    return _remade(reply, lambda one: protocol.frame(one.id, one.code, one.parameters + random.randbytes(1)))
 
 
 def _shorter(random: Random, request: Request, reply: bytes) -> bytes:
-    return _remade(reply, lambda one: wire.frame(one.id, one.error, one.parameters[:-1]))
+    return _remade(reply, lambda one: protocol.frame(one.id, one.code, one.parameters[:-1]))
 
 
 def _alarmed(random: Random, request: Request, reply: bytes) -> bytes:
-    return _remade(reply, lambda one: wire.frame(one.id, random.randrange(256), one.parameters))
+    return _remade(reply, lambda one: protocol.frame(one.id, random.randrange(256), one.parameters))
 
 
 def _impossible_length(random: Random, request: Request, reply: bytes) -> bytes:
     """A length field of 0 or 1, or above what the SDKs take, and a sum that fits."""
     length = random.choice((0, 1, 247, 255))
     body = bytes((reply[2], length)) + reply[4:-1]
-    return wire.HEADER + body + bytes((wire.checksum(body),))
+    return protocol.HEADER + body + bytes((protocol.checksum(body),))
 
 
 def _other_data(random: Random, request: Request, reply: bytes) -> bytes:
-    return _remade(reply, lambda one: wire.frame(one.id, one.error, random.randbytes(len(one.parameters))))
+    return _remade(reply, lambda one: protocol.frame(one.id, one.code, random.randbytes(len(one.parameters))))
 
 
 def _echoed(random: Random, request: Request, reply: bytes) -> bytes:
@@ -171,15 +175,15 @@ def _echo_alone(random: Random, request: Request, reply: bytes) -> bytes:
 
 
 def _out_of_order(random: Random, request: Request, reply: bytes) -> bytes:
-    packets = wire.Splitter("status").feed(reply)
+    packets = _packets(reply)
     random.shuffle(packets)
-    return b"".join(one.data for one in packets)
+    return b"".join(packets)
 
 
 def _one_missing(random: Random, request: Request, reply: bytes) -> bytes:
-    packets = wire.Splitter("status").feed(reply)
+    packets = _packets(reply)
     del packets[random.randrange(len(packets))]
-    return b"".join(one.data for one in packets)
+    return b"".join(packets)
 
 
 def _random(random: Random, request: Request, reply: bytes) -> bytes:
@@ -236,5 +240,5 @@ def drawn(seed: int, count: int) -> Iterator[Case]:
         if random.random() < 0.25:
             chosen.append(random.choice(names[:10]))
         for name in chosen:
-            stream = CHANGES[name](random, request, stream) if len(stream) >= wire.OVERHEAD else stream
+            stream = CHANGES[name](random, request, stream) if len(stream) >= protocol.OVERHEAD else stream
         yield Case(request, stream, ", then ".join(chosen))

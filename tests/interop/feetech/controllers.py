@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, Final
 
-from motorbus.families.feetech.table import CONTROL
+from motorbus.families.feetech.traits import TRAITS
 from tests.interop.feetech.peer import Peer, kept
 from tests.interop.feetech.steps import Anything, Call, Held, Raised, Step
 from tests.interop.feetech.twin import ABSENT, HLS, IDS, SCS, STS, Kind
@@ -57,7 +57,7 @@ def _scans(controller: str, kind: Kind) -> Iterator[Step]:
     found = [[1, number], [2, number], [253, number]]
     yield Step((Call("controller", "scan", ([1, 2, ABSENT, 253],), found),), why=why)
     alone = ("unplug 2", "unplug 253")
-    if not CONTROL[kind.map].broadcast_ping and controller == "Sts3215":
+    if not TRAITS[kind.map].broadcast_ping and controller == "Sts3215":
         yield Step((Call("controller", "broadcast_scan", ([1, 2, 253],), []),), why="no-broadcast-ping")
         return
     if controller != "Sts3215":
@@ -86,7 +86,7 @@ def _raw(kind: Kind) -> Iterator[Step]:
     yield call("write_raw_data_with_error", 1, GAIN, [33, 31], gives=5, before=ALARMS, after=wrote)
     twice = {(node, GAIN): [33, 31] for node in NODES}
     yield call("sync_write_raw_data", NODES, GAIN, [[33, 31]] * 2, after=twice)
-    if CONTROL[kind.map].sync_read:
+    if TRAITS[kind.map].sync_read:
         yield call("sync_read_raw_data", NODES, 0, 5, gives=both)
         yield call("sync_read_raw_data_with_error", NODES, 0, 5, gives=[[one, 0] for one in both])
         lost = Raised(f"motor {ABSENT}")
@@ -112,7 +112,7 @@ def _named(controller: str, kind: Kind) -> Iterator[Step]:
         yield Step((Call("controller", name, one, gives),), before=before, why=why)
     # The definition decides whether it asks all at once; a servo that does not know SYNC READ then stays silent.
     asks_all = controller != "Scs0009"
-    silent = asks_all and not CONTROL[kind.map].sync_read
+    silent = asks_all and not TRAITS[kind.map].sync_read
     for name, gives in (
         ("sync_read_register", [goal] * 2),
         ("sync_read_register_with_error", [[goal, 0]] * 2),

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from motorbus.families.feetech import wire
-from motorbus.families.feetech.table import CONTROL
+from motorbus.families.feetech import protocol
+from motorbus.families.feetech.traits import TRAITS
 from tests.interop.feetech.sdk import (
     CORRUPT,
     PATIENCE,
@@ -23,7 +23,7 @@ from tests.interop.feetech.twin import ABSENT
 def groups(sdk: Sdk) -> Iterator[Step]:
     """SYNC READ and SYNC WRITE, by the objects that collect ids and by the handler's own calls."""
     yield from _writing(sdk)
-    if CONTROL[sdk.kind.map].sync_read:
+    if TRAITS[sdk.kind.map].sync_read:
         yield from _reading(sdk)
     else:
         yield from _unread(sdk)
@@ -102,7 +102,7 @@ def _reading(sdk: Sdk) -> Iterator[Step]:
 def _packet(node: int) -> Through:
     """The whole answer to a SYNC READ of the position."""
     held = Held(node, POSITION, 2, True)
-    return Through(lambda data: list(wire.encode_status(node, 0, bytes(data))), held, "the packet")
+    return Through(lambda data: list(protocol.frame(node, 0, bytes(data))), held, "the packet")
 
 
 def _unread(sdk: Sdk) -> Iterator[Step]:

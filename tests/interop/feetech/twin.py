@@ -17,8 +17,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
 
-from motorbus.families.feetech import wire
-from motorbus.families.feetech.table import TABLES
+from motorbus.families.feetech import protocol
+from motorbus.families.feetech.registers import TABLES
 from tests.support.processes import Simulated
 
 IDS: Final = (1, 2, 253)
@@ -73,7 +73,7 @@ class Twin:
         self.port = str(folder / "bus")
         self._folder = folder
         self._stack = ExitStack()
-        self._splitter = wire.Splitter("status")
+        self._parser = protocol.parser(protocol.MAX_ID)
 
     def __enter__(self) -> Self:
         control = self._folder / "control"
@@ -128,29 +128,27 @@ class Twin:
         """What this servo holds."""
         rate = self._tune(RATE)
         try:
-            return list(self._asked(wire.read(node, address, count), node, count).parameters)
+            return list(self._asked(protocol.read(node, address, count), node, count).parameters)
         finally:
             self._tune(rate)
 
     def write(self, node: int, address: int, data: list[int]) -> None:
         """Change what it holds, by an ordinary write."""
-        self._asked(wire.write(node, address, bytes(data)), node, 0)
+        self._asked(protocol.write(node, address, bytes(data)), node, 0)
 
     def alarm(self, node: int) -> int:
         """The error byte of its answer to a PING."""
-        return self._asked(wire.ping(node), node, 0).error
+        return self._asked(protocol.ping(node), node, 0).code
 
-    def _asked(self, packet: bytes, node: int, count: int) -> wire.StatusPacket:
+    def _asked(self, packet: bytes, node: int, count: int) -> protocol.Packet:
         """The answer with so many parameters; what a client has left unread is passed over."""
         for _ in range(TRIES):
             self.settle()
             os.write(self._terminal, packet)
             while data := self._bytes(PATIENCE):
-                for answer in self._splitter.feed(data):
-                    if not isinstance(answer, wire.StatusPacket) or answer.id != node:
-                        continue
-                    if len(answer.parameters) == count:
-                        return answer
+                for answer, fault in self._parser.feed(data):
+                    if not fault and answer[2] == node and len(answer) == protocol.OVERHEAD + count:
+                        return protocol.decode(answer)
         raise AssertionError(f"no answer to {packet.hex(' ')}")
 
     def _bytes(self, patience: float) -> bytes:

@@ -140,7 +140,8 @@ def test_one_that_stays_off_its_goal_at_the_end_is_told_with_goal_and_present() 
 
 
 def test_one_that_is_slower_than_the_machine_file_says_is_told() -> None:
-    with machine(arm="1", can="0x25", options={"can": {"speed": 0.1}}) as (made, _), Robot.of(made) as robot:
+    with machine(arm="1", can="0x25") as (made, sims), Robot.of(made) as robot:
+        sims["can"][0x25].speed = 0.1
         with pytest.raises(Stalled, match="c1 does not follow") as told:
             robot.move({"a1": 0.6, "c1": 0.6})
         assert "slower than max_velocity says" in str(told.value)

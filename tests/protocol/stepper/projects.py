@@ -1,36 +1,24 @@
-"""Any project that a file can say, and pieces of files for the tests of programs."""
+"""Any project that a file may hold, for the tests of this folder."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from hypothesis import strategies as st
 
-from motorbus.families.stepper import table
-from motorbus.families.stepper.table import PARAMETERS, Project, Step, with_steps
-
-MOTOR = """
-[motor]
-microsteps = 8
-step_angle = "1.8 deg"
-turn_distance = 5000
-lead = "5 mm"
-"""
-STEP = """
-[[step]]
-move = "10 mm"
-speed = "60 rpm"
-start = "200 Hz"
-acceleration = "100 Hz"
-"""
+from motorbus.families.stepper.parameters import (
+    BASE_NAMES,
+    PARAMETERS,
+    STEP_NAMES,
+    Project,
+    Step,
+    with_steps,
+)
 
 
-def file(*parts: str, top: str = "", motor: str = MOTOR, steps: int = 1) -> str:
-    """A file with these parts behind a motor and some steps."""
-    return "format = 1\n" + top + "\n" + motor + STEP * steps + "\n".join(parts)
-
-
-def _numbers(name: str) -> st.SearchStrategy[int]:
+def numbers(name: str) -> st.SearchStrategy[int]:
+    """Any value that a request may carry."""
     row = PARAMETERS[name]
     if name in ("start_input", "stop_input"):
         return st.sampled_from((0, 1, 2, 5))
@@ -39,19 +27,12 @@ def _numbers(name: str) -> st.SearchStrategy[int]:
 
 @st.composite
 def projects(draw: st.DrawFn) -> Project:
-    """Any project that may be sent, with rows filled behind the last step too."""
-    steps = tuple(
-        Step(**{name: draw(_numbers(name)) for name in table.STEP_NAMES})
-        for _ in range(draw(st.integers(1, 10)))
-    )
-    total = draw(st.integers(1, len(steps)))
-    first = draw(st.integers(0, total))
-    last = draw(st.integers(first, total)) if first else 0
-    values: dict[str, Any] = {
-        name: draw(_numbers(name))
-        for name in table.BASE_NAMES
-        if name not in ("number", "total_steps", "loop_first", "loop_last")
-    }
-    base = Project(number=draw(st.integers(1, 4)), loop_first=first, loop_last=last, **values)
-    made = with_steps(base, steps)
-    return Project(**{**{n: getattr(made, n) for n in Project.__dataclass_fields__}, "total_steps": total})
+    """One to ten steps, a loop or none, and no numbers behind the last step."""
+    count = draw(st.integers(1, 10))
+    steps = tuple(Step(**{name: draw(numbers(name)) for name in STEP_NAMES}) for _ in range(count))
+    values: dict[str, Any] = {name: draw(numbers(name)) for name in BASE_NAMES}
+    first = draw(st.integers(0, count))
+    last = draw(st.integers(first, count)) if first else 0
+    loop = draw(st.integers(1, 254)) if first else 0
+    values |= {"number": draw(st.integers(1, 4)), "loop_first": first, "loop_last": last, "loop_count": loop}
+    return replace(with_steps(Project(), steps), **(values | {"total_steps": count}))

@@ -1,9 +1,8 @@
-"""Frames of the stepper controller that are known from outside this project, kept as data in tests/vectors/stepper.
+"""Frames of the stepper controller from outside this project, as data in tests/vectors/stepper.
 
-`manual` holds the 27 example frames of the manual with their replies; `further` values that no example has; `dumps`
-two whole projects; `invalid` what is no frame, first of all what the manual's own annotations would make of its frames.
-Below `behaviour` are streams, motions and orders of steps. They were written by a separate script that knows nothing
-of motorbus.
+`manual` holds the 27 example frames and their replies, `further` values that no example has, `dumps` two
+projects, `invalid` what is no frame. `behaviour` has streams, motions and orders of steps. A separate script
+that knows nothing of motorbus has written them.
 """
 
 from __future__ import annotations
@@ -13,14 +12,11 @@ from typing import Any
 
 from tests.protocol.vectors import VECTORS, Vector, load
 
-FOLDER = VECTORS / "stepper"
-
 
 def behaviour(name: str) -> list[dict[str, Any]]:
-    """What is no frame: streams, motion or order."""
-    found: list[dict[str, Any]] = json.loads(
-        (FOLDER / "behaviour" / f"{name}.json").read_text(encoding="utf-8")
-    )
+    """Streams, motion or order."""
+    path = VECTORS / "stepper" / "behaviour" / f"{name}.json"
+    found: list[dict[str, Any]] = json.loads(path.read_text(encoding="utf-8"))
     return found
 
 
@@ -36,5 +32,5 @@ DUMP_A, DUMP_B = (vector.data for vector in DUMPS)
 
 
 def name_of(value: object) -> str:
-    """How a parametrised test is called."""
+    """The name of a parametrised test."""
     return value.id if isinstance(value, Vector) else repr(value)

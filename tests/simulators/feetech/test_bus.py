@@ -1,4 +1,4 @@
-"""Who answers which packet, and when: silence, cut streams, delays, collisions, trains of replies."""
+"""Which servo receives and answers which packet, and when."""
 
 from __future__ import annotations
 
@@ -8,12 +8,15 @@ import pytest
 
 from motorbus.core.can_frame import CanFrame
 from motorbus.errors import RequestError
-from motorbus.families.feetech.simulator import simulate
 from tests.simulators.feetech.host import (
+    ACK,
     ACTION,
     ALL,
+    BOOTLOADER,
     CALIBRATE,
     CLEAR_TURNS,
+    LOCK,
+    MODELS,
     PING,
     READ,
     REG_WRITE,
@@ -26,18 +29,20 @@ from tests.simulators.feetech.host import (
     packet,
 )
 
-# Silence.
+SCS = ("scs", "scs2")
+
+# -- silence ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     "data",
     [
-        "FF FF 01 02 01 FC",  # wrong checksum
-        "FF FF 02 02 01 FA",  # another id
+        bytes.fromhex("FF FF 01 02 01 FC"),  # wrong checksum
+        packet(2, PING),
         packet(1, UNKNOWN),
         packet(1, CLEAR_TURNS),  # ignored by STS3215 firmware 3.10
         packet(1, 0x55),
-        packet(1, PING, 0),  # lengths that the instruction does not have
+        packet(1, PING, 0),  # wrong number of parameters
         packet(1, READ, 56),
         packet(1, READ, 56, 2, 0),
         packet(1, READ, 0, 254),
@@ -50,188 +55,184 @@ from tests.simulators.feetech.host import (
         packet(ALL, WRITE, 42, 0, 8),
         packet(ALL, REG_WRITE, 42, 0, 8),
         packet(ALL, ACTION),
-        packet(1, SYNC_READ, 56, 2, 1),  # only ever a broadcast
+        packet(1, SYNC_READ, 56, 2, 1),  # only as a broadcast
         packet(1, SYNC_WRITE, 42, 2, 1, 0, 8),
         packet(ALL, SYNC_READ, 56, 254, 1),
         packet(ALL, SYNC_READ, 56, 2),
         packet(ALL, SYNC_WRITE, 42, 2, 1, 0),
         packet(ALL, SYNC_WRITE, 42, 0, 1),
     ],
-    ids=lambda data: data if isinstance(data, str) else data.hex(" "),
+    ids=lambda data: data.hex(" "),
 )
-def test_silence(data: bytes | str) -> None:
+def test_packet_that_no_servo_answers(data: bytes) -> None:
     host = Host()
     assert host.say(data) == []
-    assert host.say(packet(1, PING)) == ["FF FF 01 02 00 FC"]
+    assert host.say(packet(1, PING)) == ACK
 
 
-def test_a_bad_sync_write_moves_nobody() -> None:
+def test_incomplete_sync_write_changes_nothing() -> None:
     host = Host()
     host.say(packet(ALL, SYNC_WRITE, 42, 2, 1, 0))
-    assert host.read(1, 40, 1) == 0
+    assert (host.read(1, 40, 1), host.read(1, 42)) == (0, 0)
 
 
-def test_a_can_frame_means_nothing_here() -> None:
-    bus = simulate((1,))
-    bus.receive(CanFrame(0x601, b"\0" * 8), 1.0)
-    assert bus.due() is None
+def test_can_frame_is_ignored() -> None:
+    host = Host()
+    host.bus.receive(CanFrame(0x601, b"\0" * 8), 1.0)
+    assert host.bus.due() is None
 
 
-# Cut and joined streams.
+# -- streams ---------------------------------------------------------------------------------------
 
 
-def test_bytes_one_by_one() -> None:
+def test_request_in_single_bytes() -> None:
     host = Host()
     for byte in bytes.fromhex("FF FF 01 02 01"):
         assert host.say(bytes([byte])) == []
-    assert host.say(b"\xfb") == ["FF FF 01 02 00 FC"]
+    assert host.say(b"\xfb") == ACK
 
 
-def test_several_packets_and_noise_in_one_piece() -> None:
+def test_requests_and_noise_in_one_piece() -> None:
     host = Host((1, 2))
     noise = bytes.fromhex("00 FF 13 FF FF")
-    assert host.say(packet(1, PING) + noise + packet(2, PING)) == ["FF FF 01 02 00 FC", "FF FF 02 02 00 FB"]
+    assert host.say(packet(1, PING) + noise + packet(2, PING)) == [*ACK, "FF FF 02 02 00 FB"]
+    # FF FF 01 03 claims seven bytes; they end inside the valid packet
+    assert Host().say(bytes.fromhex("FF FF 01 03") + packet(1, PING)) == ACK
 
 
-def test_a_request_within_a_false_one_is_found() -> None:
-    # FF FF 01 03 claims seven bytes; they end inside the good packet and their sum is wrong
-    assert Host().say(bytes.fromhex("FF FF 01 03") + packet(1, PING)) == ["FF FF 01 02 00 FC"]
-
-
-def test_half_a_packet_is_forgotten_after_a_pause() -> None:
+def test_incomplete_packet_is_dropped_after_a_pause() -> None:
     host = Host()
     host.say(bytes.fromhex("FF FF 01 FF 03"))  # claims 259 bytes
     assert host.say(packet(1, PING)) == []
     assert host.wait(0.0049).say(packet(1, PING)) == []
-    assert host.wait(0.0052).say(packet(1, PING)) == ["FF FF 01 02 00 FC"]
+    assert host.wait(0.0052).say(packet(1, PING)) == ACK
 
 
-def test_without_a_pause_rule_half_a_packet_swallows_what_follows() -> None:
-    host = Host(frame_gap=0)
-    host.say(bytes.fromhex("FF FF 01 FF 03"))
-    for _ in range(42):  # 5 + 42 * 6 = 257 of 259 bytes
-        assert host.wait(1.0).say(packet(1, PING)) == []
-    assert len(host.wait(1.0).say(packet(1, PING))) == 43  # then all of it comes at once
-
-
-def test_random_bytes_neither_raise_nor_answer_much() -> None:
+def test_random_bytes_raise_nothing() -> None:
     host, dice = Host(), random.Random(2)
-    for _ in range(2000):
+    for _ in range(1000):
         host.wait(0.001).say(dice.randbytes(dice.randrange(1, 40)))
-    assert host.wait(0.01).say(packet(1, PING)) == ["FF FF 01 02 00 FC"]
+    assert host.wait(0.01).say(packet(1, PING)) == ACK
 
 
-# Answers.
+# -- one servo -------------------------------------------------------------------------------------
 
 
-def test_write_and_read_back() -> None:
-    host = Host()
-    assert host.write(1, 41, 50) == ["FF FF 01 02 00 FC"]
-    assert host.say(packet(1, READ, 41, 1)) == ["FF FF 01 03 00 32 C9"]
+@pytest.mark.parametrize("name", MODELS)
+def test_every_instruction_of_the_manual(name: str) -> None:
+    host = Host((1,), name)
+    assert host.say(packet(1, PING)) == ACK
+    assert len(host.say(packet(1, READ, 0, 5))) == 1
+    assert host.write(1, 13, 60) == ACK
+    assert host.say(packet(1, REG_WRITE, 13, 61)) == ACK
+    assert (host.read(1, 64, 1), host.read(1, 13, 1)) == (1, 60)
+    assert host.say(packet(1, ACTION)) == ACK
+    assert (host.read(1, 64, 1), host.read(1, 13, 1)) == (0, 61)
+    assert host.say(packet(ALL, SYNC_WRITE, 13, 1, 1, 62)) == []
+    assert host.read(1, 13, 1) == 62
+    assert host.say(packet(ALL, WRITE, 13, 63)) == []
+    assert host.read(1, 13, 1) == 63
+    host.write(1, 8, 0)  # status return level
+    assert host.write(1, 13, 64) == host.say(packet(1, REG_WRITE, 13, 65)) == []
+    assert host.say(packet(1, ACTION)) == []
+    assert (host.say(packet(1, PING)), host.read(1, 13, 1)) == (ACK, 65)
+    assert host.write(1, 8, 1) == ACK
 
 
-def test_identity_block() -> None:
+def test_read_of_the_identity_of_nothing_and_beyond_the_table() -> None:
     # firmware 3.10, byte order 0, model 9.3, id 4
     assert Host((4,)).say(packet(4, READ, 0, 6)) == ["FF FF 04 08 00 03 0A 00 09 03 04 D6"]
-
-
-def test_a_read_of_nothing_and_beyond_the_table() -> None:
     host = Host()
-    assert host.say(packet(1, READ, 56, 0)) == ["FF FF 01 02 00 FC"]
+    assert host.say(packet(1, READ, 56, 0)) == ACK
     assert host.say(packet(1, READ, 250, 10)) == ["FF FF 01 0C 00 00 00 00 00 00 00 00 00 00 00 F2"]
     assert len(host.say(packet(1, READ, 0, 253))[0].split()) == 259
 
 
-def test_the_error_byte_carries_the_alarms_and_nothing_else() -> None:
+def test_address_without_data_and_action_without_reg_write_are_acknowledged() -> None:
     host = Host()
-    host.bus.nodes[1].alarm = 0x20
-    assert host.say(packet(1, PING)) == ["FF FF 01 02 20 DC"]
-    assert host.write(1, 55, 0) == ["FF FF 01 02 20 DC"]
-    assert host.read(1, 65, 1) == 0x20
-    assert host.read(1, 55, 1) == 0  # an alarm does not refuse a write
+    for data in (packet(1, WRITE, 42), packet(1, REG_WRITE, 42), packet(1, ACTION)):
+        assert host.say(data) == ACK
+    assert (host.read(1, 64, 1), host.read(1, 40, 1)) == (0, 0)
 
 
-def test_level_0_answers_ping_and_reads_only() -> None:
+@pytest.mark.parametrize("code", [PING, SYNC_READ, RESTORE])
+def test_servo_that_lacks_an_instruction_answers_the_others(code: int) -> None:
+    """An encoder board answers READ and WRITE only (avenhaus/SO-ARM100-Encoders)."""
+    requests = {
+        PING: packet(1, PING),
+        SYNC_READ: packet(ALL, SYNC_READ, 5, 1, 1),
+        RESTORE: packet(1, RESTORE),
+    }
     host = Host()
-    host.write(1, 8, 0)
-    assert host.write(1, 41, 7) == []
-    assert host.say(packet(1, REG_WRITE, 41, 8)) == []
-    assert host.say(packet(1, ACTION)) == []
-    assert host.say(packet(1, PING)) == ["FF FF 01 02 00 FC"]
-    assert host.read(1, 41, 1) == 8
-    assert len(host.say(packet(ALL, SYNC_READ, 41, 1, 1))) == 1
-    assert host.write(1, 8, 1) == ["FF FF 01 02 00 FC"]
+    host.servo.lacks = {code}
+    assert host.say(requests[code]) == []
+    assert host.read(1, 5, 1) == 1
+    host.servo.lacks = set()
+    assert len(host.say(requests[code])) == 1
 
 
-def test_the_return_delay_is_in_steps_of_2_microseconds() -> None:
-    host = Host()
-    assert host.timed(packet(1, PING)) == [(0.0, "FF FF 01 02 00 FC")]
-    host.write(1, 7, 250)
-    assert host.timed(packet(1, PING)) == [(0.0005, "FF FF 01 02 00 FC")]
+# -- several servos --------------------------------------------------------------------------------
 
 
-def test_an_eeprom_write_is_acknowledged_late_when_it_is_stored() -> None:
-    host = Host()
-    assert host.timed(packet(1, WRITE, 13, 65)) == [(0.0, "FF FF 01 02 00 FC")]  # locked: nothing to store
-    host.write(1, 55, 0)
-    assert host.timed(packet(1, WRITE, 13, 60)) == [(0.02, "FF FF 01 02 00 FC")]
-    assert host.timed(packet(1, WRITE, 41, 60)) == [(0.0, "FF FF 01 02 00 FC")]
-
-
-def test_an_address_without_a_datum() -> None:
-    for instruction in (WRITE, REG_WRITE):
-        assert Host().say(packet(1, instruction, 42)) == ["FF FF 01 02 00 FC"]
-    host = Host()
-    host.say(packet(1, REG_WRITE, 42))
-    assert host.read(1, 64, 1) == 0
-
-
-def test_action_with_nothing_pending_is_acknowledged() -> None:
-    host = Host()
-    assert host.say(packet(1, ACTION)) == ["FF FF 01 02 00 FC"]
-    assert host.read(1, 40, 1) == 0
-
-
-# Several at once.
-
-
-def test_broadcast_ping_of_a_single_servo_gives_its_id() -> None:
+def test_broadcast_ping() -> None:
     assert Host((9,)).say("FF FF FE 02 01 FE") == ["FF FF 09 02 00 F4"]
-
-
-def test_broadcast_ping_of_several_collides() -> None:
-    # byte by byte, low wins: 01 & 02 = 00, FC & FB = F8
+    # byte by byte ANDed: 01 & 02 = 00, FC & FB = F8
     assert Host((1, 2)).say(packet(ALL, PING)) == ["FF FF 00 02 00 F8"]
-
-
-def test_broadcast_ping_in_turn() -> None:
     host = Host((5, 2), broadcast_ping="in_turn")
     assert host.timed(packet(ALL, PING)) == [(0.0, "FF FF 02 02 00 FB"), (60e-6, "FF FF 05 02 00 F8")]
 
 
-def test_two_servos_with_one_id_garble_each_other_when_they_differ() -> None:
+@pytest.mark.parametrize("name", SCS)
+def test_scs_answers_neither_broadcast_ping_nor_sync_read(name: str) -> None:
+    host = Host((1,), name)
+    assert host.say(packet(ALL, PING)) == host.say(packet(ALL, SYNC_READ, 56, 2, 1)) == []
+
+
+def test_two_servos_with_one_id_garble_unequal_replies() -> None:
     host = Host((1, 1))
-    assert host.say(packet(1, PING)) == ["FF FF 01 02 00 FC"]  # alike: nobody can tell
+    assert host.say(packet(1, PING)) == ACK
     host.bus.servos[1].raw_position = 1304
     # 2048 = 00 08 with checksum F2; 1304 = 18 05 with checksum DD
     assert host.say(packet(1, READ, 56, 2)) == ["FF FF 01 04 00 00 00 D0"]
 
 
-def test_unequal_return_delays_shift_the_collision() -> None:
+@pytest.mark.parametrize(
+    ("delay", "replies"),
+    [
+        # FF FF 01 02 00 FC
+        #          FF FF 01 02 00 FC, three bytes later
+        (15, [(0.0, "FF FF 01 02 00 00 02 00 FC")]),
+        (200, [(0.0, "FF FF 01 02 00 FC"), (400e-6, "FF FF 01 02 00 FC")]),
+    ],
+)
+def test_later_reply_is_shifted_or_separate(delay: int, replies: list[tuple[float, str]]) -> None:
     host = Host((1, 1))
-    host.bus.servos[1].memory["return_delay"] = 15  # 30 us: three bytes at 1 Mbit/s
-    # FF FF 01 02 00 FC
-    #          FF FF 01 02 00 FC
-    assert host.say(packet(1, PING)) == ["FF FF 01 02 00 00 02 00 FC"]
+    host.bus.servos[1].memory["return_delay"] = delay
+    assert host.timed(packet(1, PING)) == replies
 
 
-def test_replies_that_do_not_overlap_stay_apart() -> None:
-    host = Host((1, 1))
-    host.bus.servos[1].memory["return_delay"] = 200  # 400 us, the first needs 60
-    assert host.timed(packet(1, PING)) == [(0.0, "FF FF 01 02 00 FC"), (0.0004, "FF FF 01 02 00 FC")]
+def test_duplicate_is_late_by_chance_so_that_equal_replies_collide() -> None:
+    host = Host(duplicate="1")
+    replies = [host.say(packet(1, READ, 0, 40)) for _ in range(12)]
+    assert sum(len(reply[0].split()) > 46 for reply in replies) == 12
+    assert [host.say(packet(1, READ, 0, 40)) for _ in range(12)] != replies
+    assert Host(duplicate="1").say(packet(1, READ, 0, 40)) == replies[0]
 
 
-def test_who_is_asked_later_and_begins_earlier_is_heard_first() -> None:
+def test_duplicate_added_at_run_time() -> None:
+    host = Host((1, 2))
+    host.write(1, 6, 1)  # 500 kbit/s
+    host.wait(1.0).bus.duplicate(1)
+    assert [servo.id for servo in host.bus.servos] == [1, 2, 1]
+    assert [servo.baud_rate for servo in host.bus.servos] == [500_000, 1_000_000, 500_000]
+    assert list(host.bus.nodes) == [1, 2]
+    host.bus.servos[2].power_cycle()
+    assert host.bus.servos[2].baud_rate == 500_000
+    with pytest.raises(RequestError, match="no servo has the id 7"):
+        host.bus.duplicate(7)
+
+
+def test_replies_are_sent_in_the_order_of_their_start() -> None:
     host = Host((1, 2, 3))
     host.write(1, 7, 250)
     host.write(2, 7, 100)
@@ -242,91 +243,140 @@ def test_who_is_asked_later_and_begins_earlier_is_heard_first() -> None:
     assert host.bus.due() is None
 
 
-def test_sync_read_in_the_order_of_the_list_back_to_back() -> None:
-    host = Host((1, 2, 3), position={1: 1, 2: 2, 3: 3})
-    assert host.timed(packet(ALL, SYNC_READ, 56, 2, 3, 1, 2)) == [
-        (0.0, "FF FF 03 04 00 03 00 F5"),
-        (80e-6, "FF FF 01 04 00 01 00 F9"),
-        (160e-6, "FF FF 02 04 00 02 00 F7"),
-    ]
-
-
-def test_sync_read_honours_each_return_delay() -> None:
-    host = Host((1, 2))
-    host.bus.nodes[2].memory["return_delay"] = 50
-    assert [at for at, _ in host.timed(packet(ALL, SYNC_READ, 56, 2, 1, 2))] == [0.0, 180e-6]
+def test_reply_of_a_servo_that_loses_its_supply_is_not_sent() -> None:
+    host = Host()
+    host.write(1, 7, 250)
+    host.bus.receive(packet(1, PING), host.now)
+    host.servo.power_cycle()
+    assert host.bus.advance(host.now + 1.0) == []
 
 
 @pytest.mark.parametrize(
-    ("switch", "times"), [("wait", [0.0, 160e-6]), ("close_up", [0.0, 80e-6]), ("silent", [0.0])]
+    ("missing", "times"), [("wait", [0.0, 160e-6]), ("close_up", [0.0, 80e-6]), ("silent", [0.0])]
 )
-def test_sync_read_with_one_missing(switch: str, times: list[float]) -> None:
-    host = Host((1, 3), sync_read_missing=switch)
+def test_sync_read_with_a_missing_servo(missing: str, times: list[float]) -> None:
+    host = Host((1, 3), sync_read_missing=missing)
     assert [at for at, _ in host.timed(packet(ALL, SYNC_READ, 56, 2, 1, 2, 3))] == times
 
 
-def test_sync_write_reaches_those_who_are_there() -> None:
-    host = Host((1, 3))
-    assert host.say(packet(ALL, SYNC_WRITE, 41, 1, 1, 10, 2, 20, 3, 30)) == []
-    assert (host.read(1, 41, 1), host.read(3, 41, 1)) == (10, 30)
+def test_sync_read_in_the_order_of_its_list_with_each_return_delay() -> None:
+    host = Host((1, 2, 3))
+    for servo in host.bus.servos:
+        servo.raw_position = servo.id
+    host.bus.nodes[1].memory["return_delay"] = 50
+    assert host.timed(packet(ALL, SYNC_READ, 56, 2, 3, 1, 2)) == [
+        (0.0, "FF FF 03 04 00 03 00 F5"),
+        (180e-6, "FF FF 01 04 00 01 00 F9"),
+        (260e-6, "FF FF 02 04 00 02 00 F7"),
+    ]
 
 
-# What lies between.
+def test_mixed_bus_keeps_byte_orders_and_leaves_out_scs_in_sync_read() -> None:
+    host = Host((1, 2, 3), "sts3215+scs0009+hls3925", position=258)
+    assert host.say(packet(1, READ, 56, 2)) == ["FF FF 01 04 00 02 01 F7"]
+    assert host.say(packet(2, READ, 56, 2)) == ["FF FF 02 04 00 01 02 F6"]
+    times = [at for at, _ in host.timed(packet(ALL, SYNC_READ, 63, 1, 1, 2, 3))]
+    assert times == [0.0, pytest.approx(140e-6)]  # 7 bytes of 10 µs each for 1 and 2
 
 
-def test_an_adapter_that_hears_itself_repeats_everything_before_any_answer() -> None:
+def test_second_id_of_hls_is_obeyed_for_writes_only_and_silently() -> None:
+    host = Host((1, 5), "hls3925")
+    assert host.read(1, 7, 1) == 1  # at first it is the main id
+    host.write(1, 7, 40)
+    assert host.write(40, 13, 60) == host.say(packet(40, REG_WRITE, 13, 61)) == []
+    assert (host.read(1, 13, 1), host.read(1, 64, 1)) == (60, 1)
+    assert (
+        host.say(packet(40, PING)) == host.say(packet(40, READ, 0, 5)) == host.say(packet(40, ACTION)) == []
+    )
+    assert host.read(1, 64, 1) == 1
+    host.say(packet(ALL, SYNC_WRITE, 13, 1, 40, 62))
+    assert (host.read(1, 13, 1), host.read(5, 13, 1)) == (62, 70)
+    host.write(1, 7, 5)  # that of another servo, which alone answers
+    assert host.write(5, 13, 50) == ["FF FF 05 02 00 F8"]
+    assert (host.read(1, 13, 1), host.read(5, 13, 1)) == (50, 50)
+
+
+# -- adapter, delays and rates ---------------------------------------------------------------------
+
+
+def test_echo_precedes_every_reply() -> None:
     host = Host(echo="yes")
-    assert host.say(packet(1, PING)) == ["FF FF 01 02 01 FB", "FF FF 01 02 00 FC"]
+    assert host.say(packet(1, PING)) == ["FF FF 01 02 01 FB", *ACK]
     assert host.say("FF FF 09") == ["FF FF 09"]
-    assert host.say(packet(ALL, WRITE, 41, 5)) == [packet(ALL, WRITE, 41, 5).hex(" ").upper()]
 
 
-def test_replies_come_later_by_chance_and_the_same_again() -> None:
-    def delays(seed: int) -> list[float]:
-        host = Host(reply_jitter=0.001, seed=seed)
-        return [host.timed(packet(1, PING))[0][0] for _ in range(50)]
-
-    assert delays(1) == delays(1) != delays(2)
-    assert all(0.0 <= delay < 0.001 for delay in delays(1))
-    assert len(set(delays(1))) > 40
-
-
-def test_replies_of_duplicates_with_jitter_are_separate_or_garbled() -> None:
-    host = Host(duplicate="1", reply_jitter=0.0005, seed=3)
-    status = "FF FF 01 02 00 FC"
-    replies = [host.say(packet(1, PING)) for _ in range(50)]
-    assert [status, status] in replies
-    assert any(status not in reply for reply in replies)
-
-
-# A second servo with an id that is there.
+@pytest.mark.parametrize(
+    ("name", "register", "delay"),
+    [
+        ("sts", 0, 0.0),
+        ("sts", 250, 500e-6),
+        ("scs", 100, 200e-6),
+        ("smbl", 49, 100e-6),
+        ("smbl", 51, 102e-6),
+        ("smcl", 0, 100e-6),
+        ("hls", 250, 0.0),  # its second id
+    ],
+)
+def test_register_7_delays_replies(name: str, register: int, delay: float) -> None:
+    host = Host((1,), name)
+    host.write(1, 7, register)
+    assert host.timed(packet(1, PING)) == [(delay, *ACK)]
 
 
-def test_a_second_servo_comes_while_the_bus_is_at_work() -> None:
-    host = Host((1, 2))
-    host.write(1, 6, 1)  # 500 kbit/s from now on
-    host.wait(1.0)
-    host.bus.duplicate(1)
-    assert [servo.id for servo in host.bus.servos] == [1, 2, 1]
-    assert host.bus.servos[2].baud_rate == host.bus.servos[0].baud_rate == 500_000
-    assert len(host.bus.nodes) == 2
-    host.bus.servos[2].memory["return_delay"] = 250
-    host.bus.servos[2].power_cycle()
-    assert len(host.say(packet(1, PING))) == 1  # the power cycle has taken its delay, and both say the same
-    host.bus.servos[2].memory["return_delay"] = 250
-    assert host.say(packet(1, PING)) == ["FF FF 01 02 00 FC"] * 2
-    assert host.bus.servos[2].baud_rate == 500_000
-    with pytest.raises(RequestError, match="no servo has the id 7"):
-        host.bus.duplicate(7)
+@pytest.mark.parametrize("name", MODELS)
+def test_servo_at_another_rate_is_silent(name: str) -> None:
+    host = Host((1,), name)
+    shipped = 115_200 if name.startswith("sm") else 1_000_000
+    assert host.bus.usual_rate == shipped
+    host.bus.tune(57_600)
+    assert host.say(packet(1, PING)) == []
+    host.bus.tune(shipped)
+    host.write(1, 6, 11)  # 4800 bit/s
+    assert host.say(packet(1, PING)) == []
+    host.bus.tune(4_800)
+    assert host.say(packet(1, PING)) == ACK
+    host.write(1, 6, 12)
+    assert host.servo.baud_rate is None
 
 
-def test_what_happens_to_servos_by_themselves_goes_on_beside_a_second_one() -> None:
-    host = Host((1,))
-    servo = host.bus.servos[0]
-    servo.memory["goal_position"] = 3000
-    servo.memory["torque_enable"] = 1
-    servo.move(host.now)
-    host.bus.duplicate(1)
-    host.wait(10.0)
-    assert servo.raw_position == 3000
-    assert host.bus.servos[1].raw_position == 2048
+@pytest.mark.parametrize(("baud_ack", "replies"), [("old", ACK), ("new", [])])
+def test_acknowledgement_of_a_new_rate(baud_ack: str, replies: list[str]) -> None:
+    host = Host(baud_ack=baud_ack)
+    host.bus.tune(1_000_000)
+    assert host.write(1, 6, 1) == replies
+    host.bus.tune(500_000)
+    assert host.say(packet(1, PING)) == ACK
+
+
+@pytest.mark.parametrize(("id_ack", "reply"), [("old", ACK[0]), ("new", "FF FF 07 02 00 F6")])
+@pytest.mark.parametrize("name", MODELS)
+def test_id_is_changed_behind_the_lock_of_the_map(name: str, id_ack: str, reply: str) -> None:
+    host = Host((1,), name, id_ack=id_ack)
+    host.write(1, LOCK[name], 0)
+    assert host.write(1, 5, 7) == [reply]
+    host.wait(1.0).write(7, LOCK[name], 1)
+    host.bus.nodes[7].power_cycle()
+    assert host.say(packet(7, PING)) == ["FF FF 07 02 00 F6"]
+
+
+def test_bootloader_is_silent_for_800_ms() -> None:
+    host = Host()
+    assert host.say(packet(1, BOOTLOADER)) == []
+    assert host.wait(0.79).say(packet(1, PING)) == []
+    assert host.wait(0.02).say(packet(1, PING)) == ACK
+
+
+@pytest.mark.parametrize("commit", ["before_ack", "after_ack"])
+def test_replies_wait_for_the_eeprom_or_precede_it(commit: str) -> None:
+    host = Host(eeprom_commit=commit)
+    later = 0.02 if commit == "before_ack" else 0.0
+    assert host.timed(packet(1, WRITE, 13, 65)) == [(0.0, *ACK)]  # locked
+    host.write(1, 55, 0)
+    host.bus.receive(packet(1, WRITE, 13, 60) + packet(1, PING), host.now)
+    replies = host.timed(packet(ALL, SYNC_READ, 13, 1, 1))
+    assert [(at, reply[:14]) for at, reply in replies] == [
+        (later, "FF FF 01 02 00"),
+        (later, "FF FF 01 02 00"),
+        (later, "FF FF 01 03 00"),
+    ]
+    assert host.wait(1.0).timed(packet(1, WRITE, 41, 60)) == [(0.0, *ACK)]

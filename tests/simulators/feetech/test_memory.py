@@ -1,69 +1,99 @@
-"""Bytes by rows: what is kept, what is dropped, what a row makes of a number."""
+"""Registers and EEPROM: rights, lock, power-off in the middle of a store, factory values."""
 
 from __future__ import annotations
 
 import random
+from itertools import product
+from math import inf
 
 import pytest
 
-from motorbus.core.register import Coding, Storage
-from motorbus.families.feetech.simulator.flash import Commit, Flash
-from motorbus.families.feetech.simulator.memory import Layout, Memory, Written, code
-from motorbus.families.feetech.table import STS, TABLES
+from motorbus.core.register import Register, Storage
+from motorbus.families.feetech.registers import TABLES
+from motorbus.families.feetech.registers.sts import STS
+from motorbus.families.feetech.simulator.memory import Cell, Layout, Memory, code
+from motorbus.families.feetech.simulator.servo import FEEDBACK
+from tests.simulators.feetech.host import LOCK, READ, RESTORE, WRITE, Host, packet
+
+SPECIAL = ("id", "second_id", "baud_rate", "lock", "return_delay", "status_return_level")
+"""Rows whose change would silence the servo, or that gate what is tested."""
 
 
-@pytest.fixture
-def memory() -> Memory:
-    return Memory(Layout(STS, {"id": 9}))
+class Slow:
+    """The memory of an STS servo with a clock; a write to the EEPROM takes 20 ms."""
+
+    def __init__(self, torn: str = "erased") -> None:
+        self.now = 0.0
+        self.memory = Memory(Layout(STS, {"id": 9}), lambda: self.now, 0.02, torn)
 
 
-def test_it_begins_as_the_rows_say_and_as_the_model_differs(memory: Memory) -> None:
-    assert (memory["id"], memory["max_position_limit"], memory["phase"]) == (9, 4095, 12)
+def writable(row: Register) -> bool:
+    return row.writable or row.name == "max_acceleration"  # lerobot writes it
 
 
-def test_where_no_register_is_there_are_zeros(memory: Memory) -> None:
-    assert memory.write(50, b"\x07\x08", locked=False).names == frozenset()
-    assert memory.read(50, 2) == b"\0\0"
-    assert memory.read(255, 3) == b"\0\0\0"
+def other_value(row: Register, now: int) -> int:
+    """A value that the row allows and does not have."""
+    if row.name == "torque_enable":
+        return 1
+    return row.high if now != row.high else row.low
 
 
-def test_half_a_row_can_be_written(memory: Memory) -> None:
-    assert memory.write(43, b"\x04", locked=True).names == {"goal_position"}
-    assert memory["goal_position"] == 0x0400
+def raw(host: Host, row: Register) -> int:
+    (reply,) = host.say(packet(1, READ, row.address, row.size))
+    return row.decode(bytes.fromhex(reply)[5:-1])
 
 
-def test_a_write_runs_off_the_end_without_harm(memory: Memory) -> None:
-    assert memory.write(254, bytes(10), locked=False).names == frozenset()
+@pytest.mark.parametrize("name", TABLES)
+def test_row_that_can_be_written_is_read_back(name: str) -> None:
+    for row in (row for row in TABLES[name].values() if row.name not in SPECIAL):
+        host = Host((1,), name)
+        before = raw(host, row)
+        wanted = other_value(row, before)
+        (acknowledgement,) = host.write(1, row.address, *row.encode(wanted))
+        assert acknowledgement.startswith("FF FF 01 02"), row.name
+        assert raw(host, row) == (wanted if writable(row) else before), row.name
 
 
-def test_a_write_tells_what_it_touched_and_whether_it_was_stored(memory: Memory) -> None:
-    assert memory.write(13, b"\x41\x50", locked=True) == Written(
-        frozenset({"max_temperature", "max_voltage"}), False
-    )
-    assert memory.write(13, b"\x41\x50", locked=False) == Written(
-        frozenset({"max_temperature", "max_voltage"}), True
-    )
-    assert memory.write(41, b"\x01", locked=False) == Written(frozenset({"acceleration"}), False)
+@pytest.mark.parametrize("name", TABLES)
+def test_only_a_write_with_the_lock_open_outlasts_a_power_cycle(name: str) -> None:
+    rows = [row for row in TABLES[name].values() if row.name not in SPECIAL and writable(row)]
+    for row, lock in product(rows, (0, 1)):
+        host = Host((1,), name)
+        before = host.servo.memory[row.name]
+        wanted = other_value(row, before)
+        host.write(1, LOCK[name], lock)
+        host.write(1, row.address, *row.encode(wanted))
+        host.wait(1.0).servo.power_cycle()
+        kept = not lock and row.storage is Storage.EEPROM
+        assert host.servo.memory[row.name] == (wanted if kept else before), f"{row.name}, lock {lock}"
+        assert host.servo.memory["lock"] == 1
 
 
-def test_strict_drops_the_rows_that_do_not_fit_and_takes_the_others(memory: Memory) -> None:
-    assert memory.write(33, b"\x09\x14", locked=True, strict=True).names == {"protective_torque"}
-    assert memory["operating_mode"] == 0
+@pytest.mark.parametrize("name", TABLES)
+def test_addresses_without_a_row_read_0_and_keep_nothing(name: str) -> None:
+    host, table = Host((1,), name), TABLES[name]
+    covered = {row.address + place for row in table.values() for place in range(row.size)}
+    for address in set(range(256)) - covered:
+        host.write(1, address, 7)
+        assert host.read(1, address, 1) == 0
+    host.say(packet(1, WRITE, 254, *bytes(10)))  # beyond the last address
+    read_only = {row.name for row in table.values() if row.storage is Storage.RAM and not row.writable}
+    assert read_only - set(FEEDBACK) <= {"current_zero_offset"}  # 0: no source explains it
 
 
-def test_storing_one_row(memory: Memory) -> None:
-    memory["homing_offset"] = -5
-    memory.store("homing_offset")
-    memory.power_up()
-    assert memory["homing_offset"] == -5
-
-
-def test_factory_rows_can_be_read_and_not_written(memory: Memory) -> None:
-    assert memory.write(80, b"\x05", locked=False).names == frozenset()
+def test_every_row_is_coded_as_it_says() -> None:
+    dice = random.Random(1)
+    for table in TABLES.values():
+        memory = Memory(Layout(table, {}), lambda: 0.0)
+        for row in table.values():
+            for value in (row.low, row.high, dice.randint(row.low, row.high)):
+                memory[row.name] = value
+                assert memory.read(row.address, row.size) == row.encode(value)
+                assert memory[row.name] == value
 
 
 @pytest.mark.parametrize(
-    ("row", "raw", "data"),
+    ("row", "value", "data"),
     [
         ("present_position", -2, "02 80"),
         ("present_position", 40_000, "FF 7F"),
@@ -73,134 +103,103 @@ def test_factory_rows_can_be_read_and_not_written(memory: Memory) -> None:
         ("homing_offset", -1652, "74 0E"),
     ],
 )
-def test_a_number_as_bytes_cut_to_what_the_row_can_say(row: str, raw: int, data: str) -> None:
-    assert code(STS[row], raw) == bytes.fromhex(data)
+def test_value_is_cut_to_what_its_row_can_express(row: str, value: int, data: str) -> None:
+    assert code(STS[row], value) == bytes.fromhex(data)
 
 
-# What takes its time: see test_flash.py for the cells themselves.
+def test_part_of_a_row_and_rows_of_both_kinds_in_one_write() -> None:
+    host = Host()
+    host.write(1, 43, 4)
+    assert host.read(1, 42) == 0x0400
+    host.write(1, 2, 9, 9, 9, 1, 0, 25)  # 2, 3 and 4 are read-only
+    assert [host.read(1, address, 1) for address in (2, 3, 4, 7)] == [0, 9, 3, 25]
 
 
-class Slow:
-    """A memory whose EEPROM needs 20 ms for a write, and a clock for it."""
-
-    def __init__(self) -> None:
-        self.now = 0.0
-        layout = Layout(STS, {"id": 9})
-        flash = Flash(layout.factory, clock=lambda: self.now, time=0.02)
-        self.memory = Memory(layout, flash)
+@pytest.mark.parametrize(("switch", "mode", "torque"), [("store", 9, 20), ("drop", 0, 20)])
+def test_value_out_of_range_is_stored_or_dropped(switch: str, mode: int, torque: int) -> None:
+    host = Host(out_of_range=switch)
+    assert host.write(1, 33, 9, 20) == ["FF FF 01 02 00 FC"]
+    assert (host.read(1, 33, 1), host.read(1, 34, 1)) == (mode, torque)
 
 
-def test_with_the_lock_open_the_live_byte_is_first_and_the_stored_one_follows() -> None:
+# -- EEPROM ----------------------------------------------------------------------------------------
+
+
+def test_live_value_first_then_cell_after_cell() -> None:
     slow = Slow()
-    slow.memory.write(13, b"\x41\x50", locked=False)
-    assert slow.memory["max_temperature"] == 65
-    assert slow.memory.stored[13] == 70
-    assert slow.memory.commits == [Commit(0.01, 13, 65), Commit(0.02, 14, 80)]
+    assert slow.memory.write(13, b"\x41\x50", locked=False) == {"max_temperature", "max_voltage"}
+    assert (slow.memory["max_temperature"], slow.memory.stored[13]) == (65, 70)
+    assert slow.memory.waiting == [Cell(0.01, 13, 65), Cell(0.02, 14, 80)]
+    assert slow.memory.midway() == 0.005
     slow.now = 0.01
     assert (slow.memory.stored[13], slow.memory.wear) == (65, {13: 1})
+    assert slow.memory.midway() == pytest.approx(0.015)
+    slow.memory.write(55, b"\x01", locked=False)  # the lock is closed meanwhile
+    slow.memory.write(15, b"\x30", locked=False)  # stored behind the others
+    slow.now = 0.02
+    assert slow.memory.waiting == [Cell(0.04, 15, 0x30)]
+    slow.now = 0.04
+    assert (slow.memory.wear, slow.memory.midway()) == ({13: 1, 14: 1, 15: 1}, inf)
+    assert (slow.memory.waiting, slow.memory.busy_until) == ([], -inf)
 
 
-def test_a_locked_write_persists_nothing() -> None:
+def test_locked_write_stores_nothing() -> None:
     slow = Slow()
     slow.memory.write(13, b"\x41", locked=True)
     slow.now = 1.0
-    assert (slow.memory.commits, slow.memory.stored[13], slow.memory.wear) == ([], 70, {})
-    slow.memory.power_up()
-    assert slow.memory["max_temperature"] == 70
+    assert (slow.memory.waiting, slow.memory.stored[13], slow.memory.wear) == ([], 70, {})
 
 
-def test_a_power_cut_leaves_what_was_committed_and_a_restart_all() -> None:
-    for cut, second in ((True, 80), (False, 90)):
-        slow = Slow()
-        slow.memory.write(13, b"\x41\x5a", locked=False)
-        slow.now = 0.01
-        if cut:
-            slow.memory.power_up()
-        else:
-            slow.memory.restart()
-        assert (slow.memory["max_temperature"], slow.memory["max_voltage"]) == (65, second)
+@pytest.mark.parametrize(("torn", "second"), [("erased", 255), ("old", 80), ("new", 90)])
+def test_power_cut_tears_the_cell_in_work(torn: str, second: int) -> None:
+    slow = Slow(torn)
+    slow.memory.write(13, b"\x41\x5a\x20", locked=False)
+    slow.now = 0.01
+    slow.memory.power_off()
+    slow.memory.restart()
+    found = [slow.memory[name] for name in ("max_temperature", "max_voltage", "min_voltage")]
+    assert found == [65, second, 40]
+    assert slow.memory.waiting == []
 
 
-def test_closing_the_lock_while_storing() -> None:
+def test_power_cut_between_two_cells_tears_none() -> None:
     slow = Slow()
-    slow.memory.write(55, b"\0", locked=True)
-    slow.memory.write(13, b"\x41", locked=False)
-    slow.memory.write(55, b"\x01", locked=False)
-    slow.now = 1.0
-    assert slow.memory.stored[13] == 65
+    slow.memory.write(13, b"\x41\x5a", locked=False)
+    slow.now = 0.01
+    slow.memory.power_off()
+    assert bytes(slow.memory.stored[13:15]) == b"\x41\x50"
 
 
-def test_an_impossible_id_or_rate_is_mended_on_wish() -> None:
-    for mend, found in ((True, (9, 0)), (False, (255, 255))):
-        slow = Slow()
-        slow.memory.stored[5:7] = b"\xff\xff"
-        slow.memory.power_up(mend=mend)
-        assert (slow.memory["id"], slow.memory["baud_rate"]) == found
-        assert slow.memory.stored[5:7] == b"\xff\xff"  # it is not written back
-
-
-def test_a_restore_of_the_factory_values_takes_its_time_too() -> None:
+def test_restart_without_a_power_cut_loses_nothing() -> None:
     slow = Slow()
-    slow.memory.write(13, b"\x41", locked=False)
+    slow.memory.write(13, b"\x41\x5a", locked=False)
+    slow.memory.restart()
+    assert (slow.memory["max_temperature"], slow.memory["max_voltage"]) == (65, 90)
     slow.now = 1.0
-    slow.memory.restore_factory(frozenset({"id"}), 1.0)
-    assert slow.memory["max_temperature"] == 70
-    assert slow.memory.stored[13] == 65
-    assert {commit.address for commit in slow.memory.commits} == set(range(6, 40))
-    slow.now = 2.0
-    assert (slow.memory.stored[13], slow.memory.commits) == (70, [])
+    assert bytes(slow.memory.stored[13:15]) == b"\x41\x5a"
+
+
+@pytest.mark.parametrize("torn", ["erased", "old"])
+def test_torn_id_is_the_shipped_one_after_power_up(torn: str) -> None:
+    host = Host((7,), torn=torn)
+    host.write(7, 55, 0)
+    host.bus.receive(packet(7, WRITE, 5, 9), host.now)
+    assert host.servo.midway() == pytest.approx(host.now + 0.01)
+    host.wait(0.01).servo.power_cycle()
+    assert host.servo.id == (1 if torn == "erased" else 7)
+    assert host.servo.memory.stored[5] == (255 if torn == "erased" else 7)
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_a_write_does_the_same_as_one_row_by_row(name: str) -> None:
-    chance = random.Random(name)
-    layout = Layout(TABLES[name], {})
-    quick = Memory(layout)
-    live = bytearray(quick.live)
-    for _ in range(3000):
-        address, data = chance.randrange(256), chance.randbytes(chance.randrange(12))
-        locked = chance.random() < 0.5
-        names, stored = set(), False
-        for row in layout.touched(address, len(data)):
-            if row.writable or row.name == "max_acceleration":
-                names.add(row.name)
-                stored |= row.storage is Storage.EEPROM and not locked
-                for place in range(row.address, row.address + row.size):
-                    if address <= place < address + len(data):
-                        live[place] = data[place - address]
-        assert quick.write(address, data, locked=locked) == Written(frozenset(names), stored)
-        assert quick.live == live
-
-
-@pytest.mark.parametrize("name", TABLES)
-def test_every_row_is_read_and_told_as_its_coding_says(name: str) -> None:
-    chance = random.Random(name)
-    memory = Memory(Layout(TABLES[name], {}))
-    for row in TABLES[name].values():
-        for raw in (0, 1, -1, 255, 256, -256, 0x7FFF, 0x8000, 1 << 20, chance.randrange(-40000, 40000)):
-            memory[row.name] = raw
-            span = slice(row.address, row.address + row.size)
-            assert bytes(memory.live[span]) == code(row, raw)
-            memory.live[span] = chance.randbytes(row.size)
-            assert memory[row.name] == row.decode(bytes(memory.live[span]))
-    assert any(row.coding is Coding.SIGN_MAGNITUDE for row in TABLES[name].values())
-
-
-def test_whoever_works_with_the_registers_learns_of_every_change() -> None:
-    memory = Memory(Layout(STS, {}))
-    changes = [
-        lambda: memory.write(40, b"\1", locked=True),
-        lambda: memory.write(33, b"\0", locked=True, strict=True),
-        lambda: memory.__setitem__("torque_enable", 0),
-        lambda: memory.restore_factory(frozenset()),
-        memory.power_up,
-        memory.restart,
-    ]
-    for change in changes:
-        memory.settled = True
-        change()
-        assert not memory.settled
-    memory.settled = True
-    memory.tell("present_position", 5)
-    assert memory.settled
-    assert memory["present_position"] == 5
+def test_factory_restore_brings_back_all_but_the_id(name: str) -> None:
+    host = Host((4,), name)
+    shipped = bytes(host.servo.memory.stored)
+    host.write(4, LOCK[name], 0)
+    for address in (6, 13, 19, 20, 21):
+        host.write(4, address, 1)
+    assert host.say(packet(4, RESTORE)) == ["FF FF 04 02 00 F9"]
+    assert host.servo.baud_rate == Host((4,), name).servo.baud_rate
+    assert host.wait(0.49).write(4, 13, 1) == []  # not received
+    assert host.wait(0.02).write(4, 41, 1) == ["FF FF 04 02 00 F9"]
+    assert bytes(host.servo.memory.stored) == shipped
+    assert Host(factory_restore="no").say(packet(1, RESTORE)) == []

@@ -1,315 +1,401 @@
-"""The controller by its bytes: 27 commands, a working copy and four slots, what runs, and what nobody can ask for."""
+"""What the simulated controller does with requests, inputs, and a loss of its supply."""
 
 from __future__ import annotations
 
 import json
-from math import inf
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from motorbus.errors import RequestError
-from motorbus.families.stepper.table import TABLE, Project, Step, with_steps
-from tests.protocol.stepper.vectors import DUMP_A, DUMP_B, MANUAL, REQUESTS, name_of
-from tests.protocol.vectors import Vector
-from tests.simulators.stepper.host import (
-    CLEAR,
-    DONE,
-    FORWARD,
-    READ,
-    SAVE,
-    SELECT,
-    START,
-    STOP,
-    STOP_PROJECT,
-    Host,
-    frame,
-    number,
-    step,
-    written,
-)
+from motorbus.families.stepper import FAMILY
+from motorbus.families.stepper.parameters import Project, Step, encode_image
+from motorbus.families.stepper.protocol import COMMANDS, encode
+from motorbus.families.stepper.simulator import OPTIONS, Quirks, simulate
+from motorbus.families.stepper.simulator.memory import EXAMPLE
+from tests.simulators.stepper.host import NOTICE, TURN, Host, made
 
-EXAMPLES = [
-    (request, reply)
-    for request in MANUAL
-    for reply in MANUAL
-    if request.id.endswith("-request") and reply.id == request.id.replace("-request", "-reply")
-]
+MANUAL = json.loads(Path("tests/vectors/stepper/manual.json").read_text(encoding="utf-8"))
+FRAMES = [(row["expected"]["command"], bytes.fromhex(row["hex"])) for row in MANUAL]
+REQUESTS = {name: data for name, data in FRAMES if len(data) == 11}
+REPLIES = {
+    "read_project": b"\xff\xaa\x3e\x01\x00\x00",
+    **{name: data for name, data in FRAMES if len(data) == 6},
+}
 
 
-@pytest.mark.parametrize(("request_", "reply"), EXAMPLES, ids=name_of)
-def test_each_example_of_the_manual_is_answered_as_the_manual_says(request_: Vector, reply: Vector) -> None:
-    assert bytes.fromhex(Host().say(request_.data)) == reply.data
+# -- requests and replies ----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("vector", REQUESTS, ids=name_of)
-def test_every_frame_that_is_known_is_answered(vector: Vector) -> None:
-    answered = bytes.fromhex(Host().say(vector.data))
-    assert answered[:3] == vector.data[:3]
-    assert len(answered) in (6, 226) or answered[-2:] == b"\xee\xdd"
+@pytest.mark.parametrize("name", COMMANDS)
+def test_example_of_the_manual_is_answered_as_documented(name: str) -> None:
+    replies = Host().send(REQUESTS[name], 0.1)
+    assert replies[0][:6] == REPLIES[name]
+    assert len(replies[0]) == (226 if name == "read_project" else 6)
 
 
-def test_a_new_one_holds_the_examples_of_the_manual() -> None:
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_damaged_request_is_not_answered(name: str) -> None:
     host = Host()
-    assert host.dump(1) == DUMP_A
-    assert host.dump(2) == DUMP_A[:3] + b"\x02" + bytes(222)
-    assert Host(shipped="empty").dump(1) == DUMP_A[:6] + bytes(220)
-
-
-def write_dump_b(host: Host) -> None:
-    host.write(
-        [
-            frame(SELECT, 2, 3),
-            frame(3, 1, *number(16, 2), 90),
-            frame(3, 2, *number(5000, 3)),
-            frame(0x7E, 2, 3, 2),
-            frame(0x8E, 3),
-            frame(3, 0x0E, 1),
-            frame(0x9E, 0),
-            frame(0xAE, 0),
-            *step(1, distance=10000, start=200, acceleration=100, rpm=60, output=1, delay=500),
-            *step(2, distance=56814, direction=1, start=200, acceleration=100, rpm=300, output=5, wait=1),
-            *step(3, distance=43775, start=200, acceleration=100, rpm=300, output=8, delay=1000, stop=2),
-        ]
-    )
-
-
-def test_a_project_that_is_written_is_read_byte_for_byte() -> None:
-    host = Host()
-    write_dump_b(host)
-    assert host.dump(2) == DUMP_B
-    assert host.say(frame(SAVE, 2)) == "FF AA 2E 02 00 00"
-    host.device.power_cycle()
-    assert host.dump(2) == DUMP_B
-
-
-def test_dump_b_runs_as_long_as_reckoned_and_tells_its_end_once() -> None:
-    host = Host()
-    write_dump_b(host)
-    host.device.set_input(1, True)
-    began = host.now
-    assert host.say(frame(START, 2)) == "FF AA 4E 02 00 00"
-    ((at, text),) = host.wait(60.0)
-    assert text == DONE
-    assert at - began == pytest.approx(41.613525, abs=1e-6)
-    assert host.device.position == 3 * (12800 - 2 * 72721 + 2 * 56032)
-
-
-# --- memory --------------------------------------------------------------------------------------------------------
-
-
-def test_what_is_not_saved_is_lost_with_the_supply() -> None:
-    host = Host()
-    host.write([frame(SELECT, 1, 1), *step(1, distance=77)])
-    assert host.dump(1)[26:29] == bytes(number(77, 3))
-    host.device.power_cycle()
-    assert host.dump(1) == DUMP_A
-
-
-def test_selecting_loads_what_is_stored_or_only_renames() -> None:
-    edits = [frame(SELECT, 1, 1), frame(3, 2, *number(500, 3)), frame(SELECT, 2, 1)]
-    loading = Host()
-    loading.write(edits)
-    assert loading.dump(2)[15:18] == bytes(3)
-    assert loading.dump(1) == DUMP_A
-    renaming = Host(select="relabel")
-    renaming.write(edits)
-    assert renaming.dump(2)[15:18] == bytes(number(500, 3))
-
-
-def test_selecting_writes_the_number_of_steps_and_keeps_the_rows_behind() -> None:
-    host = Host()
-    host.write(written(3, step(1), step(2, distance=9)))
-    host.write([frame(SAVE, 3), frame(SELECT, 3, 1)])
-    dump = host.dump(3)
-    assert dump[7] == 1
-    assert dump[46:49] == bytes(number(9, 3))
-
-
-def test_reading_may_show_what_is_stored() -> None:
-    host = Host(read_view="stored")
-    host.write([frame(SELECT, 1, 1), *step(1, distance=77)])
-    assert host.dump(1) == DUMP_A
-    host.say(frame(SAVE, 1))
-    assert host.dump(1)[26:29] == bytes(number(77, 3))
-
-
-@pytest.mark.parametrize(("reading", "answered"), [("warn", True), ("allow", True), ("refuse", False)])
-def test_saving_as_another_project(reading: str, answered: bool) -> None:
-    host = Host(save_cross=reading)
-    host.write([frame(SELECT, 1, 1)])
-    assert (host.say(frame(SAVE, 4)) != "") is answered
-    assert (host.dump(4)[6] == 4) is answered
-    assert bool(host.device.log) is (reading != "allow")
-
-
-@pytest.mark.parametrize(("reading", "kept"), [("old", True), ("empty", False)])
-def test_a_save_that_is_cut_by_the_supply(reading: str, kept: bool) -> None:
-    host = Host(save_cut=reading, save_time=1.0)
-    host.write([frame(SELECT, 1, 1), *step(1, distance=77)])
-    assert host.say(frame(SAVE, 1), 0.5) == ""
-    host.device.power_cycle()
-    assert host.wait(5.0) == []
-    assert (host.dump(1) == DUMP_A) is kept
-    assert (host.dump(1)[6:] == bytes(220)) is not kept
-
-
-def test_a_save_that_is_not_cut_is_acknowledged_when_it_is_done() -> None:
-    host = Host(save_time=1.0)
-    host.write([frame(SELECT, 1, 1), *step(1, distance=77)])
-    assert host.timed(frame(SAVE, 1), 2.0) == [(1.002, "FF AA 2E 01 00 00")]
-    host.device.power_cycle()
-    assert host.dump(1)[26:29] == bytes(number(77, 3))
-
-
-def test_a_cleared_project_is_zero_and_ends_when_it_is_started() -> None:
-    host = Host()
-    assert host.say(frame(CLEAR, 1)) == "FF AA 1E 01 00 00"
-    assert host.dump(1) == DUMP_A[:6] + bytes(220)
-    assert host.say(frame(START, 1)) == f"FF AA 4E 01 00 00 {DONE}"
-    assert Host(clear_notice=False, shipped="empty").say(frame(START, 1)) == "FF AA 4E 01 00 00"
-    host.say(FORWARD)
-    assert host.device.position == 0  # and with it the speed of everything by hand
-
-
-def test_bytes_of_a_number_may_come_high_one_first() -> None:
-    host = Host(dump_order="big")
-    host.write([frame(SELECT, 2, 1), frame(3, 1, *number(0x0102, 2), 180)])
-    assert host.dump(2)[12:14] == b"\x01\x02"
-    assert Host(dump_order="big").dump(1)[12:14] == b"\x00\x08"
-
-
-def test_flags_may_belong_to_the_device() -> None:
-    of_project, of_device = Host(), Host(flags_scope="device")
-    for host in (of_project, of_device):
-        host.write([frame(SELECT, 2, 1), frame(3, 0x0E, 1), frame(0xAE, 1), frame(0x9E, 2)])
-    assert of_project.dump(1)[20:23] == bytes(3)
-    assert of_device.dump(1)[20:23] == b"\x01\x02\x01"
-    of_device.device.power_cycle()
-    assert of_device.dump(1)[20:23] == bytes(3)  # never saved
-    of_device.write([frame(0xAE, 1), frame(SAVE, 1)])
-    of_device.device.power_cycle()
-    assert of_device.device.status()["phase"] == "homing"
-
-
-def test_which_project_is_selected_at_power_on() -> None:
-    host = Host(selected_at_boot=3)
-    assert host.say(frame(0x8E, 2)) == "FF AA 8E 03 00 00"
-    assert host.device.status()["selected"] == 3
-
-
-# --- what is not answered -------------------------------------------------------------------------------------------
+    before = encode_image(host.controller.store.working)
+    for at in range(2, 11):
+        data = REQUESTS[name]
+        assert host.send(data[:at] + bytes([data[at] ^ 0x40]) + data[at + 1 :]) == []
+    assert encode_image(host.controller.store.working) == before
+    assert host.phase == "idle"
 
 
 @pytest.mark.parametrize(
-    "data",
+    ("name", "values"),
     [
-        frame(SELECT, 5, 1),
-        frame(SELECT, 0, 1),
-        frame(SELECT, 1, 11),
-        frame(READ, 5),
-        frame(3, 3, 1, 0, 0, 0, 0, 11),
-        frame(3, 3, 1, 0, 0, 0, 0, 0),
-        frame(3, 6, 9, 0, 0, 0, 0, 1),
-        frame(3, 8, 6, 0, 0, 0, 0, 1),
-        frame(0, 0x0C, 6, 1),
-        frame(0, 0x0C, 1, 2),
-        frame(0, 0x0B, 0),
-        frame(3, 1, 0, 0, 180),
-        frame(0x9E, 3),
-        frame(5, 0x0D),
-        frame(3, 0x10),
-        frame(0xBE, 1),
-        frame(0, 0x0D),
-        frame(3, 0x0D)[:-1] + b"\x00",
+        ("select_project", {"project": 5, "total_steps": 1}),
+        ("select_project", {"project": 1, "total_steps": 11}),
+        ("set_microstep_and_angle", {"microsteps": 0, "step_angle": 180}),
+        ("set_step_output", {"output": 9, "step": 1}),
+        ("set_step_delay", {"delay": 1, "step": 11}),
+        ("read_input", {"port": 6}),
+        ("set_output", {"port": 1, "level": 2}),
+        ("start_project", {"project": 0}),
     ],
 )
-def test_what_is_wrong_is_not_answered_and_changes_nothing(data: bytes) -> None:
+def test_number_out_of_range_is_not_answered(name: str, values: dict[str, int]) -> None:
     host = Host()
-    assert host.say(data) == ""
-    assert host.device.log
-    assert host.dump(1) == DUMP_A
-    assert host.device.state.phase.value == "idle"
+    assert host.ask(name, **values) == []
+    assert name in host.controller.log[-1].text
 
 
-def test_numbers_out_of_range_may_be_acknowledged_and_are_ignored() -> None:
-    host = Host(out_of_range="ack")
-    assert host.say(frame(3, 6, 9, 0, 0, 0, 0, 1)) == "FF AA 03 06 00 01"
-    assert host.say(frame(3, 6, 1, 0, 0, 0, 0, 11)) == ""  # but not for a step that there is not
-    assert host.dump(1) == DUMP_A
+def test_other_motor_and_unknown_command_are_not_answered() -> None:
+    host = Host(motor=7)
+    assert host.ask("stop_motor") == []
+    assert host.send(encode("stop_motor", motor=7)) == [bytes.fromhex("FFAA070D0000")]
+    assert host.ask("stop_project") == [bytes.fromhex("FFAA5E000000")]
+    unknown = bytes.fromhex("FFAA0710000000000000")
+    assert host.send(unknown + bytes([sum(unknown) & 255])) == []
+    assert [remark.text for remark in host.controller.log] == [
+        "motor 3 is another one",
+        "unknown command 07 10",
+    ]
 
 
-def test_steps_behind_the_last_one_are_taken() -> None:
-    assert Host().say(frame(3, 6, 1, 0, 0, 0, 0, 10)) == "FF AA 03 06 00 0A"
+def test_requests_in_pieces_after_noise_and_after_a_gap() -> None:
+    host, request = Host(), REQUESTS["stop_project"]
+    assert host.send(request[:5]) == []
+    assert host.send(request[5:]) == [REPLIES["stop_project"]]
+    assert host.send(b"\xff\x00\xff\xaa\x01" + request) == [REPLIES["stop_project"]]
+    assert host.send(request[:5]) == []
+    host.wait(0.2)
+    assert host.send(request[5:]) == []
+    assert host.send(request + request, 0.01) == [REPLIES["stop_project"]] * 2
 
 
-def test_another_motor_number_may_be_its_own() -> None:
-    host = Host(motor=5)
-    assert host.say(frame(5, 0x0D)) == "FF AA 05 0D 00 00"
-    assert host.say(STOP) == ""
-    assert host.say(STOP_PROJECT) == "FF AA 5E 00 00 00"
-
-
-# --- looking at it ---------------------------------------------------------------------------------------------------
-
-
-def test_its_status_is_plain_data() -> None:
+def test_host_at_another_rate_is_not_heard() -> None:
     host = Host()
-    host.write(written(2, step(1), repeat=2))
-    host.say(frame(START, 2), 1.5)
-    status = json.loads(json.dumps(host.device.status()))
-    assert (status["phase"], status["project"], status["step"], status["pass"]) == ("moving", 2, 1, 2)
-    assert status["position"] == pytest.approx(2400, abs=4)
-    assert status["frequency"] == 1600
+    host.line.tune(19200)
+    assert host.send(REQUESTS["stop_project"]) == []
 
 
-def test_its_memory_is_every_row_by_name() -> None:
+def test_reply_comes_after_the_turnaround_and_a_save_after_its_time() -> None:
+    host = Host(turnaround=0.01)
+    host.ask("stop_project", 0.1)
+    assert host.came[-1][0] == pytest.approx(0.01)
+    begun = host.now
+    assert host.ask("save_project", 0.03, project=1) == []
+    assert host.controller.midway() == pytest.approx(begun + 0.025)
+    assert host.wait(0.02) == [REPLIES["save_project"]]
+    assert host.controller.midway() == float("inf")
+
+
+def test_echo_returns_what_the_host_sends() -> None:
+    host = Host(echo=True)
+    assert host.ask("stop_project") == [REQUESTS["stop_project"], REPLIES["stop_project"]]
+
+
+# -- memory ------------------------------------------------------------------------------------------------------------
+
+
+def test_new_controller_has_the_example_or_nothing() -> None:
+    assert Host().read(1) == EXAMPLE
+    assert Host().read(2) == Project()
+    assert Host(shipped="cleared").read(1) == Project()
+    assert Host().controller.memory["step_1_delay"] == 1000
+
+
+def test_edits_show_at_once_and_are_lost_without_a_save() -> None:
     host = Host()
-    memory = host.device.memory
-    assert set(memory) == set(TABLE)
-    assert len(memory) == len(TABLE)
-    assert (memory["microsteps"], memory["step_angle"], memory["step_1_delay"], memory["step_10_delay"]) == (
-        8,
-        180,
-        1000,
-        0,
+    host.ask("set_step_delay", delay=7, step=1)
+    assert host.read(1).step(1).delay == 7
+    host.controller.power_cycle()
+    assert host.read(1).step(1).delay == 1000
+    host.ask("set_step_delay", delay=7, step=1)
+    host.ask("save_project", 0.1, project=1)
+    host.controller.power_cycle()
+    assert host.read(1).step(1).delay == 7
+
+
+def test_stored_view_shows_edits_only_after_the_save() -> None:
+    host = Host(read_view="stored")
+    host.ask("set_step_delay", delay=7, step=1)
+    assert host.read(1).step(1).delay == 1000
+    host.ask("save_project", 0.1, project=1)
+    assert host.read(1).step(1).delay == 7
+
+
+@pytest.mark.parametrize("select", ["load", "relabel"])
+def test_selection_loads_or_renames(select: str) -> None:
+    host = Host(made(number=2), select=select)
+    host.ask("set_step_delay", delay=7, step=1)
+    host.ask("select_project", project=2, total_steps=3)
+    shown = host.read(2)
+    assert (shown.number, shown.total_steps) == (2, 3)
+    assert shown.step(1) == (TURN if select == "load" else Step(**{**steps(EXAMPLE), "delay": 7}))
+    (reply,) = host.ask("set_project_loop", project_loop=1)
+    assert reply[3] == 2, "the reply names the selected project"
+
+
+def steps(project: Project) -> dict[str, Any]:
+    step = project.step(1)
+    return {name: getattr(step, name) for name in step.__slots__}
+
+
+def test_save_stores_the_selected_project_under_any_number() -> None:
+    host = Host()
+    host.ask("save_project", 0.1, project=3)
+    assert host.read(3).step(1) == EXAMPLE.step(1)
+    assert host.read(3).number == 3
+
+
+def test_clear_empties_stored_and_edited_copy() -> None:
+    host = Host()
+    host.ask("clear_project", 0.1, project=1)
+    assert host.read(1) == Project()
+    host.controller.power_cycle()
+    assert host.read(1) == Project()
+    assert host.ask("start_project", project=1) == [REPLIES["start_project"], NOTICE]
+
+
+@pytest.mark.parametrize("save_cut", ["old", "empty"])
+def test_supply_lost_during_a_save(save_cut: str) -> None:
+    host = Host(save_cut=save_cut)
+    host.ask("set_step_delay", delay=7, step=1)
+    host.ask("save_project", 0.01, project=1)
+    host.controller.power_cycle()
+    assert host.wait(0.1) == [], "the acknowledgement is lost"
+    assert host.read(1) == (EXAMPLE if save_cut == "old" else Project())
+
+
+@pytest.mark.parametrize("order", ["little", "big"])
+def test_dump_has_the_byte_order(order: str) -> None:
+    host = Host(made(Step(distance=0x010203)), dump_order=order)
+    (dump,) = host.ask("read_project", project=1)
+    assert dump[26:29] == bytes((1, 2, 3) if order == "big" else (3, 2, 1))
+
+
+# -- motion ------------------------------------------------------------------------------------------------------------
+
+
+def test_project_runs_its_loops_and_sends_one_notice() -> None:
+    there, back = (
+        Step(**{**steps(made()), "delay": 100}),
+        Step(**{**steps(made()), "direction": 1, "distance": 400}),
     )
-    host.write([frame(SELECT, 2, 7)])
-    assert (memory["number"], memory["total_steps"]) == (2, 7)
-    assert memory["step_1_start_frequency"] == 0
-    with pytest.raises(RequestError):
-        memory["colour"]
+    project = made(there, back, loop_first=1, loop_last=2, loop_count=2, project_loop=3)
+    host = Host(project)
+    assert host.ask("start_project", project=1) == [REPLIES["start_project"]]
+    assert host.controller.status()["step"] == 1
+    came = host.wait(30.0)
+    assert came == [NOTICE]
+    assert host.controller.position == 6 * (1600 - 400)
+    assert host.phase == "idle"
 
 
-def test_a_project_can_be_put_into_it() -> None:
+def test_outputs_follow_steps_and_commands_and_stay_until_power_off() -> None:
+    host = Host(made(Step(output=2), Step(output=4), Step(output=5)))
+    host.ask("set_output", port=1, level=1)
+    host.ask("set_output", port=5, level=1)
+    host.ask("start_project", project=1)
+    status = host.controller.status()
+    assert status["outputs"] == [False, True, True]
+    assert status["leds"] is True
+    host.controller.power_cycle()
+    assert host.controller.status()["outputs"] == [False] * 3
+
+
+def test_inputs_start_stop_wait_and_cut() -> None:
+    waits, cut = Step(**{**steps(made()), "start_input": 1}), Step(**{**steps(made()), "stop_input": 2})
+    host = Host(made(waits, cut))
+    assert host.ask("read_input", port=1)[0][5] == 0
+    host.controller.set_input(3, True)
+    assert host.phase == "waiting for an input"
+    host.controller.set_input(1, True)
+    assert host.phase == "moving"
+    assert host.ask("read_input", port=1)[0][5] == 1
+    host.wait(1.3)
+    assert host.controller.status()["step"] == 2
+    host.controller.set_input(2, True)
+    assert host.wait(0.01) == [], "a project that an input started sends no notice"
+    assert 1600 < host.controller.position < 2200
+    host.controller.set_input(2, False)
+    host.ask("start_project", project=1)
+    host.controller.set_input(4, True)
+    assert host.wait(5.0) == []
+    assert host.phase == "idle"
+    with pytest.raises(RequestError, match="input 6"):
+        host.controller.set_input(6, True)
+
+
+def test_a_script_changes_inputs_at_its_moments() -> None:
     host = Host()
-    made = with_steps(Project(microsteps=8, step_angle=180, turn_distance=1), (Step(distance=5),))
-    host.device.put(1, made)
-    assert host.dump(1)[6:8] == b"\x01\x01"
-    assert host.dump(1)[26] == 5
-    with pytest.raises(RequestError, match="no project 5"):
-        host.device.put(5, made)
+    host.line.script("2.5 1 on\n0.5 2 on\n3.0 1 off")
+    assert host.line.due() == 0.5
+    seen = []
+    for moment in (0.4, 0.5, 2.5, 3.0):
+        host.line.advance(moment)
+        seen.append(sorted(host.controller.machine.inputs))
+    assert seen == [[], [2], [1, 2], [2]]
+    with pytest.raises(RequestError, match="'1 6 on' is no change of an input"):
+        host.line.script("1 6 on")
 
 
-def test_remarks_do_not_grow_for_ever() -> None:
-    host = Host()
-    for _ in range(1100):
-        host.device.remark("again")
-    assert len(host.device.log) == 1000
-
-
-def test_what_happened_does_not_grow_for_ever() -> None:
-    host = Host()
-    host.write(written(1, step(1, distance=0, delay=1), repeat=255))
-    host.say(frame(START, 1), 20.0)
-    assert len(host.device.told) == 10_000
-    assert host.device.told[-1].at == pytest.approx(host.now, abs=0.002)
-
-
-def test_the_middle_of_a_save() -> None:
-    host = Host(save_time=0.5, turnaround=0.0)
-    assert host.device.midway() == inf
-    began = host.now
-    host.bus.receive(frame(SAVE, 1), began)
-    assert host.device.midway() == pytest.approx(began + 0.25)
+def test_busy_controller_acknowledges_and_ignores_a_start() -> None:
+    host = Host(made(project_loop=255))
+    host.ask("start_project", project=1)
+    assert host.ask("jog_forward") == [REPLIES["jog_forward"]]
+    assert host.controller.status()["project"] == 1
+    assert "jog_forward is ignored" in host.controller.log[-1].text
+    host.ask("set_step_delay", delay=7, step=1)
+    assert "is not changed" in host.controller.log[-1].text
+    host.ask("stop_motor")
     host.wait(1.0)
-    assert host.device.midway() == inf
+    assert host.phase == "idle"
+
+
+@pytest.mark.parametrize("mode", [0, 1])
+def test_stop_mode_decides_how_a_stop_ends_the_motion(mode: int) -> None:
+    host = Host(made())
+    host.ask("set_stop_mode", stop_mode=mode)
+    host.ask("jog_reverse", 0.5)
+    host.ask("stop_project", 0.01)
+    assert host.phase == "jogging", "stop project does not end a manual motion"
+    host.ask("stop_motor", 0.002)
+    assert host.phase == ("slowing down" if mode == 0 else "idle")
+    host.wait(0.1)
+    assert host.phase == "idle"
+    assert host.controller.position < -400
+    host.ask("jog_reverse", 0.5)
+    host.ask("set_stop_mode", stop_mode=1 - mode)
+    host.ask("stop_motor", 0.002)
+    assert host.phase == ("idle" if mode == 0 else "slowing down")
+
+
+@pytest.mark.parametrize(("tick", "seconds"), [(1.0, 1.092), (10.0, 1.853)])
+def test_ramp_grows_in_each_tick(tick: float, seconds: float) -> None:
+    host = Host(made(Step(distance=1600, speed=60, start_frequency=400, acceleration=10)), ramp_tick_ms=tick)
+    host.ask("run_once", seconds - 0.03)
+    assert host.phase == "making one move"
+    host.wait(0.06)
+    assert (host.phase, host.controller.position) == ("idle", 1600)
+    assert host.wait(1.0) == []
+
+
+# -- home switch, power ------------------------------------------------------------------------------------------------
+
+
+def test_wired_switch_is_closed_at_its_place_and_behind_it() -> None:
+    host = Host(made(), home_switch="wired", home_at=-500)
+    host.ask("home", 10.0)
+    status = host.controller.status()
+    assert (status["phase"], status["position"], status["homed"], status["inputs"]) == ("idle", 0, True, [5])
+    host.controller.set_input(5, False)
+    assert host.controller.status()["inputs"] == [5], "its place has it"
+    host.ask("jog_forward", 0.5)
+    assert host.controller.status()["inputs"] == []
+    host.ask("stop_motor", 2.0)
+    host.ask("home", 10.0)
+    assert host.controller.position == 0
+    assert host.controller.offset == -500
+
+
+@pytest.mark.parametrize(("switch", "inputs"), [("stuck", [5]), ("never", []), ("free", [])])
+def test_other_home_switches(switch: str, inputs: list[int]) -> None:
+    host = Host(made(), home_switch=switch)
+    assert host.controller.status()["inputs"] == inputs
+    host.ask("home", 60.0)
+    assert host.phase == ("idle" if switch == "stuck" else "homing")
+    assert host.controller.position == (0 if switch == "stuck" else pytest.approx(-60 * 1600, rel=0.01))
+    host.controller.set_input(5, True)
+    assert host.phase == ("homing" if switch == "never" else "idle")
+
+
+def test_power_on_homing_moves_when_the_supply_comes() -> None:
+    host = Host(made(power_on_home=1))
+    host.controller.power_cycle()
+    assert host.phase == "homing"
+    host.controller.set_input(5, True)
+    assert host.controller.status()["homed"] is True
+
+
+def test_unplugged_controller_is_silent_and_comes_back_at_rest() -> None:
+    host = Host(made(project_loop=255))
+    host.ask("start_project", 0.5, project=1)
+    place = host.controller.position
+    host.controller.unplug()
+    assert host.ask("stop_motor") == []
+    assert host.phase == "off"
+    host.controller.plug()
+    assert (host.phase, host.controller.position) == ("idle", place)
+    assert host.ask("stop_motor") == [REPLIES["stop_motor"]]
+    assert host.wait(10.0) == []
+
+
+def test_clock_may_begin_anywhere_and_nothing_depends_on_how_often_it_is_looked_at() -> None:
+    often, once = Host(made(), at=1e6), Host(made(), at=1e6)
+    for host in (often, once):
+        host.ask("start_project", 0.0, project=1)
+    for _ in range(300):
+        often.wait(0.01)
+    once.wait(3.0)
+    assert [data for _, data in often.came] == [data for _, data in once.came]
+    assert [at for at, _ in often.came] == pytest.approx([at for at, _ in once.came], abs=1e-6)
+    assert often.came[-1][1] == NOTICE
+
+
+def test_due_is_the_moment_of_the_next_event() -> None:
+    host = Host(made())
+    assert host.line.due() is None
+    host.line.receive(encode("start_project", project=1), 0.0)
+    assert host.line.due() == pytest.approx(0.002)
+    host.wait(0.01)
+    due = host.line.due()
+    assert due is not None
+    assert host.wait(due - host.now - 1e-6) == []
+    assert host.wait(1e-6 + 1e-9) == [NOTICE]
+
+
+def test_notice_without_a_cause() -> None:
+    host = Host()
+    host.controller.notice()
+    assert host.wait(0.0) == [NOTICE]
+
+
+# -- options -----------------------------------------------------------------------------------------------------------
+
+
+def test_options_are_checked() -> None:
+    assert len(Quirks.__dataclass_fields__) == 11, (
+        "8 quirks, the place of the switch, and two settings of the bus"
+    )
+    assert {option.name for option in OPTIONS} >= {"motor", "dump_order", "select"}
+    for options in (
+        {"select": "both"},
+        {"speed": 3},
+        {"motor": 14},
+        {"motor": "x"},
+        {"dump_order": "middle"},
+    ):
+        with pytest.raises(RequestError):
+            simulate((1,), **options)
+    for ids, model in (((2,), ""), ((1, 1), ""), ((1,), "servo")):
+        with pytest.raises(RequestError):
+            simulate(ids, model)
+    assert FAMILY.simulator((1,), "Stepper", turnaround="0.5").nodes[1].quirks.turnaround == 0.5  # type: ignore[attr-defined]

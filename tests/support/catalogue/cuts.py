@@ -7,15 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from math import inf, tau
+from math import inf
 from typing import Any
 
 from motorbus.core.family import Family
 from motorbus.core.register import Storage
 from motorbus.families.kst import PowerCycleNeeded
-from motorbus.families.stepper import Program
-from motorbus.families.stepper.table import Project, Step, with_steps
 from tests.conformance.cuts import Call, Command
+from tests.support.catalogue import stepper
 from tests.support.subjects import SUBJECTS, tables_of
 from tests.support.world import kept, locks, samples
 
@@ -57,9 +56,8 @@ def feetech(kind: str, method: str, *arguments: Any, name: str = "", **fields: A
 
 
 def identity(kind: str, method: str, value: int, *, name: str = "", **fields: Any) -> Command:
-    """A change of id or rate, among the ids of this bus."""
-    options = {"among": (OLD, NEW, OTHER)}
-    return feetech(kind, method, value, name=name, options=options, journalled=True, **fields)
+    """A change of id or rate."""
+    return feetech(kind, method, value, name=name, journalled=True, **fields)
 
 
 def guarded(kind: str, method: str, *arguments: Any, **fields: Any) -> Command:
@@ -113,7 +111,7 @@ FEETECH = [
     identity("scs2", "set_baud", SLOW, quirks={"torn": "old", "baud_ack": "new"}, cuts=10),
     identity("smcl", "set_baud", SLOW, quirks={"eeprom_commit": "after_ack"}, cuts=10),
     guarded("sts", "set_mode", "velocity", pairs=50),
-    guarded("sts", "set_many_turns", True, quirks={"torn": "new"}, pairs=50),
+    guarded("sts", "set_multi_turn", True, quirks={"torn": "new"}, pairs=50),
     guarded("sts", "calibrate", 1.0, name="-to", pairs=50),
     guarded("sts", "calibrate", name="-middle"),
     guarded("hls", "calibrate"),
@@ -186,77 +184,7 @@ KST = [
     kst("kst-ext", "set_reversed", True, ids=(OLD, OTHER), pairs=50),
 ]
 
-# -- stepper -----------------------------------------------------------------------------------------------------------
-
-BORROWED = with_steps(
-    Project(
-        number=1, microsteps=8, step_angle=180, turn_distance=400, loop_first=1, loop_last=2, loop_count=3
-    ),
-    (
-        Step(distance=7, direction=1, start_frequency=60, acceleration=40, speed=90, delay=300, output=2),
-        Step(distance=50, start_frequency=50, acceleration=30, speed=120),
-    ),
-)
-"""A project 1 in which every field that is borrowed has a value of its own."""
-STORED = replace(BORROWED, number=2, turn_distance=77)
-WRITTEN = replace(
-    with_steps(STORED, (*STORED.steps[:1], Step(distance=56814, speed=300, start_frequency=200))), stop_mode=1
-)
-
-
-def stepper_contents(device: Any) -> object:
-    return device.status(), dict(device.store.stored), [device.memory[name] for name in device.memory]
-
-
-def stepper(method: str, *arguments: Any, name: str = "", **fields: Any) -> Command:
-    subject = SUBJECTS["stepper"]
-
-    def prepare(device: Any) -> None:
-        device.put(1, BORROWED)
-        device.put(2, STORED)
-
-    def state(device: Any) -> object:
-        return device.store.image(1), dict(device.store.stored), device.status()["phase"]
-
-    return Command(
-        name=f"stepper-{method}{name}",
-        subject=subject,
-        ids=(1,),
-        call=Call(method, arguments, fields.pop("options", {})),
-        state=state,
-        address=lambda device: (1, subject.link.rate),
-        contents=stepper_contents,
-        prepare=prepare,
-        **fields,
-    )
-
-
-def borrow(method: str, *arguments: Any, **fields: Any) -> Command:
-    return stepper(method, *arguments, journalled=True, **fields)
-
-
-def edit(method: str, *arguments: Any, **fields: Any) -> Command:
-    """A change of a project, which the next call completes."""
-    return stepper(method, *arguments, guarded=False, **fields)
-
-
-RELABELLED = {"select": "relabel", "selected_at_boot": 2}
-STORED_VIEW = {**RELABELLED, "read_view": "stored", "save_cut": "empty"}
-HOMING = {"velocity": tau, "deadline": 5.0}
-AT_HOME = {"home_switch": "wired", "home_at": -30}
-
-STEPPER = [
-    borrow("jog", tau, 0.5, pairs=50),
-    borrow("jog", tau, 0.5, name="-relabel", quirks=RELABELLED, cuts=20),
-    borrow("move_by", -tau, options={"velocity": tau}, pairs=50),
-    borrow("home", options=HOMING, quirks=AT_HOME, then=Call("jog", (tau, 0.5)), cuts=40, pairs=50),
-    borrow("run", 1, guarded=False, pairs=50),
-    edit("write_project", Program(project=WRITTEN), atomic=True, restart=1, pairs=50),
-    edit("write_project", Program(project=WRITTEN), name="-relabel", quirks=STORED_VIEW, cuts=20),
-    edit("clear", 2, atomic=True, pairs=50),
-]
-
-COMMANDS = [*FEETECH, *guarded_writes(), *KST, *STEPPER]
+COMMANDS = [*FEETECH, *guarded_writes(), *KST, *stepper.COMMANDS]
 
 
 NOT_COMPLETED = {
@@ -271,7 +199,7 @@ def known_faults() -> Iterator[tuple[Command, str]]:
     for command in COMMANDS:
         if command.restart == 1:
             yield replace(command, restart=0), NOT_COMPLETED[command.subject.name]
-        if command.call.method == "set_many_turns":
+        if command.call.method == "set_multi_turn":
             yield replace(command, quirks=ERASED), TORN
     yield kst("kst-ext", "set_mid_point", ids=(OLD, OTHER), prepare=turned), NO_EFFECT
 

@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 
 from motorbus.core.request import Expected, Reply, Request, Response, TimeoutClass
 from motorbus.errors import MotorbusError
-from motorbus.families.feetech import Servo, wire
-from motorbus.families.feetech.driver.exchanges import (
+from motorbus.families.feetech import FAMILY, Servo, protocol
+from motorbus.families.feetech.driver.bus import HELD, hold_request
+from motorbus.families.feetech.driver.requests import (
     PRESENT,
     Block,
     acknowledged,
@@ -21,9 +22,6 @@ from motorbus.families.feetech.driver.exchanges import (
     verified,
     write_block,
 )
-from motorbus.families.feetech.driver.holding import COUNT, ask, holds
-from motorbus.families.feetech.driver.line import stop
-from motorbus.families.feetech.driver.sharing import read_twice
 from tests.support.rigs.feetech import FEEDBACK, IDS, Rig, ping
 from tests.support.single_faults import Overheard
 
@@ -102,7 +100,7 @@ def reg_write(rig: Rig) -> None:
     """Success means that it waits in the servo."""
     data, servo = _word(rig), rig.servos[1]
     block = Block(GOAL_TIME, data, repeatable=False)
-    exchange = acknowledged(Servo(rig.bus, 1), wire.reg_write(1, GOAL_TIME, data), block)
+    exchange = acknowledged(Servo(rig.bus, 1), protocol.reg_write(1, GOAL_TIME, data), block)
     _written(rig, exchange, lambda: servo.pending, (GOAL_TIME, data))
 
 
@@ -111,7 +109,7 @@ def action(rig: Rig) -> None:
     servo = rig.servos[1]
     assert servo.pending is not None
     data = servo.pending[1]
-    exchange = acknowledged(Servo(rig.bus, 1), wire.action(1), Block(0, b"", repeatable=False))
+    exchange = acknowledged(Servo(rig.bus, 1), protocol.action(1), Block(0, b"", repeatable=False))
     _written(rig, exchange, lambda: servo.memory.read(GOAL_TIME, 2), data)
     assert servo.pending is None
 
@@ -121,7 +119,7 @@ def sync_write(rig: Rig) -> None:
     data = [_word(rig) for _ in GROUP]
     before = [rig.servos[id].memory.read(GOAL_TIME, 2) for id in GROUP]
     rig.bus.run(
-        unanswered(wire.sync_write(GOAL_TIME, list(zip(GROUP, data, strict=True))), Block(0, b"").effect)
+        unanswered(protocol.sync_write(GOAL_TIME, list(zip(GROUP, data, strict=True))), Block(0, b"").effect)
     )
     rig.link.advance(0.1)
     after = [rig.servos[id].memory.read(GOAL_TIME, 2) for id in GROUP]
@@ -132,23 +130,29 @@ def sync_read(rig: Rig) -> None:
     """A node may be missing; one that is there is right."""
     raw = rig.stir()
     dues = tuple(Expected(node, node, 8) for node in GROUP)
-    answer: Response = rig.bus.run(Request[Response](wire.sync_read(56, 2, GROUP), dues, repeatable=True))
+    answer: Response = rig.bus.run(Request[Response](protocol.sync_read(56, 2, GROUP), dues, repeatable=True))
     told = {reply.data[2]: reply.data[5:7] for reply in answer.replies}
     assert told == dict.fromkeys(set(GROUP) - set(answer.missing), rig.code(raw))
+
+
+def _once(rig: Rig, packet: bytes) -> Request[Any]:
+    """An instruction that is not sent twice."""
+    block = Block(0, b"", repeatable=False)
+    return acknowledged(Servo(rig.bus, 1), packet, block, timeout=TimeoutClass.STORE)
 
 
 def restore(rig: Rig) -> None:
     """RESET, known as factory restore: what was set is as shipped."""
     memory = rig.servos[1].memory
-    exchange = acknowledged(Servo(rig.bus, 1), wire.factory_restore(1), timeout=TimeoutClass.STORE)
-    shipped = memory.layout.factory[13]
+    exchange = _once(rig, protocol.factory_restore(1))
+    shipped = memory.layout.shipped[13]
     _written(rig, exchange, lambda: memory.live[13], shipped)
 
 
 def _set_apart(rig: Rig) -> None:
     rig.link.advance(2.0)  # a servo is deaf while it restores itself
     memory = rig.servos[1].memory
-    memory.live[13] = memory.layout.factory[13] - 1
+    memory.live[13] = memory.layout.shipped[13] - 1
 
 
 def calibration(position: int | None) -> Kind:
@@ -156,8 +160,8 @@ def calibration(position: int | None) -> Kind:
 
     def act(rig: Rig) -> None:
         servo = rig.servos[1]
-        request = wire.calibrate(1, b"" if position is None else rig.code(position))
-        exchange = acknowledged(Servo(rig.bus, 1), request, timeout=TimeoutClass.STORE)
+        request = protocol.calibrate(1, b"" if position is None else rig.code(position))
+        exchange = _once(rig, request)
         _written(rig, exchange, lambda: servo.raw_position, 2048 if position is None else position)
 
     return Kind(act, 6 if position is None else 8, 6, lambda rig: _stand(rig, 1000), sure=False)
@@ -167,14 +171,14 @@ def _stand(rig: Rig, raw: int) -> None:
     rig.link.advance(0.2)  # what it stores takes its time
     servo = rig.servos[1]
     servo.memory["homing_offset"] = 0  # at one pose the offset that a calibration needs does not fit
-    servo.count_anew(rig.link.now())
+    servo.set_zero()
     servo.raw_position = raw
 
 
 def clear_turns(rig: Rig) -> None:
     """CLEAR TURNS 0x0A: it tells a position within one turn."""
     servo = rig.servos[1]
-    exchange = acknowledged(Servo(rig.bus, 1), wire.clear_turns(1), timeout=TimeoutClass.STORE)
+    exchange = _once(rig, protocol.clear_turns(1))
     _written(rig, exchange, lambda: servo.raw_position, servo.raw_position % 4096)
 
 
@@ -200,13 +204,14 @@ def _switches(rig: Rig) -> dict[int, int]:
 def limp(rig: Rig) -> None:
     """What an emergency stop says to each by its name."""
     memory = rig.servos[1].memory
-    exchange = stop({1: None}).requests[1]
+    exchange = FAMILY.open().stop({1: None}).requests[1]
     _written(rig, exchange, lambda: memory.live[TORQUE], 0)
 
 
 def limp_unanswered(number: int, whom: Collection[int]) -> Kind:
     """What it says to many at once: nobody answers, so they are all let go, or have not heard it."""
-    exchange = (stop({}) if len(whom) == len(IDS) else stop(dict.fromkeys(whom), hold=(4,))).requests[number]
+    driver = FAMILY.open() if len(whom) == len(IDS) else FAMILY.open(estop_hold="4")
+    exchange = driver.stop(dict.fromkeys(() if len(whom) == len(IDS) else whom)).requests[number]
     assert isinstance(exchange.wire, bytes)
 
     def act(rig: Rig) -> None:
@@ -222,7 +227,7 @@ def limp_unanswered(number: int, whom: Collection[int]) -> Kind:
 def ask_to_hold(rig: Rig) -> None:
     """READ of all that decides what holds a servo."""
     raw = rig.stir()
-    answer: Response = rig.bus.run(ask(1))
+    answer: Response = rig.bus.run(hold_request(1, None))
     assert [reply.data[5:-1] for reply in answer.replies] == [_image(rig, raw)]
 
 
@@ -233,17 +238,10 @@ def _image(rig: Rig, raw: int) -> bytes:
 def hold(rig: Rig) -> None:
     """What it is told then: to be where it is. Success means that this is its goal."""
     raw, memory = rig.stir(), rig.servos[1].memory
-    told = Reply(1, 1, wire.encode_status(1, 0, _image(rig, raw)))
-    (exchange,) = holds({1: Response((told,), (), rig.link.now())}, (1,))
-    assert exchange.wire == wire.write(1, GOAL, rig.code(raw))
+    told = Reply(1, 1, protocol.frame(1, 0, _image(rig, raw)))
+    exchange = hold_request(1, Response((told,), (), rig.link.now()))
+    assert exchange.wire == protocol.write(1, GOAL, rig.code(raw))
     _written(rig, exchange, lambda: memory.read(GOAL, 2), rig.code(raw))
-
-
-def listened_twice(rig: Rig) -> None:
-    """READ with the line kept open for a second servo of the same id. There is none, and none may be heard."""
-    raw, memory = rig.stir(), rig.servos[1].memory
-    told = rig.bus.run(read_twice(Servo(rig.bus, 1), PRESENT, FEEDBACK))
-    assert told == (rig.code(raw) + memory.read(58, FEEDBACK - 2),)
 
 
 _COMMON = {
@@ -262,14 +260,13 @@ _COMMON = {
     "stop: one is let go": Kind(limp, 8, 6, _stiff, sure=False),  # a stop says it again in its next round
     "stop: all are let go": limp_unanswered(0, IDS),
     "stop: some are let go": limp_unanswered(0, GROUP),
-    "read that two may answer": Kind(listened_twice, 8, 6 + FEEDBACK, _let_be, sure=False),
 }
 KINDS: dict[str, dict[str, Kind]] = {
     "sts3215": {
         **_COMMON,
         "sync read 3 x 2 bytes": Kind(sync_read, 11, 24),
         "calibrate": calibration(None),
-        "stop: one is asked for what holds it": Kind(ask_to_hold, 8, 6 + COUNT, _stiff, sure=False),
+        "stop: one is asked for what holds it": Kind(ask_to_hold, 8, 6 + HELD, _stiff, sure=False),
         "stop: one is held": Kind(hold, 9, 6, _stiff, sure=False),
     },
     "scs215": _COMMON,

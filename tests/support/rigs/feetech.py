@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from motorbus.core.request import Expected, Request, Response
-from motorbus.families.feetech import FAMILY, wire
+from motorbus.families.feetech import FAMILY, protocol
 from motorbus.families.feetech.simulator import FeetechBus
+from motorbus.families.feetech.traits import TRAITS
 from motorbus.link.base import Line, PerfectLine
 from motorbus.link.memory import MemoryLink
 from tests.support.world import make_bus
@@ -41,7 +42,7 @@ class Rig:
     def stir(self) -> int:
         """Give every servo a position it has not had lately; returns it."""
         self.count += 1
-        raw = 17 + self.count * 7919 % (self.servos[1].model.turn - 96)
+        raw = 17 + self.count * 7919 % (TRAITS[self.servos[1].model.table.name].turn - 96)
         for servo in self.servos.values():
             servo.raw_position = raw
         return raw
@@ -52,6 +53,6 @@ class Rig:
 
 
 def ping(rig: Rig) -> None:
-    request: Request[Response] = Request(wire.ping(1), (Expected(1, 1, 6),), repeatable=True)
+    request: Request[Response] = Request(protocol.ping(1), (Expected(1, 1, 6),), repeatable=True)
     answer = rig.bus.run(request)
-    assert answer.replies[0].data == wire.encode_status(1, 0)
+    assert answer.replies[0].data == protocol.frame(1, 0)

@@ -1,48 +1,68 @@
-"""Many servos in one packet: SYNC READ with partial results, SYNC WRITE split to what a packet can carry.
+"""Several servos in one packet: SYNC READ with partial results, SYNC WRITE, REG WRITE with one ACTION.
 
-A silent servo costs its own value and nobody else's. Ids alone say nothing of register maps, limits and units, so
-whoever is named by id is read first (registers 0 to 39, by SYNC READ as well); a servo object that is prepared
-costs nothing more. Trains of replies are kept short, for a stop must wait until a train has passed.
+A silent servo costs its own value only. Servos of maps without SYNC READ, and those that answer READ and not SYNC READ,
+are read one by one. Replies of one request take at most 4 ms, for a stop waits until they have passed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Final, NamedTuple, TypeVar
+from operator import gt, lt, mul, truediv
+from struct import Struct
+from typing import Any, Final, NamedTuple, TypeVar
 
-from motorbus.core.register import RegisterMap, Value, shown
-from motorbus.core.request import ExactDecoder, Expected, Request, Response
-from motorbus.core.setpoint import Setpoint
-from motorbus.core.steps import catch
-from motorbus.errors import MotorbusError, RequestError
-from motorbus.families.feetech import wire
-from motorbus.families.feetech.driver.exchanges import (
-    Block,
-    changed_since,
-    read_block,
-    told_by,
-    unanswered,
+from motorbus.core.family import Positions
+from motorbus.core.register import Register, RegisterMap, Value
+from motorbus.core.request import (
+    ExactDecoder,
+    Expected,
+    Priority,
+    Request,
+    Response,
+    SetpointGroup,
+    SetpointWrite,
 )
-from motorbus.families.feetech.driver.gauge import blocks
+from motorbus.core.setpoint import Setpoint, torque_off
+from motorbus.core.steps import Emit, Exclusive, SetBitrate, catch, with_cleanup
+from motorbus.errors import MotorbusError, RequestError
+from motorbus.families.feetech import protocol
+from motorbus.families.feetech.driver.access import (
+    Span,
+    action_all,
+    check_names,
+    check_values,
+    decode_span,
+    hand_over,
+    ram_block,
+    rows_of,
+    spans,
+)
+from motorbus.families.feetech.driver.goals import position_goal
 from motorbus.families.feetech.driver.identity import learn, unknown_map
+from motorbus.families.feetech.driver.motion import LIMP, disable_torque
 from motorbus.families.feetech.driver.node import IMAGE, Node, as_nodes
-from motorbus.families.feetech.driver.orders import check_names, check_values, only_block, orders_of
-from motorbus.families.feetech.driver.registers import Span, decode, rows_of, spans
+from motorbus.families.feetech.driver.requests import (
+    DATA,
+    PRESENT,
+    Block,
+    read_block,
+    reports_position,
+    unanswered,
+    unchanged,
+)
 
 T = TypeVar("T")
 One = TypeVar("One", bound=int | Node)
 
-RATE: Final = 1_000_000
-"""bit/s taken for granted where nobody says otherwise: how STS servos ship."""
-AIR: Final = 0.004
-"""s of air that one train of replies may need, so that a stop need not wait longer."""
-_MOST_IDS: Final = 251
-_BITS: Final = 10
+AIR: Final = 0.004  # s of replies of one request
+SOUND: Final = 0xFD  # low byte of the sum of a whole valid packet, header and checksum included
+BITS: Final = 10  # of a byte on the wire
+MOST_IDS: Final = 251
+NUMBERS: Final = frozenset((float, int))
 
 
 class GroupResult(NamedTuple):
-    """What a group read brought: values by id and name in API units, the error of each id that is missing, the
-    alarm bits by id, and when the last reply came (s on the link's clock; -inf when none did)."""
+    """Values by id and name in API units, errors by id, alarms by id, arrival of the last reply (s, -inf for none)."""
 
     values: dict[int, dict[str, Value]]
     errors: dict[int, MotorbusError]
@@ -50,206 +70,254 @@ class GroupResult(NamedTuple):
     at: float
 
 
-# -- read ----------------------------------------------------------------------------------------------------
+class ReadsAlone(NamedTuple):
+    """An event: this servo answers READ and not SYNC READ, so it is read by itself from now on."""
+
+    node: int
 
 
-async def sync_read(
-    names: Sequence[str], ids: Iterable[int | Node], *, rate: int = RATE, air: float = AIR
-) -> GroupResult:
-    """These registers of all these servos, by as few SYNC READs as keep each train of replies within `air` s.
+# -- read ------------------------------------------------------------------------------------------------------
 
-    Servos that know no SYNC READ are read one by one; maps may be mixed, and each value is read by the servo's own map.
-    `rate` is the rate of the bus in bit/s. Who does not answer has an error in the result, and the others their
-    values. Raises RequestError for an unknown name; nothing is sent then.
+
+async def sync_read(names: Sequence[str], ids: Iterable[int | Node]) -> GroupResult:
+    """These registers of all these servos, by few SYNC READs; maps may be mixed.
+
+    Errors of single servos are in the result. Raises RequestError for an unknown name.
     """
     check_names(names)
-    nodes = distinct(ids)
-    errors = await prepare_all(nodes, rate=rate, air=air)
+    nodes = as_nodes(ids)
+    errors = await prepare_all(nodes)
     raws: dict[int, dict[str, int]] = {node.node: {} for node in nodes if node.node not in errors}
-    for table, group in _by_table(node for node in nodes if node.node in raws):
-        for span in spans(rows_of(table, names)):
-            await _sync_read_span(span, group, raws, errors, rate, air)
+    groups: dict[tuple[str, str], list[Node]] = {}
+    for node in nodes:
+        if node.node in raws:
+            groups.setdefault((_table(node).name, _table(node)["present_position"].order), []).append(node)
+    for group in groups.values():
+        for span in spans(rows_of(_table(group[0]), names)):
+            here = [node for node in group if node.node not in errors]
+            for part in await divided(here, span.size):
+                for id, data in (await collect(part, span.address, span.size, errors)).items():
+                    raws[id] |= decode_span(span, data)
     answered = [node for node in nodes if node.node not in errors]
+
+    def values(node: Node) -> dict[str, Value]:
+        rows = rows_of(_table(node), names)
+        return {row.name: node.value(row, raws[node.node][row.name]) for row in rows}
+
     return GroupResult(
-        {node.node: _values(node, names, raws[node.node]) for node in answered},
+        {node.node: values(node) for node in answered},
         errors,
         {node.node: node.alarm for node in answered},
         max((node.at for node in answered), default=float("-inf")),
     )
 
 
-async def prepare_all(
-    ids: Iterable[int | Node], *, rate: int = RATE, air: float = AIR
-) -> dict[int, MotorbusError]:
-    """Read identity, limits, mode and units of all of these that are not known yet; the errors by id."""
-    nodes = [node for node in distinct(ids) if node.table is None or node.settings is None]
+async def prepare_all(ids: Iterable[int | Node]) -> dict[int, MotorbusError]:
+    """Identify those of these servos that are unknown; the errors by id."""
+    nodes = [node for node in as_nodes(ids) if node.table is None or node.settings is None]
     errors: dict[int, MotorbusError] = {}
-    for part in trains(nodes, IMAGE, rate, air):
-        images = await collected(part, 0, IMAGE, errors)
+    for part in await divided(nodes, IMAGE):
+        images = await collect(part, 0, IMAGE, errors)
         for node in part:
             if node.node in images:
                 learn(node, images[node.node])
     return errors
 
 
-async def _sync_read_span(
-    span: Span,
-    group: Sequence[Node],
-    raws: dict[int, dict[str, int]],
-    errors: dict[int, MotorbusError],
-    rate: int,
-    air: float,
-) -> None:
-    here = [node for node in group if node.node not in errors]
-    for part in trains(here, span.size, rate, air):
-        found = await collected(part, span.address, span.size, errors)
-        for id, data in found.items():
-            raws[id].update(decode(span, data))
+async def divided(nodes: Sequence[Node], count: int) -> list[Sequence[Node]]:
+    """Divide nodes so that the replies of each part, with `count` bytes each, take at most `AIR` s at this rate."""
+    each = (protocol.OVERHEAD + count) * BITS / await SetBitrate(0)
+    most = int(min(max(AIR / each, 1), MOST_IDS))
+    return [nodes[start : start + most] for start in range(0, len(nodes), most)]
 
 
-def block_of_each(
-    nodes: Sequence[Node], address: int, count: int, *, kept: bool = False
-) -> Request[dict[int, bytes]]:
-    """SYNC READ one block of each; the value holds the bytes of those who answered. `kept`: it is run again."""
-
-    def read(answer: Response) -> dict[int, bytes]:
-        return {id: data[:count] for id, data in _heard(by_id, answer)}
-
-    def whole(size: int) -> ExactDecoder[dict[int, bytes]] | None:
-        return blocks(nodes, count, size) if kept and size > 0 else None
-
-    by_id = {node.node: node for node in nodes}
-    return sync_exchange(nodes, address, count, read, whole=whole)
-
-
-def sync_exchange(
-    nodes: Sequence[Node],
-    address: int,
-    count: int,
-    read: Callable[[Response], T],
-    places: Callable[[Response], Mapping[int, float]] | None = None,
-    whole: Callable[[int], ExactDecoder[T] | None] = lambda _: None,
-) -> Request[T]:
-    """SYNC READ one block of each of these, in this order.
-
-    `places` says where they are by what was read last. `whole` as for `read_block`.
-    """
-    by_id = {node.node: node for node in nodes}
-    ids = list(by_id)
-    return Request(
-        wire.sync_read(address, count, ids),
-        tuple(Expected(id, id, wire.OVERHEAD + count) for id in ids),
-        read,
-        repeatable=True,
-        reports_position=places or told_by(by_id, address, count),
-        decode_exact=whole(count),
-    )
-
-
-async def collected(
+async def collect(
     nodes: Sequence[Node], address: int, count: int, errors: dict[int, MotorbusError]
 ) -> dict[int, bytes]:
-    """One block of each: by SYNC READ, and by READ of those whom it did not bring; the errors of the rest by id.
-
-    Those whose map is known to have no SYNC READ are not asked by it, and wait for nobody. What servos do whose
-    predecessor in the list is silent is not documented.
-    """
-    able = [node for node in nodes if node.control.sync_read]
-    heard = await catch(block_of_each(able, address, count)) if able else {}
-    found = {} if isinstance(heard, MotorbusError) else heard
+    """One block of each: by SYNC READ, then by READ of those that it did not return; errors of the rest by id."""
+    able = [node for node in nodes if node.traits.sync_read and not node.reads_alone]
+    found = await _sync_blocks(able, address, count) if len(able) > 1 else {}
     for node in nodes:
-        if node.node not in found:
-            data = await catch(read_block(node, address, count, bytes))
-            if isinstance(data, MotorbusError):
-                errors[node.node] = data
-            else:
-                found[node.node] = data
+        if node.node in found:
+            node.reads_alone = False
+            continue
+        data = await catch(read_block(node, address, count, bytes))
+        if isinstance(data, MotorbusError):
+            errors[node.node] = data
+            continue
+        found[node.node] = data
+        if node in able and node.table is not None and not await _sync_blocks([node], address, count):
+            node.reads_alone = True
+            await Emit(ReadsAlone(node.node))
     return found
 
 
-def trains(nodes: Sequence[Node], count: int, rate: int, air: float) -> Iterator[Sequence[Node]]:
-    """Divide nodes so that the replies of each part, with `count` bytes each, need at most `air` s (but one may)."""
-    each = (wire.OVERHEAD + count) * _BITS / rate
-    most = int(min(max(air / each, 1), _MOST_IDS))
-    for start in range(0, len(nodes), most):
-        yield nodes[start : start + most]
+async def _sync_blocks(nodes: Sequence[Node], address: int, count: int) -> dict[int, bytes]:
+    def decode(answer: Response) -> dict[int, bytes]:
+        return {id: data[:count] for id, data in _replies(nodes, answer)}
+
+    found = await catch(sync_request(nodes, address, count, decode))
+    return {} if isinstance(found, MotorbusError) else found
 
 
-def distinct(ids: Iterable[int | Node]) -> list[Node]:
-    """Each as a node. Raises RequestError when one is there twice or there is none, and for what is no list of them."""
-    try:
-        wanted = list(ids)
-    except TypeError:
-        if isinstance(ids, Iterable):
-            raise
-        raise RequestError(
-            f"{shown(ids)} is no list of servos",
-            expected="a list of servos, also where there is only one",
-            advice="put it into brackets; nothing was sent",
-        ) from None
-    nodes = as_nodes(wanted)
-    if len(nodes) == len(wanted) > 0:
-        return nodes
-    raise RequestError(
-        "an id is named twice" if nodes else "no servo is named",
-        advice="name each servo once; nothing was sent",
+def sync_request(
+    nodes: Sequence[Node],
+    address: int,
+    count: int,
+    decode: Callable[[Response], T],
+    decode_exact: ExactDecoder[T] | None = None,
+) -> Request[T]:
+    """SYNC READ one block of each of these, in this order. Raises RequestError for a servo without SYNC READ."""
+    for node in nodes:
+        if not node.traits.sync_read or node.reads_alone:
+            raise node.refusal("has no SYNC READ", "use sync_read(), which reads such servos one by one")
+    ids = [node.node for node in nodes]
+    return Request(
+        protocol.sync_read(address, count, ids),
+        tuple(Expected(id, id, protocol.OVERHEAD + count) for id in ids),
+        decode,
+        repeatable=True,
+        reports_position=reports_position({node.node: node for node in nodes}, address, count),
+        decode_exact=decode_exact,
     )
 
 
-def _heard(by_id: Mapping[int, Node], answer: Response) -> Iterator[tuple[int, bytes]]:
+def _replies(nodes: Sequence[Node], answer: Response) -> Iterator[tuple[int, bytes]]:
+    """Id and data of each reply."""
+    by_id = {node.node: node for node in nodes}
     for reply in answer.replies:
         frame = reply.data
-        by_id[frame[2]].heard(frame[4], answer.at)
-        yield frame[2], frame[5:-1]
+        by_id[frame[2]].note_reply(frame[4], answer.at)
+        yield frame[2], frame[DATA:-1]
 
 
-def _by_table(nodes: Iterable[Node]) -> Iterator[tuple[RegisterMap, list[Node]]]:
-    groups: dict[str, tuple[RegisterMap, list[Node]]] = {}
-    for node in nodes:
-        assert node.table is not None
-        key = f"{node.table.name} {node.table['present_position'].order}"
-        groups.setdefault(key, (node.table, []))[1].append(node)
-    yield from groups.values()
+def positions_request(nodes: Sequence[Node]) -> Request[Positions]:
+    """The present positions (rad) of identified servos with SYNC READ, in one request that may be kept."""
+    rows = {node.node: known_row(node, "present_position") for node in nodes}
+    by_id = {node.node: node for node in nodes}
+
+    def decode(answer: Response) -> Positions:
+        values = {}
+        for id, data in _replies(nodes, answer):
+            row = rows[id]
+            values[id] = float(by_id[id].value(row, row.decode(data[: row.size])))
+        return Positions(values, answer.missing, answer.at)
+
+    exact = exact_positions(nodes, list(rows.values()))
+    return sync_request(nodes, PRESENT, 2, decode, exact)
 
 
-def _values(node: Node, names: Sequence[str], raws: Mapping[str, int]) -> dict[str, Value]:
+def exact_positions(nodes: Sequence[Node], rows: Sequence[Register]) -> ExactDecoder[Positions] | None:
+    """The fast decoder of `positions_request`; None for mixed byte orders, and modes that leave the offset in."""
+    if len({row.order for row in rows}) > 1 or any(
+        node.settings is None or node.settings.shift for node in nodes
+    ):
+        return None
+    order = "<" if rows[0].order == "little" else ">"
+    unpack = Struct(order + "5xHx" * len(nodes)).unpack
+    made = [(node, node.settings) for node in nodes]
+    ids = [node.node for node in nodes]
+    scales = [float(node.value(row, 1)) for node, row in zip(nodes, rows, strict=True)]
+
+    def take(data: bytes, at: float) -> Positions | None:
+        raws = unpack(data)
+        if max(raws) >= 0x8000:  # negative
+            return None
+        values = dict(zip(ids, map(mul, raws, scales)))  # noqa: B905 - as many
+        for node, settings in made:
+            if node.settings is not settings:
+                return None
+            node.at, node.alarm = at, ()
+        return Positions(values, (), at)
+
+    return exact_decoder(ids, 2, take)
+
+
+def exact_decoder(ids: Sequence[int], count: int, take: ExactDecoder[T]) -> ExactDecoder[T]:
+    """Decode a SYNC READ if its bytes are all replies, in order, with valid checksums and no alarm."""
+    size = protocol.OVERHEAD + count
+    heads = [protocol.HEADER + bytes((id, count + 2, 0)) for id in ids]
+    total = size * len(ids)
+    parts = [(slice(at, at + size), head) for at, head in zip(range(0, total, size), heads, strict=True)]
+
+    def decode(data: Any, at: float) -> T | None:
+        if len(data) != total:
+            return None
+        for part, head in parts:
+            frame = data[part]
+            if not frame.startswith(head) or sum(frame) & 0xFF != SOUND:
+                return None
+        return take(data, at)
+
+    return decode
+
+
+def _table(node: Node) -> RegisterMap:
     assert node.table is not None
-    return {row.name: node.value(row, raws[row.name]) for row in rows_of(node.table, names)}
+    return node.table
 
 
-# -- write ---------------------------------------------------------------------------------------------------
+def known_row(node: Node, name: str) -> Register:
+    """A row of an identified servo. Raises RequestError if it is not, DeviceError for an unknown map."""
+    if node.table is None or node.settings is None:
+        raise node.refusal("is not identified, so its limits and units are unknown", "run prepare_all()")
+    if not node.table[name].unit:
+        raise unknown_map(node, f"cannot tell its {name.replace('_', ' ')} in a unit")
+    return node.row(name)
 
 
-async def sync_write(
-    values: Mapping[One, Mapping[str, Value]],
-    *,
-    rate: int = RATE,
-    air: float = AIR,
-) -> None:
+# -- write -----------------------------------------------------------------------------------------------------
+
+
+async def sync_write(values: Mapping[One, Mapping[str, Value]]) -> None:
     """Write the same adjoining RAM registers of many servos: `{id or servo: {name: value}}`, in API units.
 
-    One packet serves up to 83 servos with two bytes each; more are split, and so are servos in whose maps the registers
-    lie elsewhere; then it is not simultaneous. Maps and byte orders may be mixed otherwise. Nobody acknowledges a SYNC
-    WRITE: follow it with sync_read() when it matters. All or nothing: raises NoReply or DeviceError, with nothing
-    written, when a servo that must be asked first is silent or unknown; and the goals of all packets are judged before
-    the first one leaves. What ends it between two packets, as a stop, has a note that says who was written to.
+    No servo acknowledges it. One packet carries up to 83 servos with two bytes each; more packets are not simultaneous.
+    Nothing is written if a servo is silent or unknown, or a value cannot be written.
     """
+    await send_all(sync_writes(*await _prepared(values, "SYNC WRITE")))
+
+
+async def _prepared(values: Mapping[One, Mapping[str, Value]], what: str) -> tuple[list[Node], list[Block]]:
+    """The servos, identified, and the block of each."""
     for orders in values.values():
         check_values(orders)
-    nodes = distinct(values)
-    errors = await prepare_all(nodes, rate=rate, air=air)
+    nodes = as_nodes(values)
+    errors = await prepare_all(nodes)
     if errors:
         raise next(iter(errors.values()))
-    refuse_other_names(nodes, list(values.values()))
-    blocks = [
-        block_of(node, orders)._replace(under=node.settings)
-        for node, orders in zip(nodes, values.values(), strict=True)
-    ]
-    await written_all(list(sync_writes(nodes, blocks)))
+    if what == "SYNC WRITE" and len({frozenset(orders) for orders in values.values()}) > 1:
+        raise RequestError(
+            "SYNC WRITE takes the same registers for every servo", advice="write() them singly"
+        )
+    return nodes, [ram_block(node, orders, what) for node, orders in zip(nodes, values.values(), strict=True)]
 
 
-async def written_all(requests: Sequence[Request[None]]) -> None:
-    """These one after the other; an error of a later one is told with a note that the first ones have left."""
+def sync_writes(nodes: Sequence[Node], blocks: Sequence[Block]) -> list[Request[None]]:
+    """These blocks in few SYNC WRITEs. Each is judged by the goals of the later ones too."""
+    places: dict[tuple[int, int], list[tuple[Node, Block]]] = {}
+    for node, block in zip(nodes, blocks, strict=True):
+        places.setdefault((block.address, len(block.data)), []).append((node, block))
+    parts = []
+    for (_, size), group in places.items():
+        most = protocol.sync_write_capacity(size)
+        parts += [group[start : start + most] for start in range(0, len(group), most)]
+    requests = []
+    for number, part in enumerate(parts):
+        left = [one for later in parts[number:] for one in later]
+        requests.append(
+            unanswered(
+                protocol.sync_write(part[0][1].address, [(node.node, block.data) for node, block in part]),
+                max(block.effect for _, block in left),
+                tuple(goal for _, block in left for goal in block.goals),
+                unless=unchanged([node for node, _ in left]),
+            )
+        )
+    return requests
+
+
+async def send_all(requests: Sequence[Request[None]]) -> None:
+    """Send these one after the other; an error of a later one says how many have left."""
     for sent, request in enumerate(requests):
         try:
             await request
@@ -259,51 +327,198 @@ async def written_all(requests: Sequence[Request[None]]) -> None:
             raise
 
 
-def sync_writes(nodes: Sequence[Node], blocks: Sequence[Block]) -> Iterator[Request[None]]:
-    """These blocks as few SYNC WRITEs as can carry them: one for each place and length, unless they are too many.
+class GoalWriter:
+    """Makes SYNC WRITEs of goal positions of identified servos for a loop; see `__call__`.
 
-    One is not sent once a servo that it or a later one is for has other settings than when it was made; and each is
-    judged by the goals of the later ones besides, so that the first does not leave when the last is refused.
+    Raises RequestError unless all are in position mode and fit one packet.
     """
-    parts = list(_parts(nodes, blocks))
-    for index, part in enumerate(parts):
-        left = [one for later in parts[index:] for one in later]
-        goals: tuple[Setpoint, ...] = tuple(goal for _, block in left for goal in block.goals)
-        items = [(node.node, block.data) for node, block in part]
-        yield unanswered(
-            wire.sync_write(part[0][1].address, items),
-            max(block.effect for _, block in left),
-            goals,
-            refusal=changed_since([(node, block.under) for node, block in left]),
+
+    def __init__(self, nodes: Sequence[Node]) -> None:
+        rows = [known_row(node, "goal_position") for node in nodes]
+        for node in nodes:
+            position_goal(node, 0.0)
+        if len(nodes) > protocol.sync_write_capacity(2):
+            raise RequestError(f"{len(nodes)} servos are too many for one packet", advice="divide them")
+        self._made: Final = [(node, node.settings) for node in nodes]
+        self._nodes: Final = nodes
+        self._rows: Final = rows
+        cells = [_cell(node, row) for node, row in zip(nodes, rows, strict=True)]
+        self._scales, self._lows, self._highs = zip(*cells, strict=True)
+        self._pack: Final = Struct("<" + "BH" * len(nodes)).pack
+        self._big: Final = [number for number, row in enumerate(rows) if row.order == "big"]
+        self._ids: Final = [node.node for node in nodes]
+        head = bytes((protocol.BROADCAST, 4 + 3 * len(nodes), 0x83, rows[0].address, 2))
+        self._head: Final = protocol.HEADER + head
+        self._sum: Final = sum(head)
+        self._group: Final = SetpointGroup([node.node for node in nodes], self._setpoints, unchanged(nodes))
+
+    def holds(self) -> bool:
+        """Whether the settings of all servos are those that it was made by."""
+        return all(node.settings is settings for node, settings in self._made)
+
+    def __call__(self, goals: Sequence[float]) -> Request[None]:
+        """The packet with these goals (rad), one for each servo; the gate judges the limits.
+
+        Raises RequestError for another number of goals, LimitExceeded for what no register holds.
+        """
+        if len(goals) != len(self._nodes):
+            raise RequestError(f"{len(goals)} goals for {len(self._nodes)} servos")
+        if not NUMBERS.issuperset(map(type, goals)):
+            return self._checked(goals)
+        try:
+            raws = list(map(round, map(truediv, goals, self._scales)))
+        except (ValueError, OverflowError):  # not finite
+            return self._checked(goals)
+        if any(map(lt, raws, self._lows)) or any(map(gt, raws, self._highs)):
+            return self._checked(goals)
+        codes = raws.copy()
+        for number in self._big:
+            codes[number] = (raws[number] & 0xFF) << 8 | raws[number] >> 8
+        body = self._pack(*[part for pair in zip(self._ids, codes) for part in pair])  # noqa: B905 - as many
+        return SetpointWrite(self._head + body + bytes((~(self._sum + sum(body)) & 0xFF,)), self._group, raws)
+
+    def _setpoints(self, raws: Sequence[int]) -> tuple[Setpoint, ...]:
+        return tuple(
+            Setpoint(node.node, "position", node.value(row, raw), *(node.limits or (None, None)))
+            for node, row, raw in zip(self._nodes, self._rows, raws, strict=True)
         )
 
-
-def _parts(nodes: Sequence[Node], blocks: Sequence[Block]) -> Iterator[list[tuple[Node, Block]]]:
-    """What one packet carries, of all packets."""
-    places: dict[tuple[int, int], list[tuple[Node, Block]]] = {}
-    for node, block in zip(nodes, blocks, strict=True):
-        places.setdefault((block.address, len(block.data)), []).append((node, block))
-    for (_, size), group in places.items():
-        capacity = wire.sync_write_capacity(size)
-        for start in range(0, len(group), capacity):
-            yield group[start : start + capacity]
+    def _checked(self, goals: Sequence[float]) -> Request[None]:
+        """The packet with a negative goal, or one outside the limits, which the gate judges."""
+        blocks = []
+        for node, row, goal in zip(self._nodes, self._rows, goals, strict=True):
+            raw, order = position_goal(node, goal)
+            blocks.append(Block(row.address, row.encode(raw), row.effect, (order,)))
+        (request,) = sync_writes(self._nodes, blocks)
+        return request
 
 
-def refuse_other_names(nodes: Sequence[Node], values: Sequence[Mapping[str, Value]]) -> None:
-    """Raise RequestError where one is to get other registers than the first."""
-    for node, orders in zip(nodes, values, strict=True):
-        if set(orders) != set(values[0]):
-            raise RequestError(
-                f"node {node.node} is to get other registers than node {nodes[0].node}",
-                expected="the same registers for every servo of a SYNC WRITE",
-                advice="write() them one by one; nothing was sent",
-                node=node.node,
-            )
+def _cell(node: Node, row: Register) -> tuple[float, int, int]:
+    """The unit (rad), lowest and highest raw goal within the limits whose code is the number itself."""
+    scale, (low, high) = float(node.value(row, 1)), node.limits or (0.0, 0.0)
+    least, most = max(0, row.low, round(low / scale)), min(row.high, round(high / scale))
+    least += node.value(row, least) < low
+    most -= node.value(row, most) > high
+    return scale, least, most
 
 
-def block_of(node: Node, values: Mapping[str, Value]) -> Block:
-    """What these values come to in the registers of a servo that is known. Raises as `sync_write`."""
-    if not node.writable:
-        raise unknown_map(node, "refuses to write to it")
-    assert node.table is not None
-    return only_block(node, orders_of(node, node.table, values), "SYNC WRITE")
+class ServoGroup:
+    """Identified servos of one bus for a loop; its requests may be kept and run again.
+
+    Raises RequestError for a servo that is not identified; `read` and `positions` for one without SYNC READ.
+    """
+
+    def __init__(self, servos: Sequence[Node]) -> None:
+        self.servos: Final = as_nodes(servos)
+        for node in self.servos:
+            known_row(node, "present_position")
+
+    @property
+    def positions(self) -> Request[Positions]:
+        """The present positions (rad)."""
+        return positions_request(self.servos)
+
+    def read(self, *names: str) -> Request[dict[int, dict[str, Value]]]:
+        """These registers of all servos that answer, by id and name; they must lie alike in the maps of all."""
+        check_names(names)
+        rows = {node.node: rows_of(_table(node), names) for node in self.servos}
+        (span, *others) = {span._replace(rows=()) for found in rows.values() for span in spans(found)}
+        if others:
+            raise RequestError(f"{', '.join(names)} are not in one place", advice="read fewer registers")
+        address, size, _ = span
+        by_id = {node.node: node for node in self.servos}
+
+        def decode(answer: Response) -> dict[int, dict[str, Value]]:
+            values = {}
+            for id, data in _replies(self.servos, answer):
+                raws = decode_span(Span(address, size, tuple(rows[id])), data)
+                values[id] = {row.name: by_id[id].value(row, raws[row.name]) for row in rows[id]}
+            return values
+
+        return sync_request(self.servos, address, size, decode)
+
+    def write(self, *names: str) -> Callable[[Sequence[Any]], Request[None]]:
+        """A function of one value for each servo, or one sequence of values in the order of the names."""
+        if names == ("goal_position",):
+            return GoalWriter(self.servos)
+
+        def make(values: Sequence[Any]) -> Request[None]:
+            if len(values) != len(self.servos):
+                raise RequestError(f"{len(values)} values for {len(self.servos)} servos")
+            rows = [(value,) if len(names) == 1 else value for value in values]
+            blocks = [
+                ram_block(node, dict(zip(names, row, strict=True)), "SYNC WRITE")
+                for node, row in zip(self.servos, rows, strict=True)
+            ]
+            (request,) = sync_writes(self.servos, blocks)
+            return request
+
+        return make
+
+
+# -- torque, REG WRITE -----------------------------------------------------------------------------------------
+
+
+def disable_torque_everyone() -> Request[None]:
+    """Torque off for every servo on the line, in one broadcast without replies."""
+    wire = protocol.write(protocol.BROADCAST, LIMP.address, LIMP.data)
+    return unanswered(wire, LIMP.effect, priority=Priority.STOP)
+
+
+def limp_requests(ids: Sequence[int], most: int) -> list[Request[None]]:
+    """Torque off for these servos by SYNC WRITE, at most so many in one packet."""
+    parts = [ids[start : start + most] for start in range(0, len(ids), most)]
+    return [
+        unanswered(
+            protocol.sync_write(LIMP.address, [(id, LIMP.data) for id in part]),
+            LIMP.effect,
+            tuple(map(torque_off, part)),
+            priority=Priority.STOP,
+        )
+        for part in parts
+    ]
+
+
+async def disable_torque_all(ids: Iterable[int | Node]) -> dict[int, MotorbusError]:
+    """Torque off for all of these: by SYNC WRITE, then one by one until acknowledged; the errors by id.
+
+    Every servo is visited, also after an interruption, which is raised then.
+    """
+    waiting = as_nodes(ids)
+    errors: dict[int, MotorbusError] = {}
+
+    async def at_once() -> None:
+        for request in limp_requests([node.node for node in waiting], protocol.sync_write_capacity(1)):
+            await catch(request)
+
+    async def one_by_one() -> None:
+        while waiting:
+            failure = await catch(disable_torque(waiting[0]))
+            if failure is not None:
+                errors[waiting[0].node] = failure
+            del waiting[0]
+
+    await with_cleanup(at_once(), one_by_one)
+    return errors
+
+
+async def reg_write_all(values: Mapping[One, Mapping[str, Value]]) -> None:
+    """REG WRITE to each of these, `{id or servo: {name: value}}` in API units, then ACTION for all.
+
+    ACTION is not sent unless all have acknowledged; a note says which hold a REG WRITE then.
+    """
+    nodes, blocks = await _prepared(values, "REG WRITE")
+
+    async def hand_over_all() -> None:
+        for number, (node, block) in enumerate(zip(nodes, blocks, strict=True)):
+            try:
+                await hand_over(node, block)
+            except MotorbusError as error:
+                held = ", ".join(str(one.node) for one in nodes[: number + 1])
+                error.add_note(f"servos {held} may hold a REG WRITE, which the next ACTION would carry out")
+                raise
+        await action_all(nodes)
+        for node in nodes:
+            node.pending = None
+
+    await Exclusive(hand_over_all())

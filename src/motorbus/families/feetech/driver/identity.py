@@ -1,58 +1,70 @@
-"""Who is there: is it alive, what is it, which register map has it, and how is it set.
+"""Whether a servo is there, what it is, how it is set, and whether it is alone.
 
-The map follows from firmware and byte order, the model gives the name and the byte order (the algorithm of the
-vendor's FD 1.9.8.5). A servo whose map is known is read and written by that map. One whose map is unknown is read by
-the few rows that all maps share, and never written. A map is never guessed: the same address is the lock in one map and
-the torque limit in another.
+The register map follows from firmware and byte order; the model gives the name and the byte order (algorithm of FD
+1.9.8.5). A servo of an unknown map is read by the rows that all maps share, and never written: the same address is the
+lock in one map and the torque limit in another.
 """
 
 from __future__ import annotations
 
 from functools import cache
-from typing import Final
+from typing import Final, NamedTuple
 
 from motorbus.core.family import Identity
-from motorbus.core.register import Access, Register, RegisterMap, changed
+from motorbus.core.register import Access, RegisterMap, changed
 from motorbus.core.request import Expected, Priority, Request, TimeoutClass
-from motorbus.errors import DeviceError, NoReply
-from motorbus.families.feetech import wire
-from motorbus.families.feetech.driver.exchanges import ACKNOWLEDGED, acknowledged, read_block
+from motorbus.core.steps import Sleep
+from motorbus.errors import DeviceError, NoReply, RequestError, WireError
+from motorbus.families.feetech import protocol
 from motorbus.families.feetech.driver.node import IMAGE, Node, Settings, settings_of
-from motorbus.families.feetech.table import STS, TABLES, Choice, choose, model_number
+from motorbus.families.feetech.driver.requests import (
+    ACKNOWLEDGED,
+    STORE,
+    Block,
+    acknowledged,
+    read_block,
+)
+from motorbus.families.feetech.models import Choice, choose, model_number
+from motorbus.families.feetech.registers import STS, TABLES
 
-_HEAD: Final = 5
-_COMMON: Final = frozenset(
+ALONE: Final = 12  # reads that show two servos with one id; 4 of 10 short reads were garbled (servolab)
+SILENCE: Final = (
+    1.0  # s without a reply after which settings are read again: another servo may be there by now
+)
+COMMON: Final = frozenset(
     (
         *("firmware_major", "firmware_minor", "byte_order", "model_major", "model_minor", "id", "baud_rate"),
-        *(
-            "status_return_level",
-            "min_position_limit",
-            "max_position_limit",
-            "max_temperature",
-            "max_voltage",
-        ),
-        *("min_voltage", "max_torque", "phase", "unload_mask", "led_mask", "position_p", "position_d"),
-        *("dead_band_cw", "dead_band_ccw", "torque_enable", "goal_position", "goal_velocity"),
-        *("present_position", "present_velocity", "present_load", "present_voltage", "present_temperature"),
-        *("reg_write_pending", "hardware_error", "moving"),
+        *("status_return_level", "min_position_limit", "max_position_limit", "max_temperature"),
+        *("max_voltage", "min_voltage", "max_torque", "phase", "unload_mask", "led_mask"),
+        *("position_p", "position_d", "dead_band_cw", "dead_band_ccw"),
+        *("torque_enable", "goal_position", "goal_velocity", "present_position", "present_velocity"),
+        *("present_load", "present_voltage", "present_temperature", "reg_write_pending"),
+        *("hardware_error", "moving"),
     )
 )
-"""Rows that mean the same in every map, as far as FD 1.9.8.5 and the SDK headers tell."""
-_ONE_UNIT_IN_ALL_MAPS: Final = ("V", "°C", "fraction")
+"""Rows that mean the same in every map. Source: FD 1.9.8.5 and the SDK headers."""
+
+
+class ScanWarning(NamedTuple):
+    """An event: a user should check this id at this rate (bit/s)."""
+
+    node: int
+    rate: int
+    what: str
 
 
 async def ping(node: Node) -> bool:
-    """Is it there? Silence is the answer False; bytes that are no answer raise WireError."""
+    """Whether it answers. Raises WireError for bytes that are no reply."""
     try:
-        await ping_exchange(node)
+        await ping_request(node)
     except NoReply:
         return False
     return True
 
 
-def ping_exchange(node: Node, *, scanning: bool = False) -> Request[None]:
-    """PING; silence raises NoReply. `scanning` waits shortly and asks once, for silence is usual then."""
-    request = acknowledged(node, wire.ping(node.node))
+def ping_request(node: Node, *, scanning: bool = False) -> Request[None]:
+    """PING; silence raises NoReply. `scanning`: with a short time-out."""
+    request = acknowledged(node, protocol.ping(node.node), Block(0, b""))
     return Request(
         request.wire,
         (Expected(node.node, node.node, ACKNOWLEDGED),),  # PING is answered at every status return level
@@ -64,116 +76,112 @@ def ping_exchange(node: Node, *, scanning: bool = False) -> Request[None]:
 
 
 def identify(node: Node) -> Request[Identity]:
-    """Firmware, byte order, model and register map, in one READ of registers 0 to 4."""
-
-    def take(head: bytes) -> Identity:
-        return meet(node, head)
-
-    return read_block(node, 0, _HEAD, take)
-
-
-def prepare(node: Node) -> Request[Identity]:
-    """Read whatever motion and prepared group operations need: identity, limits, mode and units, in one READ.
-
-    It is always the same one for a servo, and kept: who polls one that is not there asks it again and again.
-    """
-    kept = node.preparation
-    if kept is None:
-
-        def take(image: bytes) -> Identity:
-            return learn(node, image)
-
-        kept = node.preparation = read_block(node, 0, IMAGE, take)
-    return kept
+    """Read identity, limits, mode and units, registers 0 to 39, in one READ."""
+    return read_block(node, 0, IMAGE, lambda image: learn(node, image))
 
 
 async def known(node: Node) -> RegisterMap:
-    """The register map of this servo; asks it when its settings are not known yet."""
-    if node.table is not None and node.settings is not None:
-        return node.table
-    identity = await prepare(node)
-    if node.table is None:  # who answered stands for a servo and is none, as in a dry run: its answer says so
-        return TABLES[identity.table]
+    """Its register map; it is read unless its settings are known and it has answered in the last second."""
+    if node.table is None or node.settings is None or await Sleep(0) - node.at > SILENCE:
+        await identify(node)
+    assert node.table is not None
     return node.table
 
 
 async def writable(node: Node) -> RegisterMap:
-    """As `known`, for those who will write. Raises DeviceError when the map is not known."""
+    """As `known`. Raises DeviceError for an unknown map."""
     table = await known(node)
-    refuse_unless_writable(node)
+    check_map(node)
     return table
 
 
-def refuse_unless_writable(node: Node) -> None:
-    """Raise DeviceError for a servo that has been asked, and whose map is not known."""
-    if not node.writable:
+async def read_settings(node: Node) -> RegisterMap:
+    """As `writable`, with settings that are read now: another program may have changed them."""
+    await identify(node)
+    return await writable(node)
+
+
+def check_map(node: Node) -> None:
+    """Raise DeviceError for a servo of an unknown map."""
+    if not node.is_writable:
         raise unknown_map(node, "refuses to write to it")
 
 
-def meet(node: Node, head: bytes) -> Identity:
-    """Registers 0 to 4 of this servo have been read."""
-    node.identity = identity_of(node.node, head)
-    node.table = TABLES[node.identity.table] if node.identity.table else common_table(_choice(head).order)
+def learn(node: Node, image: bytes) -> Identity:
+    """Take registers 0 to 39 of this servo."""
+    chosen = choose((image[0], image[1]), (image[3], image[4]), image[2])
+    if chosen.table:
+        node.table = TABLES[chosen.table]
+        arc = node.facts.arcs.get(node.node, chosen.model.arc if chosen.model else None)
+        settings = settings_of(node.table, image, arc)
+    else:
+        node.table = common_table(chosen.order)
+        settings = Settings(answers_writes=image[STS["status_return_level"].address] != 0)
+    node.facts.maps[node.node] = chosen.table
+    node.identity = _identity(node, chosen, image, settings)
+    node.learn_settings(settings)
     return node.identity
 
 
-def learn(node: Node, image: bytes) -> Identity:
-    """Registers 0 to 39 of this servo have been read."""
-    identity = meet(node, image[:_HEAD])
-    if identity.table:
-        node.settings = settings_of(TABLES[identity.table], image)
-    else:
-        node.settings = Settings(answers_writes=image[STS["status_return_level"].address] != 0)
-    return identity
-
-
-def identity_of(node: int, head: bytes) -> Identity:
-    """What registers 0 to 4 say."""
-    chosen = _choice(head)
-    major, minor = head[3], head[4]
-    return Identity(
-        node,
-        chosen.model.name if chosen.model else f"unknown model {major}.{minor}",
-        f"{head[0]}.{head[1]}",
-        chosen.table,
-        {
-            "model_number": model_number(major, minor, chosen.order),
-            "byte_order": chosen.order,
-            "register_map": chosen.table or "unknown",
-            "writable": bool(chosen.table),
-        },
-    )
-
-
-def _choice(head: bytes) -> Choice:
-    return choose((head[0], head[1]), (head[3], head[4]), head[2])
+def _identity(node: Node, chosen: Choice, image: bytes, settings: Settings) -> Identity:
+    major, minor = image[3], image[4]
+    details: dict[str, object] = {
+        "model_number": model_number(major, minor, chosen.order),
+        "byte_order": chosen.order,
+        "register_map": chosen.table or "unknown",
+        "writable": bool(chosen.table),
+    }
+    if chosen.table:
+        details["mode"] = settings.mode.value if settings.mode else f"unknown ({settings.mode_code})"
+        details["arc"] = settings.arc
+        if chosen.model is not None and chosen.model.arc_doubt and node.node not in node.facts.arcs:
+            details["arc_doubt"] = chosen.model.arc_doubt
+    name = chosen.model.name if chosen.model else f"unknown model {major}.{minor}"
+    return Identity(node.node, name, f"{image[0]}.{image[1]}", chosen.table, details)
 
 
 @cache
 def common_table(order: str) -> RegisterMap:
-    """The rows that all register maps share, read-only; what differs between maps in unit is a plain number."""
-    return RegisterMap(
-        "common",
-        [_commoner(row, order) for row in STS.values() if row.name in _COMMON],
-        title="what all FEETECH register maps share; nothing may be written",
-    )
-
-
-def _commoner(row: Register, order: str) -> Register:
-    if row.unit in _ONE_UNIT_IN_ALL_MAPS:
-        return changed(row, access=Access.READ, order=order)
-    return changed(row, access=Access.READ, order=order, unit="", scale=1.0)
+    """The rows that all maps share, read-only; a unit that differs between maps is left out."""
+    rows = [
+        changed(row, access=Access.READ, order=order)
+        if row.unit in ("V", "°C", "fraction")
+        else changed(row, access=Access.READ, order=order, unit="", scale=1.0)
+        for row in STS.values()
+        if row.name in COMMON
+    ]
+    return RegisterMap("common", rows, title="what all FEETECH register maps share; read-only")
 
 
 def unknown_map(node: Node, refusal: str) -> DeviceError:
-    """The error for what needs a register map that this servo's firmware does not tell."""
+    """The error for what needs a register map that the firmware of this servo does not tell."""
     identity = node.identity
     assert identity is not None
     return DeviceError(
-        f"node {node.node} is {identity.model} with firmware {identity.firmware}, whose register map is not "
-        f"described: motorbus {refusal}",
+        f"node {node.node} is {identity.model} with firmware {identity.firmware}, whose register map is unknown: "
+        f"motorbus {refusal}",
         expected=f"a servo with one of the maps {', '.join(sorted(TABLES))}",
-        cause="the same address means different things in different maps, so a guess could damage the servo",
-        advice="read() the registers that all maps share, or disable_torque(); nothing was written",
+        cause="the same address means different things in different maps",
+        advice="read() gives the registers that all maps share; disable_torque() works",
+        node=node.node,
+    )
+
+
+async def check_alone(node: Node) -> bytes:
+    """Registers 0 to 39. Raises RequestError if two servos seem to have this id: their replies collide or differ."""
+    images: set[bytes] = set()
+    garbled = 0
+    for _ in range(ALONE):
+        try:
+            images.add(await read_block(node, 0, IMAGE, bytes, timeout=STORE))
+        except WireError:
+            garbled += 1
+    if len(images) == 1 and garbled < 2:
+        return images.pop()
+    raise RequestError(
+        f"two servos seem to have the id {node.node}: of {ALONE} replies {garbled} were garbled, "
+        f"{len(images)} different",
+        cause="new servos all have the id 1; noise and a loose cable look alike",
+        advice="connect one servo at a time",
         node=node.node,
     )

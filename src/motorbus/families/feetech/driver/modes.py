@@ -1,134 +1,262 @@
-"""What a servo heeds: reading its mode, and changing it such that nothing turns when torque comes on again.
+"""Operating modes, and orders in other modes than position: velocity, duty, current, step.
 
-The mode is a setting in EEPROM that takes effect at once, so it is changed on a limp servo, and what the new mode heeds
-is set to 0 before anybody switches torque on. SCS have no such register: both limits 0 make a motor of them, and limits
-make a servo of it again. Source: STS3215 memory table V3.6; FEETECH SDK, SCSCL.h and hls.py; feetech-cli, measured on
-STS3215.
+The mode is an EEPROM setting that takes effect at once, so it is changed while the servo is limp, and what the new mode
+follows is set to 0 before torque comes on. SCS have no such register: both limits 0 make a motor of them. Source:
+STS3215 memory table V3.6; FEETECH SDK, SCSCL.h and hls.py; feetech-cli and servolab, measured on STS3215.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import remainder
 
-from motorbus.core.register import RegisterMap
+from motorbus.core.family import State
+from motorbus.core.register import RegisterMap, is_number, shown
 from motorbus.core.request import Effect
-from motorbus.errors import RequestError
-from motorbus.families.feetech.driver import eeprom
-from motorbus.families.feetech.driver.bound import leaving_current_mode
-from motorbus.families.feetech.driver.exchanges import Block
-from motorbus.families.feetech.driver.identity import prepare, writable
+from motorbus.core.setpoint import Setpoint
+from motorbus.core.steps import Sleep, with_cleanup
+from motorbus.errors import LimitExceeded, RequestError
+from motorbus.families.feetech.driver import feedback, goals
+from motorbus.families.feetech.driver.eeprom import store
+from motorbus.families.feetech.driver.identity import read_settings, writable
+from motorbus.families.feetech.driver.motion import (
+    COUNTS,
+    TOLERANCE,
+    Motion,
+    count_of,
+    disable_torque,
+    move_all,
+    ordered,
+    read_bound,
+    stop,
+)
 from motorbus.families.feetech.driver.node import Node
-from motorbus.families.feetech.driver.rest import at_rest, ordered, unknown_mode, unpublished_duty
-from motorbus.families.feetech.driver.torque import disable_torque
-from motorbus.families.feetech.table import Mode
+from motorbus.families.feetech.driver.requests import ON, TORQUE_ENABLE, Block, confirmed
+from motorbus.families.feetech.traits import Mode
 
 
 async def mode(node: Node) -> Mode:
-    """What the servo heeds now, asked anew: position, velocity, pwm, step or current.
-
-    Raises DeviceError when its register map is not known, RequestError for a mode that no source explains.
-    """
-    await prepare(node)
-    await writable(node)
-    if node.known_mode is None:
-        raise unknown_mode(node)
-    return node.known_mode
+    """Its mode, read now. Raises DeviceError for an unknown map, RequestError for an unknown mode."""
+    await read_settings(node)
+    return goals.checked_mode(node)
 
 
 async def set_mode(node: Node, mode: Mode | str, *, limits: tuple[float, float] | None = None) -> None:
-    """Put the servo into a mode, for good; it is limp afterwards, and `enable_torque` begins at rest. The mode that it
-    has already is not written again.
+    """Put the servo into a mode permanently; it is limp afterwards, and `enable_torque` begins at rest.
 
-    Every map has position and PWM mode; STS and SMBL have velocity and step mode too, SMCL velocity mode, HLS velocity
-    and current mode. On SCS PWM mode is both limits 0, and position mode needs `limits` in rad, unless it was this
-    object that set them to 0. An HLS that leaves current mode is bounded by its protection current again. Raises
-    RequestError for a mode or limits that the map does not have, for PWM mode of HLS, whose duty no source places, and
-    errors of a guarded write to EEPROM.
+    On SCS PWM mode is both limits 0, and position mode needs `limits` (rad), unless this object set them to 0. An HLS
+    that leaves current mode gets its protection current as bound. Raises RequestError for a mode or limits that its map
+    lacks, and errors of `store`.
     """
-    wanted = _named(mode)
-    await prepare(node)
-    table = await writable(node)
-    if wanted not in node.control.has:
-        raise _lacking(node, wanted)
-    if wanted is Mode.PWM and not node.control.duty:
-        raise unpublished_duty(node)
-    blocks = (
-        _by_code(node, table, wanted, limits)
-        if node.control.modes
-        else _by_limits(node, table, wanted, limits)
-    )
-    if not await eeprom.store(node, table, leaving_current_mode(node, table, wanted, blocks)):
+    wanted = _checked_mode(mode)
+    table = await read_settings(node)
+    if wanted not in node.traits.has:
+        has = " or ".join(one.value for one in node.traits.has)
+        raise node.refusal(f"has no {wanted.value} mode", expected=has)
+    if wanted is Mode.PWM and not node.traits.duty:
+        raise goals.no_duty(node)
+    by_code = "operating_mode" in table
+    blocks = [_by_code(node, table, wanted, limits) if by_code else _by_limits(node, table, wanted, limits)]
+    if node.traits.current and wanted is not Mode.CURRENT and node.known_mode in (Mode.CURRENT, None):
+        row, protection = table[node.traits.current], node.settings.protection_current if node.settings else 0
+        blocks.append(
+            Block(row.address, row.encode(protection))
+        )  # else its last current bounds the next mode
+    if not await store(node, table, blocks):
         await disable_torque(node)
-    await prepare(node)
+    await read_settings(node)
     if wanted in (Mode.VELOCITY, Mode.PWM, Mode.CURRENT):
-        await ordered(node, table, at_rest(node, table, wanted))
+        await ordered(node, goals.rest_block(node, wanted))
 
 
-def _named(mode: Mode | str) -> Mode:
+def _checked_mode(mode: Mode | str) -> Mode:
     try:
         return Mode(mode)
     except ValueError:
-        raise RequestError(
-            f"{mode!r} is no mode",
-            expected=", ".join(one.value for one in Mode),
-            advice="nothing was sent",
-        ) from None
+        raise RequestError(f"{mode!r} is no mode", expected=", ".join(one.value for one in Mode)) from None
 
 
-def _by_code(
-    node: Node, table: RegisterMap, wanted: Mode, limits: tuple[float, float] | None
-) -> Sequence[Block]:
+def _by_code(node: Node, table: RegisterMap, wanted: Mode, limits: tuple[float, float] | None) -> Block:
     if limits is not None:
-        raise RequestError(
-            f"node {node.node} has an operating mode, which limits do not change",
-            advice="leave limits out, or write(min_position_limit=…, max_position_limit=…); nothing was sent",
-            node=node.node,
-        )
-    code = node.control.code(wanted)
+        raise node.refusal("has an operating mode, which limits do not change", "leave limits out")
+    code = node.traits.code(wanted)
     assert code is not None
     row = table["operating_mode"]
-    return [Block(row.address, row.encode(code), Effect.PERSISTENT)]
+    return Block(row.address, row.encode(code))
 
 
-def _by_limits(
-    node: Node, table: RegisterMap, wanted: Mode, limits: tuple[float, float] | None
-) -> Sequence[Block]:
-    """Both limits 0 for a motor; limits for a servo, which nobody makes up: a wrong one breaks what it moves."""
-    low, high = table["min_position_limit"], table["max_position_limit"]
+def _by_limits(node: Node, table: RegisterMap, wanted: Mode, limits: tuple[float, float] | None) -> Block:
+    """Both limits 0 for a motor; else limits, which only the caller or this object knows."""
     if wanted is Mode.PWM:
-        if node.limits is not None:
-            node.former_limits = node.limits
-        raws = 0, 0
+        node.former_limits = node.limits or node.former_limits
+        return limits_block(node, table, (0, 0))
+    wished = limits or node.limits or node.former_limits
+    if wished is None:
+        raise node.refusal("needs limits for position mode", "give limits=(low, high) in rad")
+    return limits_block(node, table, raw_limits(node, table, wished))
+
+
+def raw_limits(node: Node, table: RegisterMap, limits: tuple[float, float]) -> tuple[int, int]:
+    """Both position limits, raw. Raises RequestError for impossible ones."""
+    low, high = table["min_position_limit"], table["max_position_limit"]
+    raws = node.raw(low, limits[0]), node.raw(high, limits[1])
+    if not (low.low <= raws[0] <= low.high and raws[1] <= high.high and raws[0] < raws[1]):
+        least, most = float(node.value(low, low.low)), float(node.value(high, high.high))
+        span = f"{least:.4g} to {most:.4g} rad, the lower one first"
+        raise node.refusal(f"cannot have the limits {limits[0]} to {limits[1]} rad", expected=span)
+    return raws
+
+
+def limits_block(node: Node, table: RegisterMap, raws: Sequence[int]) -> Block:
+    """The block of both position limits."""
+    low, high = table["min_position_limit"], table["max_position_limit"]
+    return Block(low.address, low.encode(raws[0]) + high.encode(raws[1]))
+
+
+# -- orders ----------------------------------------------------------------------------------------------------
+
+
+async def set_velocity(
+    node: Node, velocity: float, *, acceleration: float | None = None, current: float | None = None
+) -> None:
+    """Turn at `velocity` rad/s, whose sign is the direction; 0 stands still. In velocity mode.
+
+    `acceleration` (rad/s²) and, on HLS, the bound of the current (A) stay as they are when left out. Raises
+    RequestError in another mode and for what no register takes (SMCL: no negative velocity).
+    """
+    _check_number(node, velocity, "velocity in rad/s")
+    await writable(node)
+    goals.check_mode(node, Mode.VELOCITY)
+    if current is not None:
+        goals.bound_bytes(node, current)  # raises before anything is read
+    await read_bound(node, current)
+    row = node.row("goal_velocity")
+    raw = node.raw(row, velocity)
+    low, high = (float(node.value(row, bound)) for bound in (row.low, row.high))
+    goal = Setpoint(node.node, "velocity", float(node.value(row, raw)), low, high)
+    block = Block(row.address, row.encode(raw), row.effect, (goal,))
+    if current is not None or not node.bound:
+        block = goals.with_bound(node, block, current)
+    if acceleration is not None:
+        ramp = goals.ramp_bytes(node, acceleration)
+        await confirmed(node, Block(node.row("goal_position").address - len(ramp), ramp))
+    await ordered(node, block)
+
+
+async def set_duty(node: Node, duty: float) -> None:
+    """Drive the bridge with this duty, -1 to 1, open loop. In PWM mode.
+
+    A positive duty turned an STS3215 towards smaller angles (servolab). Raises RequestError in another mode and on HLS,
+    whose duty register is unknown; LimitExceeded for another number.
+    """
+    _check_number(node, duty, "duty")
+    if not -1 <= duty <= 1:
+        raise LimitExceeded(f"node {node.node}: {duty} is no duty", expected="-1 to 1", node=node.node)
+    await writable(node)
+    if not node.traits.duty:
+        raise goals.no_duty(node)
+    goals.check_mode(node, Mode.PWM)
+    row = node.row(node.traits.duty)
+    raw = round(duty / goals.DUTY)
+    goal = Setpoint(node.node, "load", raw * goals.DUTY, -1.0, 1.0)
+    await ordered(node, Block(row.address, row.encode(raw), row.effect, (goal,)))
+
+
+async def set_current(node: Node, current: float) -> None:
+    """Push with this phase current (A), whose sign is the direction. In current mode of HLS.
+
+    Raises RequestError in another mode and on other maps, LimitExceeded for more than its register takes.
+    """
+    _check_number(node, current, "current in A")
+    await writable(node)
+    goals.check_mode(node, Mode.CURRENT)
+    row = node.row(node.traits.current)
+    raw = node.raw(row, current)
+    low, high = float(row.to_value(row.low)), float(row.to_value(row.high))
+    if not row.low <= raw <= row.high:
+        what = f"node {node.node} cannot push with {current} A"
+        raise LimitExceeded(what, expected=f"{low:.4g} to {high:.4g} A", node=node.node)
+    goal = Setpoint(node.node, "current", float(row.to_value(raw)), low, high)
+    await ordered(node, Block(row.address, row.encode(raw), row.effect, (goal,)))
+
+
+async def jog(node: Node, velocity: float, seconds: float) -> None:
+    """Turn at `velocity` rad/s for so many seconds, then decelerate. In velocity mode."""
+
+    async def turn() -> None:
+        await set_velocity(node, velocity)
+        await Sleep(seconds)
+
+    await with_cleanup(turn(), lambda: stop(node))
+
+
+@dataclass
+class _Step(Motion):
+    """A move by an angle, followed over the end of a turn."""
+
+    by: float = 0.0
+    here: dict[int, float] = field(default_factory=dict)
+
+    async def check(self, device: Node, to: float) -> Setpoint:
+        self.tolerance = max(TOLERANCE, COUNTS * count_of(device))
+        block = goals.step_block(device, to, self.velocity, self.acceleration)
+        start = await feedback.position(device)
+        self.here[device.node] = start
+        self.by = to
+        return Setpoint(device.node, "position", start + block.goals[0].value)
+
+    async def send(self, device: Node, goal: Setpoint) -> None:
+        await send_step(device, goals.step_block(device, self.by, self.velocity, self.acceleration))
+        await Sleep(0.02)  # a goal whole turns away looks like this place until it moves
+
+    async def sample(self, device: Node) -> State:
+        state = await feedback.telemetry(device)
+        settings, last = device.settings, self.here[device.node]
+        assert state.position is not None
+        here = state.position
+        if settings is not None and not settings.tells_turns:
+            here = last + remainder(here - last, settings.turn * count_of(device))
+        self.here[device.node] = here
+        return state._replace(position=here)
+
+
+async def step(
+    node: Node,
+    by: float,
+    *,
+    velocity: float | None = None,
+    acceleration: float | None = None,
+    wait: bool = True,
+    tolerance: float | None = None,
+    timeout: float | None = None,
+) -> None:
+    """Go `by` rad from here, over the end of a turn too. In step mode of STS and SMBL.
+
+    Torque is switched on. Never sent twice: OutcomeUnknown if it was not acknowledged. An interrupt of the wait
+    does not stop it, for no goal of step mode holds: disable_torque() does. Bounds, tolerance, errors as in `move`.
+    """
+    if not is_number(by):
+        raise LimitExceeded(f"node {node.node}: {shown(by)} is no angle", node=node.node)
+    await writable(node)
+    goals.check_mode(node, Mode.STEP)
+    if wait:
+        logic = _Step(velocity, acceleration)
+        await move_all(logic, {node: by}, tolerance=tolerance, timeout=timeout)
     else:
-        wished = limits or node.limits or node.former_limits
-        if wished is None:
-            raise _limits_wanted(node, table)
-        raws = node.raw(low, wished[0]), node.raw(high, wished[1])
-        if not raws[0] < raws[1]:
-            raise RequestError(
-                f"node {node.node}: limits {wished[0]} to {wished[1]} rad are none",
-                expected="the lower one first",
-                advice="nothing was sent",
-                node=node.node,
-            )
-    return [Block(low.address, low.encode(raws[0]) + high.encode(raws[1]), Effect.PERSISTENT)]
+        await send_step(node, goals.step_block(node, by, velocity, acceleration))
 
 
-def _limits_wanted(node: Node, table: RegisterMap) -> RequestError:
-    rows = table["min_position_limit"], table["max_position_limit"]
-    shipped = [f"{row.to_value(row.default):.4g}" for row in rows if row.default is not None]
-    return RequestError(
-        f"node {node.node} becomes a servo again by its limits, and nobody here knows which",
-        expected="limits=(low, high), in rad" + (f"; shipped are {' to '.join(shipped)}" if shipped else ""),
-        advice="give limits that what it moves can bear; nothing was sent",
-        node=node.node,
-    )
+async def send_step(node: Node, block: Block) -> None:
+    """Send a step; before it torque on, which moves nothing in step mode, where a goal does not switch it on."""
+    if not node.traits.goal_switches_on:
+        await confirmed(node, Block(TORQUE_ENABLE, ON, Effect.TORQUE))
+    await confirmed(node, block)
 
 
-def _lacking(node: Node, wanted: Mode) -> RequestError:
-    return RequestError(
-        f"node {node.node} has no {wanted.value} mode",
-        expected=" or ".join(one.value for one in node.control.has),
-        advice="nothing was sent",
-        node=node.node,
-    )
+def _check_number(node: Node, value: float, what: str) -> None:
+    """Raise RequestError for no number, LimitExceeded for one that is not finite."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise node.refusal(f"cannot take {shown(value)}", expected=what)
+    if not is_number(value):
+        raise LimitExceeded(f"node {node.node} cannot take {shown(value)}", expected=what, node=node.node)

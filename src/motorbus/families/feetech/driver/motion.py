@@ -1,190 +1,389 @@
-"""Holding, moving and standing still, such that nothing ever jumps.
+"""Torque, stop and move, without a jump.
 
-What these servos do of their own accord decides the order of things: writing a goal position switches torque on
-by itself; a servo that starts anew is limp and has forgotten its goal; a goal velocity of 0 means "as fast as you can"
-or "not at all", as the phase register says; the moving flag drops also when the servo stands off its goal. Source:
-STS3215 memory table V3.6; measured on hardware by feetech-cli and servolab.
+What servos do by themselves decides the order of requests: a write of the goal position may switch torque on; a servo
+that restarts is limp and has forgotten its goal; the moving flag also drops when a servo stands off its goal. So torque
+switch and goal travel in one packet, and the switch is read back. Source: STS3215 memory table V3.6; feetech-cli and
+servolab, measured on hardware.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import Enum
-from functools import partial
-from typing import Final, TypeVar
+from math import remainder
+from typing import Any, Final
 
-from motorbus.core.interrupted import Moving, stopped_if_interrupted
+from motorbus.core import move as core_move
+from motorbus.core.family import State
 from motorbus.core.register import RegisterMap, is_number, shown
-from motorbus.core.request import Effect
-from motorbus.core.steps import Runnable, Sleep, catch
-from motorbus.errors import LimitExceeded, MotorbusError, RequestError, VerificationFailed
-from motorbus.families.feetech.driver.arrival import Move, arrive
-from motorbus.families.feetech.driver.bound import ask_bound
-from motorbus.families.feetech.driver.exchanges import Block
-from motorbus.families.feetech.driver.feedback import position
-from motorbus.families.feetech.driver.node import Node
-from motorbus.families.feetech.driver.orders import position_goal, speed_goal
-from motorbus.families.feetech.driver.pace import burst, ramp_of
-from motorbus.families.feetech.driver.rest import (
-    asked_anew,
-    at_rest,
-    held,
-    is_limp,
-    not_turns_away,
-    ordered,
-    outside,
-    surely_on,
-    switched_on,
-    torque_on_unless,
-    unknown_mode,
+from motorbus.core.request import Effect, Precondition, Priority
+from motorbus.core.setpoint import Setpoint, torque_off, torque_on
+from motorbus.core.steps import Procedure, Sleep, catch
+from motorbus.errors import (
+    LimitExceeded,
+    MotionError,
+    MotorbusError,
+    RequestError,
+    Stalled,
+    VerificationFailed,
 )
-from motorbus.families.feetech.table import Mode
-
-T = TypeVar("T")
+from motorbus.families.feetech.driver import diagnosis, feedback, goals
+from motorbus.families.feetech.driver.identity import known, read_settings, writable
+from motorbus.families.feetech.driver.node import MANY_TURNS, Node, Settings
+from motorbus.families.feetech.driver.requests import (
+    DOUBTS,
+    ON,
+    PRESENT,
+    TORQUE_ENABLE,
+    Block,
+    confirmed,
+    outdated,
+    read_block,
+    verified,
+    write_block,
+)
+from motorbus.families.feetech.traits import Mode
 
 TOLERANCE: Final = 0.05
-"""rad; 32 counts of STS. Under a load of 1.5 kg at 10 cm an STS3215 stays 20 to 30 counts off its goal (user
-reports)."""
-COUNTS: Final = 10
-"""Counts of any servo within which it is in position, where these are more: one of SCS is 3.3 times one of STS, and an
-angular resolution stretches each."""
+"""rad. Under a load of 1.5 kg at 10 cm an STS3215 stays 20 to 30 counts off its goal (user reports)."""
+COUNTS: Final = 10  # counts of a coarse servo within which it is in position
+UNHURRIED: Final = 2.0  # rad/s that every servo reaches; the default timeout is computed with it # assumption
+COMMANDS: Final = 8  # bytes of registers 40 to 47: torque switch to goal velocity
+LIMP: Final = Block(TORQUE_ENABLE, b"\0", Effect.TORQUE)
+TRIES: Final = 3
 
 
 class Promise(Enum):
-    """What an acknowledged stop promises, and no more than that."""
+    """What an acknowledged stop promises."""
 
     HOLD_ACCEPTED = "goal := present position accepted: it decelerates and holds; standstill was not verified"
     OUTSIDE_ACCEPTED = (
-        "goal := present position accepted, outside its limits: it may go on to the nearer limit, as torque makes it; "
-        "only torque off ends that"
+        "goal := present position accepted, outside its limits: it may move to the nearer limit; only torque off "
+        "ends that"
     )
-    LIMP = "it is limp, where torque could move it (outside its limits, or nobody knows): nothing was sent"
+    LIMP = "it is limp, where torque could move it: no order was sent"
     ZERO_VELOCITY_ACCEPTED = "goal velocity := 0 accepted: it decelerates; standstill was not verified"
     ZERO_DUTY_ACCEPTED = "duty := 0 accepted: it runs out without holding; standstill was not verified"
     ZERO_CURRENT_ACCEPTED = "current := 0 accepted: it runs out without holding; standstill was not verified"
     TORQUE_OFF_ACCEPTED = "torque off accepted: it goes limp at once, and an arm sags or falls"
 
 
-OLD: Final = 0.1
-"""s from the reading of a position to the goal that is made of it. Nothing but the host lies between: milliseconds, a
-few of ten on a machine that is busy. Within it a servo at 50 turns/min, as fast as an STS3215 is without load, comes
-half a radian far; within the half second that the safety of motion bears, two and a half."""
-SLEPT: Final = 0.5
-"""s for question, reply, order and acknowledgement together. More than any line takes that is not retried, remote ones
-included; what takes longer may be a host that slept before the reply was read, or before the order left."""
-_TRIES: Final = 3
 _AT_REST: Final = {
     Mode.VELOCITY: Promise.ZERO_VELOCITY_ACCEPTED,
     Mode.PWM: Promise.ZERO_DUTY_ACCEPTED,
     Mode.CURRENT: Promise.ZERO_CURRENT_ACCEPTED,
 }
 
-# -- hold and let go -----------------------------------------------------------------------------------------
+# -- torque ----------------------------------------------------------------------------------------------------
+
+
+def limp(node: Node) -> Block:
+    """Torque off for this servo."""
+    return LIMP._replace(goals=(torque_off(node.node),))
+
+
+async def disable_torque(node: Node) -> None:
+    """Torque off: the servo goes limp, whatever its alarms; sent up to three times until it is acknowledged.
+
+    Raises OutcomeUnknown if nothing is answered, VerificationFailed if the torque is still on.
+    """
+    node.epoch += 1
+    doubt: MotorbusError | None = None
+    for _ in range(TRIES):
+        request = write_block(node, limp(node), priority=Priority.STOP)
+        try:
+            await request
+            if not request.expected:
+                await verified(node, LIMP)
+            return
+        except (*DOUBTS, VerificationFailed) as error:
+            doubt = error
+    if isinstance(doubt, VerificationFailed):
+        raise doubt
+    await verified(node, LIMP, doubt)
 
 
 async def enable_torque(node: Node, *, jump: float = 0.0) -> None:
-    """Torque on without a jump: the goal becomes the present position with it (velocity, duty or current 0 there).
+    """Torque on without a jump: the goal becomes the present position; velocity, duty or current 0 in their modes.
 
-    One packet carries both, so that a servo which starts anew in between is limp and nothing else; the switch is read
-    back. In step mode, where a goal is a way to go and torque alone moves nothing, the switch goes by itself.
-    Where a goal velocity of 0 means standstill and nothing else is set, that becomes the maximum, so that goals which
-    come without a velocity are gone to.
-
-    A servo that was turned by hand beyond its limits would go for the nearer limit as soon as it holds; that is
-    refused with LimitExceeded unless the way is at most `jump` (rad). Raises RequestError where no order is known that
-    would not move it: in PWM mode of HLS, in a mode that no source explains, on SMCL with both limits 0, and on a servo
-    of many turns that tells its position within one (there `jump` must be as much as all of them); for a `jump` that
-    is no finite number from 0 on; MotionError when its torque is off again at once, or it has forgotten its turns.
+    A servo that was turned beyond its limits by hand would move to the nearer one: LimitExceeded unless that is at most
+    `jump` rad away. Raises RequestError where no order is known that would not move it (PWM mode of HLS, an unknown
+    mode, SMCL without limits, many turns with a position within one); MotionError if its torque is off again at once or
+    it has forgotten its turns.
     """
     await torque_on_unless(node, None, jump=jump)
 
 
+async def torque_on_unless(node: Node, unless: Precondition | None, *, jump: float = 0.0) -> None:
+    """`enable_torque`, with a reason not to send the packet that switches torque on."""
+    if not (is_number(jump) and jump >= 0):
+        raise node.refusal(f"cannot jump by {shown(jump)}", expected="a number of rad from 0 on")
+    await read_settings(node)
+    mode = goals.checked_mode(node)
+    if mode is Mode.STEP:  # torque alone moves nothing there
+        block = Block(TORQUE_ENABLE, ON, Effect.TORQUE, (torque_on(node.node),))
+    elif mode is Mode.POSITION:
+        block = await _hold_with_torque(node, jump)
+    else:
+        block = goals.rest_block(node)
+        if mode is Mode.VELOCITY:
+            settings = node.settings
+            await read_bound(node)
+            _check_same(node, settings)
+            block = goals.with_bound(node, block)
+        block = goals.with_torque(block, await _read_commands(node))
+    await ordered(node, block._replace(unless=unless))
+    if mode is Mode.POSITION:
+        await _check_turn(node, block, jump)
+    await check_torque(node)
+
+
+async def _hold_with_torque(node: Node, jump: float) -> Block:
+    """Torque on and goal := the present position, or the near limit; with the bound of the current.
+
+    A goal velocity of 0 that means standstill becomes the maximum, or goals alone would move nothing.
+    """
+    limits, settings = goals.checked_limits(node), node.settings
+    await read_bound(node)
+    found = await _read_commands(node)
+    raw = await _read_position(node, settings)
+    _check_turn_is_known(node, raw, jump)
+    there = _within_limits(node, raw, jump)
+    block = goals.hold_block(node, there)
+    if there != raw:  # it moves, so the gate judges it as any other goal
+        block = block._replace(goals=(block.goals[0]._replace(low=limits[0], high=limits[1], stays=None),))
+    speed = node.row("goal_velocity")
+    at = speed.address - TORQUE_ENABLE
+    stands = node.settings is not None and not node.settings.zero_is_maximum
+    if stands and speed.decode(found[at : at + speed.size]) == 0:
+        return goals.with_torque(
+            block._replace(data=block.data + goals.behind_goal(node, goals.raw_speed(node, None))), found
+        )
+    return goals.with_torque(goals.with_bound(node, block), found)
+
+
+def _within_limits(node: Node, raw: int, jump: float) -> int:
+    row = node.row("goal_position")
+    here = node.value(row, raw)
+    low, high = goals.checked_limits(node)
+    there = min(max(here, low), high)
+    if abs(here - there) <= jump + row.scale / 2:
+        return node.raw(row, there)
+    what = f"node {node.node} stands at {here:.4g} rad, outside its limits {low:.4g} to {high:.4g} rad"
+    fix = f"turn it inside by hand, or enable_torque(jump={abs(here - there) + 0.001:.3f})"
+    raise LimitExceeded(f"{what}: it would jump to {there:.4g} rad", advice=fix, node=node.node)
+
+
+def _check_turn_is_known(node: Node, raw: int, jump: float = 0.0) -> None:
+    """Raise RequestError if goals count over many turns and this position within one: "here" may be turns away."""
+    settings = node.settings
+    assert settings is not None
+    if settings.tells_turns or not settings.many_turns or not 0 <= raw < settings.turn:
+        return
+    if jump < goals.checked_limits(node)[1]:
+        raise node.refusal(
+            "counts its goals over many turns and its position within one, so 'here' may be turns away",
+            "set_multi_turn(True), or move() to a goal you know, or disable_torque()",
+        )
+
+
+async def _check_turn(node: Node, block: Block, jump: float = 0.0) -> None:
+    """See that a servo that counts turns is still on the turn where this order holds it.
+
+    It forgets its turns with its supply, and is then on its way over many. Torque goes off, and MotionError is raised.
+    """
+    settings = node.settings
+    if settings is None or not settings.tells_turns:
+        return
+    far = abs(float(node.value(node.row("goal_position"), settings.turn // 2))) + jump
+    goal = block.goals[0].value
+    if abs(await feedback.position(node) - goal) > far:
+        await disable_torque(node)
+        raise MotionError(
+            f"node {node.node} has forgotten its turns while it was to stay at {goal:.4g} rad",
+            cause="it has lost its supply for a moment",
+            advice="check its supply, home it, then enable_torque(); it is limp",
+            node=node.node,
+        )
+
+
+async def is_limp(node: Node) -> bool:
+    """Whether its torque switch has any other value than 1."""
+    return await read_block(node, TORQUE_ENABLE, 1, bytes) != ON
+
+
+async def check_torque(node: Node) -> None:
+    """Raise MotionError if the torque of a servo that has acknowledged torque on is off."""
+    if await is_limp(node):
+        raise MotionError(
+            f"node {node.node} has acknowledged torque on, and its torque is off",
+            expected="register 40 at 1",
+            cause="it has lost its supply for a moment, as switching torque on may do; or an alarm, a stop or another "
+            "program has switched it off",
+            advice="check its supply and its alarms, then enable_torque(); it is limp",
+            node=node.node,
+        )
+
+
+async def ordered(node: Node, block: Block) -> None:
+    """Write an order and be sure of it; a bound of the current in it is known from then on."""
+    row = node.row(node.traits.current) if node.traits.current else None
+    at = -1 if row is None else row.address - block.address
+    has_bound = 0 <= at < len(block.data)
+    if has_bound:
+        node.bound = None
+    await confirmed(node, block)
+    if row is not None and has_bound:
+        node.bound = row.decode(block.data[at : at + row.size])
+
+
+async def read_bound(node: Node, current: float | None = None) -> None:
+    """Read the goal torque of an HLS unless it is known or `current` sets it."""
+    if node.traits.current and node.bound is None and current is None:
+        row = node.row(node.traits.current)
+        node.bound = await read_block(node, row.address, row.size, row.decode)
+
+
+async def _read_commands(node: Node) -> bytes:
+    return await read_block(node, TORQUE_ENABLE, COMMANDS, bytes)
+
+
+async def _read_position(node: Node, settings: Settings | None) -> int:
+    """Raw present position. Raises RequestError if another task has changed these settings."""
+    row = node.row("present_position")
+    raw = await read_block(node, PRESENT, row.size, row.decode)
+    _check_same(node, settings)
+    return raw
+
+
+def _check_same(node: Node, settings: Settings | None) -> None:
+    if node.settings is not settings:
+        raise outdated(node)
+
+
+# -- stop ------------------------------------------------------------------------------------------------------
+
+
 async def stop(node: Node) -> Promise:
-    """Decelerate and stay: the goal becomes the position of this moment (velocity, duty or current 0 in those modes).
+    """Decelerate and hold: the goal becomes the present position; velocity, duty or current 0 in their modes.
 
-    Mode and limits are read anew, for another program may have changed them. Returns what was promised. A limp STS
-    servo begins to hold, a limp one of another map may stay limp. Outside its limits a servo goes for the nearer one
-    as soon as it has torque: one that is limp there is left alone (`LIMP`), one with torque is on its way already, and
-    whether the goal ends that is not known (`OUTSIDE_ACCEPTED`).
-
-    Raises RequestError where nothing is known to end a movement but torque off: in step mode, where a goal is a way to
-    go; in PWM mode of HLS; in a mode that no source explains; and with torque on SMCL with both limits 0, and on a
-    servo of many turns that tells its position within one. Raises MotionError, with the servo limp, when it has
-    forgotten its turns meanwhile; VerificationFailed when it reads back something else three times.
+    Mode and limits are read first. A limp STS begins to hold. A servo that is limp outside its limits is left alone
+    (`LIMP`); one with torque there is on its way to the nearer limit (`OUTSIDE_ACCEPTED`). Raises RequestError where
+    only torque off ends a movement: step mode, PWM mode of HLS, an unknown mode, and where `enable_torque` raises it.
     """
-    table = await asked_anew(node)
-    mode = node.known_mode
-    if mode is None:
-        raise unknown_mode(node)
-    if mode is Mode.STEP:
-        raise RequestError(
-            f"node {node.node} is in step mode, where no goal means 'stay'",
-            advice="use disable_torque(), after which it is limp; nothing was sent",
-            node=node.node,
-        )
-    for again in reversed(range(_TRIES)):
+    node.epoch += 1
+    await read_settings(node)
+    for attempt in range(TRIES):
         try:
-            if mode is Mode.POSITION:
-                return await _stay(node, table)
-            await ordered(node, table, at_rest(node, table, mode))
-            break
-        except VerificationFailed:  # where no acknowledgement is due, this is how a lost packet shows
-            if not again:
+            return await _stop(node)
+        except VerificationFailed:  # a lost packet at status return level 0
+            if attempt == TRIES - 1:
                 raise
-    return _AT_REST[mode]
+    raise AssertionError
 
 
-async def _stay(node: Node, table: RegisterMap) -> Promise:
-    """Goal := here, unless that could set a limp servo into motion.
-
-    A host that sleeps between the reading and the goal would send it back to where it was. So a reading that is too old
-    is taken anew before it is sent, and what turns out to have slept on its way is said again from where it is then;
-    three times at most, for a stop is sent whatever happens.
-    """
-    for again in reversed(range(_TRIES)):
-        asked = await Sleep(0.0)
-        here = await catch(held(node, table))
-        told = node.at
-        doubtful = isinstance(here, RequestError) or (isinstance(here, Block) and outside(node, table, here))
-        if doubtful and await is_limp(node):
-            return Promise.LIMP
-        if isinstance(here, MotorbusError):
-            raise here
-        waited = await Sleep(0.0) - told
-        if again and (waited > OLD or told - asked > SLEPT):
-            continue
-        await ordered(node, table, here)
-        if not again or await Sleep(0.0) - asked <= SLEPT:
-            await not_turns_away(node, table, here)
-            break
-    return Promise.OUTSIDE_ACCEPTED if doubtful else Promise.HOLD_ACCEPTED
-
-
-async def calmed(node: Node, table: RegisterMap) -> None:
-    """What a servo that has torque and no force would go for becomes where it is, or no velocity, duty or current.
-
-    For whoever is about to give it its force back. Does nothing to a limp one, and in step mode, where nothing waits.
-    Raises LimitExceeded when it stands outside its limits, to which it would go; errors as enable_torque() otherwise.
-    """
-    mode = node.known_mode
-    if mode is Mode.STEP or await is_limp(node):
-        return
-    if mode is None:
-        raise unknown_mode(node)
+async def _stop(node: Node) -> Promise:
+    mode = goals.checked_mode(node)
+    if mode is Mode.STEP:
+        raise node.refusal("is in step mode, where no goal means 'stay'", "use disable_torque()")
     if mode is not Mode.POSITION:
-        await ordered(node, table, at_rest(node, table, mode))
-        return
-    block = await held(node, table)
-    if outside(node, table, block):
-        raise LimitExceeded(
-            f"node {node.node} stands outside its limits: with its force back it would go for the nearer one",
-            expected="a position within its limits",
-            advice="disable_torque() first, then enable_torque(jump=…) bounds that way; nothing was sent",
-            node=node.node,
-        )
-    await ordered(node, table, block)
+        await ordered(node, goals.rest_block(node))
+        return _AT_REST[mode]
+    here = await catch(_hold_here(node))
+    inside = isinstance(here, Block) and not _is_outside(node, here)
+    if not inside and isinstance(here, Block | RequestError) and await is_limp(node):
+        return Promise.LIMP
+    if isinstance(here, MotorbusError):
+        raise here
+    await ordered(node, here)
+    await _check_turn(node, here)
+    return Promise.HOLD_ACCEPTED if inside else Promise.OUTSIDE_ACCEPTED
 
 
-# -- move ----------------------------------------------------------------------------------------------------
+async def _hold_here(node: Node) -> Block:
+    goals.checked_limits(node)
+    raw = await _read_position(node, node.settings)
+    _check_turn_is_known(node, raw)
+    return goals.hold_block(node, raw)
+
+
+def _is_outside(node: Node, block: Block) -> bool:
+    low, high = goals.checked_limits(node)
+    here, slack = block.goals[0].value, node.row("goal_position").scale / 2
+    return not low - slack <= here <= high + slack
+
+
+async def _stop_move(node: Node) -> Promise | None:
+    """As `stop`; a limp servo stays limp."""
+    if await catch(is_limp(node)) is True:
+        return None
+    return await stop(node)
+
+
+# -- move ------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Motion(core_move.MoveLogic[Node]):
+    """How a servo moves: at most at `velocity` (rad/s) and `acceleration` (rad/s²), with at most `current` (A).
+
+    Where a position lies within one turn and goals do not, places are compared within a turn.
+    """
+
+    velocity: float | None = None
+    acceleration: float | None = None
+    current: float | None = None
+    ends: dict[int, float] = field(default_factory=dict)
+
+    async def check(self, device: Node, to: float) -> Setpoint:
+        await writable(device)
+        await read_bound(device, self.current)
+        goal = self._block(device, to).goals[0]
+        self.tolerance = max(TOLERANCE, COUNTS * count_of(device))
+        if self.velocity:  # a slow move takes its time for two counts
+            self.stall_time = (
+                core_move.STALL_TIME + 2 * max(core_move.PROGRESS, count_of(device)) / self.velocity
+            )
+        self.ends[device.node] = goal.value
+        return goal
+
+    async def send(self, device: Node, goal: Setpoint) -> None:
+        await ordered(device, self._block(device, goal.value))
+        if not device.traits.goal_switches_on:
+            await check_torque(device)
+        if self._turn(device):
+            await Sleep(core_move.PERIOD)  # a goal whole turns away looks like this place until it moves
+
+    async def sample(self, device: Node) -> State:
+        state = await feedback.telemetry(device)
+        turn, goal = self._turn(device), self.ends[device.node]
+        if turn and state.position is not None:
+            return state._replace(position=goal + remainder(state.position - goal, turn))
+        return state
+
+    def stop(self, device: Node) -> Procedure[Promise | None]:
+        return _stop_move(device)
+
+    def timeout(self, distance: float) -> float:
+        speed = min(self.velocity or UNHURRIED, UNHURRIED)
+        ramps = speed / self.acceleration if self.acceleration else 0.0
+        return 1.0 + 2.0 * (distance / speed + ramps)
+
+    def _block(self, node: Node, to: float) -> Block:
+        return goals.motion_block(node, to, self.velocity, self.acceleration, self.current)
+
+    def _turn(self, node: Node) -> float:
+        """rad after which a position starts at 0 again, where goals do not; else 0."""
+        settings = node.settings
+        if settings is None or settings.tells_turns or not settings.many_turns:
+            return 0.0
+        return settings.turn * count_of(node)
+
+
+def count_of(node: Node) -> float:
+    """One count of its goal position (rad)."""
+    return abs(float(node.value(node.row("goal_position"), 1)))
 
 
 async def move(
@@ -200,107 +399,101 @@ async def move(
 ) -> None:
     """Move to `to` rad, at most at `velocity` rad/s and `acceleration` rad/s² (None: the servo's maximum).
 
-    Mode and limits are read first, each time: another program may have changed them (a loop that cannot spare that
-    runs `sync_write_positions`, which asks nobody). Goal, velocity and acceleration leave in one packet. Torque goes
-    on: on STS by itself, on other maps, of which nobody has said that, by the switch in the same packet, which is read
-    back. On HLS the packet also bounds the current: by `current` (A), or as it was; 0 is never sent, and a servo that
-    was found with 0 is reported (`Powerless`). Returns when the servo is in position within `tolerance` rad (None:
-    0.05, or ten counts where these are more) and no longer moves; at once with `wait=False`. A servo of many turns
-    that tells its position within one is judged within that. When the wait is interrupted or cancelled the servo stops
-    and holds, and a note of the interruption says where; with `wait=False` it goes to its goal.
-
-    Raises LimitExceeded when `to` is not a finite number (and the gate does outside the limits), RequestError in other
-    than position mode, for an acceleration where the map has no register for it (SCS) or a current where it has none
-    (all but HLS), Stalled when it stays off its goal, MotionError after `timeout` seconds (None: by way and velocity),
-    MotionError when its torque is off again at once.
+    Torque is switched on. On HLS `current` (A) bounds the current; None keeps what is set. Returns when the servo is
+    within `tolerance` rad (None: 0.05, or ten counts where these are more) and not moving, at once with `wait=False`.
+    An interrupt of the wait stops it. Raises LimitExceeded, RequestError in another mode and for a bound without a
+    register, Stalled, MotionError after `timeout` s (None: from distance and velocity) or if its torque is off at once.
     """
-    finite(node, to, velocity, acceleration, current, tolerance, timeout)
-    table = await asked_anew(node)
-    await ask_bound(node, table, current)
-    block = move_block(node, table, to, velocity, acceleration, current)
-    if not wait:
-        node.last_move = None
-        await _sent(node, table, block)
-        return
-    order = way(node, table, block.goals[0].value, velocity, acceleration, tolerance, timeout)
-    await stops(_gone(node, table, block, order), node)
+    logic = Motion(velocity, acceleration, current)
+    await move_all(logic, {node: to}, wait=wait, tolerance=tolerance, timeout=timeout)
 
 
-async def stops(move: Runnable[T], *nodes: Node) -> T:
-    """Order a move and wait for it; when that is interrupted the servos stop and hold. A limp one stays limp."""
-    devices = [Moving(node, partial(_stopped, node), partial(position, node)) for node in nodes]
-    return await stopped_if_interrupted(move, *devices)
-
-
-async def _stopped(node: Node) -> Promise | None:
-    if await catch(is_limp(node)) is True:
-        return None
-    return await stop(node)
-
-
-async def _gone(node: Node, table: RegisterMap, block: Block, order: Move) -> None:
-    await _sent(node, table, block)
-    await arrive(node, table, order)
-
-
-async def _sent(node: Node, table: RegisterMap, block: Block) -> None:
-    await ordered(node, table, block)
-    if not node.control.goal_switches_on:
-        await surely_on(node)
-
-
-def way(
-    node: Node,
-    table: RegisterMap,
-    goal: float,
-    velocity: float | None = None,
-    acceleration: float | None = None,
+async def move_all(
+    logic: core_move.MoveLogic[Node],
+    to: Mapping[Node, float],
+    *,
+    wait: bool = True,
     tolerance: float | None = None,
     timeout: float | None = None,
-) -> Move:
-    """The move that was ordered, for `arrive` to judge; as `move` says."""
-    count = abs(float(node.value(table["goal_position"], 1)))
-    within = max(TOLERANCE, COUNTS * count) if tolerance is None else tolerance
-    settings = node.settings
-    wraps = settings is not None and settings.many_turns and not settings.accumulates
-    turn = settings.turn * count if settings is not None and wraps else None
-    return Move(goal, velocity, acceleration, within, timeout, resolution=count, turn=turn)
+    **further: Any,
+) -> None:
+    """`core.move.move`, with its further arguments; a stalled servo is asked for the reason."""
+    try:
+        await core_move.move(logic, to, wait=wait, tolerance=tolerance, timeout=timeout, **further)
+    except Stalled as error:
+        node = next(one for one in to if one.node == error.node)
+        reasons = await catch(diagnosis.why_not_moving(node))
+        if not isinstance(reasons, MotorbusError) and reasons:
+            error.cause = "; ".join(reasons)
+        error.advice = "clear the way; it still pushes towards its goal: stop() ends that"
+        raise
 
 
-def move_block(
-    node: Node,
-    table: RegisterMap,
-    to: float,
-    velocity: float | None = None,
-    acceleration: float | None = None,
-    current: float | None = None,
-) -> Block:
-    """All that a move says, in one block: acceleration, goal position, bound of the current or time, velocity.
+# -- caps and limits -------------------------------------------------------------------------------------------
 
-    Registers 41 to 47 where the goal switches torque on; elsewhere 40 to 47, the switch with them. The time is 0, so
-    that the velocity counts. Raises RequestError when a bound of the current is needed and not known (see `ask_bound`).
+
+async def cap_torque(node: Node, fraction: float) -> None:
+    """Limit the torque to this fraction of the stall torque, 0 to 1, until power-off.
+
+    A limit of 0 releases the servo; before a greater one its goal becomes its present position. Raises RequestError for
+    another number or a servo whose limit is in EEPROM, LimitExceeded for a released one outside its position limits.
     """
-    raw, order = position_goal(node, table["goal_position"], to)
-    row, more = table["goal_velocity"], burst(node, table, velocity, current)
-    data = table["goal_position"].encode(raw) + more
-    ramp = ramp_of(node, table, acceleration)
-    goals = (order, speed_goal(node, row, row.decode(more[-row.size :])))
-    block = Block(table["goal_position"].address - len(ramp), ramp + data, Effect.MOTION, goals)
-    return block if node.control.goal_switches_on else switched_on(block)
+    if not (is_number(fraction) and 0 <= fraction <= 1):
+        raise node.refusal(f"cannot limit its torque to {shown(fraction)}", expected="0 to 1")
+    table = await writable(node)
+    if not node.traits.limit:
+        raise node.refusal("keeps its torque limit in EEPROM", "write(max_torque=…) sets it")
+    row = table[node.traits.limit]
+    if fraction and not await read_block(node, row.address, row.size, row.decode):
+        await _calm(node)
+    block = Block(row.address, row.encode(node.raw(row, fraction)), row.effect)
+    await confirmed(node, block)
+    await verified(node, block)
 
 
-def finite(node: Node, to: float, *bounds: float | None) -> None:
-    """Raise LimitExceeded for a goal that is no number, RequestError for bounds that are none above 0."""
-    if not is_number(to):
-        raise LimitExceeded(
-            f"node {node.node}: {shown(to)} is no position",
-            advice="give a number in rad; nothing was sent",
-            node=node.node,
-        )
-    for bound in bounds:
-        if bound is not None and not (is_number(bound) and bound >= 0):
-            raise RequestError(
-                f"node {node.node}: {shown(bound)} is not a finite number above 0",
-                advice="velocity in rad/s, acceleration in rad/s², tolerance in rad, timeout in s; nothing was sent",
-                node=node.node,
-            )
+async def _calm(node: Node) -> None:
+    """Make a servo with torque and without force stay where it is when it gets its force back."""
+    await read_settings(node)
+    if node.known_mode is Mode.STEP or await is_limp(node):
+        return
+    if goals.checked_mode(node) is not Mode.POSITION:
+        await ordered(node, goals.rest_block(node))
+        return
+    block = await _hold_here(node)
+    if _is_outside(node, block):
+        what = f"node {node.node} stands outside its limits and would move to the nearer one"
+        raise LimitExceeded(what, advice="disable_torque(), then enable_torque(jump=…)", node=node.node)
+    await ordered(node, block)
+
+
+async def cap_current(node: Node, current: float) -> None:
+    """Bound the current (A, above 0) of an HLS until power-off or an order with another bound.
+
+    Raises RequestError for another servo, or in a mode where the register is no bound.
+    """
+    await read_settings(node)
+    data = goals.bound_bytes(node, current)
+    if node.known_mode not in (Mode.POSITION, Mode.VELOCITY):
+        what = f"is in operating mode {goals.shown_mode(node)}, where its goal torque bounds nothing"
+        raise node.refusal(what, "set_mode('position')")
+    row = node.row(node.traits.current)
+    value, most = float(node.value(row, row.decode(data))), float(node.value(row, row.high))
+    await ordered(node, Block(row.address, data, row.effect, (Setpoint(node.node, "cap", value, 0.0, most),)))
+
+
+async def limits(node: Node) -> tuple[float, float]:
+    """Lowest and highest position (rad); read if unknown. Raises RequestError where 0 and 0 have no known meaning."""
+    await writable(node)
+    return goals.checked_limits(node)
+
+
+async def travel(node: Node) -> tuple[float, float] | None:
+    """Range (rad) of its encoder and registers, whatever its limits; None in another mode than position."""
+    table: RegisterMap = await known(node)
+    settings = node.settings
+    if not node.is_writable or settings is None or settings.mode is not Mode.POSITION:
+        return None
+    count = table["goal_position"].scale * settings.factors["goal_position"]
+    if settings.many_turns:
+        return -MANY_TURNS * count, MANY_TURNS * count
+    return 0.0, settings.turn * count

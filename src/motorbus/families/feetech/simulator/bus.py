@@ -1,358 +1,243 @@
-"""Several simulated servos on one half-duplex wire: who hears which packet, who answers, and when.
+"""Simulated servos on one half-duplex wire: who receives which packet, who replies, and when.
 
-What all real ones have in common, so no switch: a packet with a wrong checksum is met with silence; a broadcast is
-obeyed and not answered, PING excepted; at status return level 0 only PING and READ are answered (FEETECH serial bus
-servo protocol manual V1.01, 1.1 and 1.3), and of SYNC READ, which that manual has not, a switch decides. Servos that
-answer at once pull the wire low together.
+A packet with a wrong checksum is ignored. A broadcast is carried out and, but for PING, not answered; at
+status return level 0 only reads are (FEETECH serial bus servo protocol manual V1.01, 1.1 and 1.3). The wire
+idles high and each 0 bit pulls it low, so replies that overlap are ANDed. Simplified: by whole bytes.
 """
 
 from __future__ import annotations
 
-from bisect import bisect_right, insort
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from bisect import insort
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import count
+from math import ceil, inf
 from operator import attrgetter
 from random import Random
-from typing import Final, NamedTuple, cast
+from typing import Final, NamedTuple
 
-from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Data
 from motorbus.errors import RequestError
-from motorbus.families.feetech.simulator import effects
-from motorbus.families.feetech.simulator.collision import BITS, Speech, heard, overlapping
-from motorbus.families.feetech.simulator.fate import Fate
-from motorbus.families.feetech.simulator.instructions import MOST, OBEY, Answer, told
-from motorbus.families.feetech.simulator.memory import Layout
-from motorbus.families.feetech.simulator.model import Model
+from motorbus.families.feetech import protocol
+from motorbus.families.feetech.protocol import BROADCAST, MAX_ID, MAX_PARAMETERS, OVERHEAD, Instruction
+from motorbus.families.feetech.simulator.instructions import carry_out
+from motorbus.families.feetech.simulator.models import Model
+from motorbus.families.feetech.simulator.quirks import Quirks
 from motorbus.families.feetech.simulator.servo import Servo
-from motorbus.families.feetech.simulator.sight import Seen, Sight, shown
-from motorbus.families.feetech.simulator.switches import Switches
-from motorbus.families.feetech.wire import (
-    BROADCAST,
-    MAX_ID,
-    OVERHEAD,
-    Instruction,
-    InstructionPacket,
-    Splitter,
-    decode_sync_read,
-    decode_sync_write,
-    frame,
-)
 
-_USUAL_RATE = 1_000_000
-_TWIN_JITTER: Final = 20
-"""Bits by which a duplicate begins its reply later, at most. # assumption: two equal servos never reply in step"""
-_ANSWERED_AT_LEVEL_0 = (Instruction.PING, Instruction.READ)
-_BY_SECOND_ID = (Instruction.WRITE, Instruction.REG_WRITE)
-_NOBODY: tuple[Servo, ...] = ()
-_WHEN = attrgetter("when")
-_made: Final = tuple.__new__
-"""Makes a named tuple in half the time of its own call: each packet of each servo needs one."""
+BITS: Final = 10  # of a byte on the wire
+JITTER: Final = 20  # bits by which a second servo with an id may be late # assumption
+SLACK: Final = 0.05  # of a byte; replies that are less apart start together
+FRAME_GAP: Final = 0.005  # s; after a longer pause an incomplete packet is dropped # assumption
+USUAL_RATE: Final = 1_000_000  # bit/s, of a host that has not set one
+WRITES: Final = (Instruction.WRITE, Instruction.REG_WRITE, Instruction.SYNC_WRITE)
+ALWAYS: Final = (Instruction.PING, Instruction.READ)  # answered at every status return level
+_NEXT: Final = attrgetter("overload.next")
 
 
-class Voice(NamedTuple):
-    """A packet that a servo begins to send at `when`; it is not sent if the servo has lost its supply since.
-
-    Without a servo it is the echo of an adapter.
-    """
+class Reply(NamedTuple):
+    """Bytes that start at `when` (s), if the `lives` of the servo are the same; without servo an echo."""
 
     when: float
     order: int
     data: bytes
-    servo: Servo | None = None
-    life: int = 0
+    servo: Servo | None
+    life: int
 
 
 class FeetechBus:
-    """A `motorbus.core.family.Simulator` of FEETECH servos.
+    """A `core.family.Simulator` of FEETECH servos; `now` is the latest time (s).
 
-    `servos` are all of them in the order given, two with one id included; `now` is the latest moment it was told.
-    `twins` are those of them that duplicate an id; unless `reply_jitter` is set they reply up to 20 bits later.
-    `model` is that of all, or those of each. `usual_rate` is the rate that the first had at first (bit/s), by which to
-    open the bus.
+    `servos` are those of the ids as given, then second ones; `usual_rate` is the rate of the first one when
+    it was made (bit/s).
     """
 
-    def __init__(
-        self,
-        ids: Iterable[int],
-        model: Model | Sequence[Model],
-        *,
-        position: int | Mapping[int, int] | None = None,
-        switches: Switches | None = None,
-    ) -> None:
-        self.switches = switches or Switches()
+    def __init__(self, ids: Iterable[int], models: Iterable[Model], quirks: Quirks) -> None:
+        self.quirks = quirks
         self.now = 0.0
         self.rate: int | None = None
-        self._splitter = Splitter("instruction")
-        self._heard_at = 0.0
-        self._voices: list[Voice] = []  # in the order in which they begin
+        self.servos: tuple[Servo, ...] = ()
+        self._parser = protocol.parser()
+        self._received_at = 0.0
+        self._replies: list[Reply] = []
         self._order = count()
-        self._by_id: dict[int, list[Servo]] | None = None
-        self._by_second: dict[int, list[Servo]] = {}
-        self._random = Random(self.switches.seed)
-        self._jitter = self.switches.reply_jitter
-        self._read_by_map = self.switches.sync_read == "by_map"
-        self._sight = Sight()
-        numbers = list(ids)
-        kinds = [model] * len(numbers) if isinstance(model, Model) else list(model)
-        distinct = {id(kind): kind for kind in kinds}
-        layouts = {key: Layout(kind.table, kind.defaults) for key, kind in distinct.items()}
-        clock, renamed = self._clock, self._forget_ids
-        self.servos = tuple(
-            Servo(
-                _checked(number),
-                kind,
-                layouts[id(kind)],
-                self.switches,
-                clock,
-                renamed,
-                position.get(number) if isinstance(position, Mapping) else position,
-            )
-            for number, kind in zip(numbers, kinds, strict=True)
-        )
+        self._random = Random(0)
+        for id, model in zip(ids, models, strict=True):
+            self._add(id, model)
         if not self.servos:
             raise RequestError("a simulated bus needs at least one servo", advice="give ids, such as 1-6")
-        self.twins: frozenset[Servo] = frozenset()
-        self._fate = Fate(self.servos, self.switches)
-        self.usual_rate = self.servos[0].baud_rate
+        self.usual_rate: int = self.servos[0].baud_rate or 0
+
+    def _add(self, id: int, model: Model) -> Servo:
+        if not 0 <= id <= MAX_ID:
+            raise RequestError(f"id {id} is not possible", expected=f"0 to {MAX_ID}")
+        servo = Servo(id, model, self.quirks, lambda: self.now)
+        self.servos = (*self.servos, servo)
+        return servo
 
     @property
     def nodes(self) -> Mapping[int, Servo]:
-        """The servos by the id they have now; of two with one id the first."""
-        return {id: servos[0] for id, servos in self._ids().items()}
+        """The servos by their present id; the first of two with one id."""
+        found: dict[int, Servo] = {}
+        for servo in self.servos:
+            found.setdefault(servo.id, servo)
+        return found
 
     def duplicate(self, id: int) -> None:
-        """A second servo with this id is there from now on, like the first and as it ships but for id and rate.
+        """Add a servo as shipped, with this id and the rate of the servo that has it.
 
         Raises RequestError when there is none.
         """
-        if id not in self._ids():
-            raise RequestError(f"no servo has the id {id}")
-        first = self._ids()[id][0]
-        layout, switches = first.memory.layout, self.switches
-        twin = Servo(id, first.model, layout, switches, self._clock, self._forget_ids, None)
-        twin.memory["baud_rate"] = twin.memory.stored[twin.memory.layout.table["baud_rate"].address] = (
-            first.memory["baud_rate"]
-        )
-        self.servos = (*self.servos, twin)
-        self.twins |= {twin}
-        self._fate = Fate(self.servos, self.switches)
-        self._fate.expect(self.now)
-        self._forget_ids()
+        if id not in self.nodes:
+            raise RequestError(f"no servo has the id {id}", expected=f"one of {sorted(self.nodes)}")
+        first = self.nodes[id]
+        second = self._add(id, first.model)
+        second.jitter = JITTER
+        address = second.model.table["baud_rate"].address
+        second.memory.live[address] = second.memory.stored[address] = first.memory["baud_rate"]
 
     def tune(self, rate: int) -> None:
-        """The host's rate; servos set to another one neither hear nor are heard."""
-        self.rate = rate
+        """Set the rate of the host (bit/s); servos set to another one neither receive nor are received."""
+        self.rate = rate or None
 
     def due(self) -> float | None:
-        """When the next packet begins, or None."""
-        return self._voices[0].when if self._voices else None
+        """The moment (s) of the next reply, or None."""
+        return self._replies[0].when if self._replies else None
 
     def advance(self, to: float) -> list[tuple[float, Data]]:
-        """Every packet that a servo begins to send up to this moment, each with its own, in order."""
+        """The replies that start up to this moment (s), in order."""
         sent: list[tuple[float, Data]] = []
-        if self._voices:
-            ripe = bisect_right(self._voices, to, key=_WHEN)
-            begun, self._voices = self._voices[:ripe], self._voices[ripe:]
-            for when, _, data, servo, life in begun:
-                self._pass(when)
-                if servo is None or servo.lives == life:
-                    sent.append((when, data))
+        while self._replies and self._replies[0].when <= to:
+            when, _, data, servo, life = self._replies.pop(0)
+            self._pass(when)
+            if servo is None or servo.lives == life:
+                sent.append((when, data))
         self._pass(to)
         return sent
 
     def receive(self, data: Data, at: float) -> None:
-        """Bytes of the host, cut anywhere, several packets in one piece or half of one."""
-        if isinstance(data, CanFrame):
+        """Take bytes of the host whose last bit arrives at this moment (s)."""
+        if not isinstance(data, bytes):
             return
         self._pass(at)
-        if self.switches.echo:
-            self._speak(at, bytes(data), None)
-        began = at - len(data) * self._byte_time(None)
-        if self.switches.frame_gap and began - self._heard_at > self.switches.frame_gap:
-            self._splitter = Splitter("instruction")
-        self._heard_at = at
-        for packet in self._splitter.feed(data):
-            if isinstance(packet, InstructionPacket):
-                self._hear(packet, at)
-
-    obeys_at_once = True
-
-    def sight(self, at: float) -> Iterable[tuple[int, tuple[Hashable, ...]]]:
-        """What each servo holds at this moment, those with one id included."""
-        return self._sight.all(self.servos, at)
-
-    def shown(self, picture: tuple[Hashable, ...], name: str) -> int:
-        """What a picture of a servo has in this row."""
-        return shown(cast("Seen", picture), name)
+        if self.quirks.echo:
+            self._speak([Reply(at, 0, data, None, 0)])
+        if at - len(data) * self._byte_time(None) - self._received_at > FRAME_GAP:
+            self._parser = protocol.parser()
+        self._received_at = at
+        for frame, fault in self._parser.feed(data):
+            if not fault:
+                self._carry_out(protocol.decode(frame), at)
 
     def _pass(self, to: float) -> None:
-        """Let time pass, and everything happen that servos do by themselves meanwhile."""
-        if self._fate.soon <= to:
-            self._fate.live(to, self.now, self._tell)
-        if to > self.now:
-            self.now = to
+        """Let time pass; servos do meanwhile what they do by themselves."""
+        while (servo := min(self.servos, key=_NEXT)).overload.next <= to:
+            self.now = max(self.now, servo.overload.next)
+            servo.trip()
+        self.now = max(self.now, to)
 
-    def _clock(self) -> float:
-        return self.now
+    # -- instructions ------------------------------------------------------------------------------
 
-    def _tell(self, moment: float) -> None:
-        self.now = moment
-
-    def _hear(self, packet: InstructionPacket, at: float) -> None:
-        if packet.instruction == Instruction.SYNC_READ:
+    def _carry_out(self, packet: protocol.Packet, at: float) -> None:
+        id, code, parameters = packet
+        if code == Instruction.SYNC_READ and protocol.suits(code, parameters):
             self._sync_read(packet, at)
-        elif packet.instruction == Instruction.SYNC_WRITE:
-            self._sync_write(packet, at)
-        elif packet.instruction in OBEY:
-            self._obey(packet, at)
-
-    def _obey(self, packet: InstructionPacket, at: float) -> None:
-        """Everyone addressed obeys at this very moment; then those speak who may."""
-        broadcast = packet.id == BROADCAST
-        speaking: list[tuple[Servo, Answer]] = []
-        for servo in self._hearing(self.servos if broadcast else self._addressed(packet), at):
-            id, rate = servo.id, servo.memory["baud_rate"]
-            answer = OBEY[packet.instruction](servo, packet.parameters, at)
-            if answer is None or not self._answers(servo, id, packet):
-                continue
-            if self.switches.baud_ack == "new" and rate != servo.memory["baud_rate"]:
-                continue
-            new = servo.id if self.switches.id_ack == "new" else id
-            speaking.append((servo, answer._replace(id=new)))
-        if broadcast and self.switches.broadcast_ping == "in_turn":
-            self._in_turn(speaking, at)
+        elif code == Instruction.SYNC_WRITE:
+            items = protocol.decode_sync_write(parameters)
+            for item_id, data in items.items if items and id == BROADCAST else ():
+                for servo in self._receivers(item_id, code, at):
+                    carry_out(servo, Instruction.WRITE, bytes((parameters[0],)) + data, at)
         else:
-            self._at_once(speaking, at)
+            found = [self._answer(servo, packet, at) for servo in self._receivers(id, code, at)]
+            answers = [answer for answer in found if answer is not None]
+            if id == BROADCAST and self.quirks.broadcast_ping == "in_turn":
+                for answer in sorted(answers, key=lambda answer: answer.data[2]):
+                    at = self._speak([answer._replace(when=at)])
+            else:
+                self._speak(answers)
 
-    def _addressed(self, packet: InstructionPacket) -> Sequence[Servo]:
-        """Those with this id, and for writes those HLS that have it as their second one (HLS memory table)."""
-        servos = self._ids().get(packet.id, _NOBODY)
-        if packet.instruction in _BY_SECOND_ID and packet.id in self._by_second:
-            return [*servos, *self._by_second[packet.id]]
-        return servos
+    def _receivers(self, id: int, code: int, at: float) -> list[Servo]:
+        """The servos that take this instruction to this id."""
+        servos = [servo for servo in self.servos if servo.receives(self.rate, at)]
+        if id == BROADCAST:
+            return servos
+        if code in WRITES:
+            return [servo for servo in servos if servo.obeys(id)]
+        return [servo for servo in servos if servo.id == id]
 
-    def _answers(self, servo: Servo, id: int, packet: InstructionPacket) -> bool:
-        """Whether this servo, which had that id when it heard the packet, may speak."""
+    def _answer(self, servo: Servo, packet: protocol.Packet, at: float) -> Reply | None:
+        """Let a servo carry out an instruction; returns its reply."""
+        id, rate = servo.id, servo.baud_rate
+        parameters = carry_out(servo, packet.code, packet.parameters, at)
         if packet.id == BROADCAST:
-            return packet.instruction == Instruction.PING and servo.model.control.broadcast_ping
-        if packet.id != id and self.switches.second_id == "silent":
-            return False
-        return packet.instruction in _ANSWERED_AT_LEVEL_0 or servo.memory["status_return_level"] != 0
+            replies = packet.code == Instruction.PING and servo.model.traits.broadcast_ping
+        else:  # a write to a second id is not answered # assumption
+            replies = packet.id == id and (packet.code in ALWAYS or servo.memory["status_return_level"] != 0)
+        if self.quirks.baud_ack == "new" and rate != servo.baud_rate:
+            replies = False
+        if parameters is None or not replies:
+            return None
+        own = servo.id if self.quirks.id_ack == "new" else id
+        return self._reply(servo, own, parameters, at, packet.code)
 
-    def _sync_write(self, packet: InstructionPacket, at: float) -> None:
-        order = decode_sync_write(packet.parameters)
-        if order is None or packet.id != BROADCAST or not order.length:
-            return
-        address, rate = order.address, self.rate
-        for id, data in order.items:
-            named: Sequence[Servo] = (self._by_id or self._ids()).get(
-                id, _NOBODY
-            )  # a write may have renamed some
-            if id in self._by_second:
-                named = [*named, *self._by_second[id]]
-            if len(named) == 1:  # most are like that
-                if named[0].hears(rate, at):
-                    effects.write(named[0], address, data, at)
-                continue
-            for servo in self._hearing(named, at):
-                effects.write(servo, address, data, at)
+    def _reply(self, servo: Servo, id: int, parameters: bytes, at: float, code: int) -> Reply:
+        """A status packet, sent when the EEPROM has stored; that to RESET is sent before."""
+        start = at  # a reply to any request waits for the EEPROM # assumption
+        if self.quirks.eeprom_commit == "before_ack" and code != Instruction.RESET:
+            start = max(at, servo.memory.busy_until)
+        start += servo.reply_delay
+        if servo.jitter:
+            start += servo.jitter * self._byte_time(servo) / BITS * self._random.random()
+        data = protocol.frame(id, servo.error, parameters)
+        return Reply(start, 0, data, servo, servo.lives)
 
-    def _sync_read(self, packet: InstructionPacket, at: float) -> None:
-        """One packet per listed servo, back to back, in the order of the list (FTServo_Linux, FTServo_Python)."""
-        order = decode_sync_read(packet.parameters)
-        if order is None or packet.id != BROADCAST or order.length > MOST:
+    def _sync_read(self, packet: protocol.Packet, at: float) -> None:
+        """One reply for each id, back to back in the order of the list (FTServo_Linux, FTServo_Python).
+
+        It is answered at every status return level. # assumption
+        """
+        code, (_, length, *ids) = packet.code, packet.parameters
+        if length > MAX_PARAMETERS or packet.id != BROADCAST:
             return
-        address, length, rate = order.address, order.length, self.rate
-        moment, ids, syncs = at, self._ids(), self._syncs
-        for id in order.ids:
-            servos: Sequence[Servo] = ids.get(id, _NOBODY)
-            if len(servos) == 1 and servos[0].hears(rate, at) and syncs(servos[0]):  # most are like that
-                moment = self._alone(servos[0], told(servos[0], address, length, at), moment)
-                continue
-            servos = [one for one in servos if one.hears(rate, at) and syncs(one)]
-            if servos:
-                moment = self._at_once([(one, told(one, address, length, at)) for one in servos], moment)
-            elif self.switches.sync_read_missing == "silent":
+        for id in ids:
+            answers = [
+                self._reply(servo, id, servo.read(*packet.parameters[:2]), at, code)
+                for servo in self._receivers(id, code, self.now)
+                if servo.model.traits.sync_read and code not in servo.lacks
+            ]
+            if answers:
+                at = self._speak(answers)
+            elif self.quirks.sync_read_missing == "silent":
                 return
-            elif self.switches.sync_read_missing == "wait":
-                moment += self._byte_time(None) * (length + OVERHEAD)
+            elif self.quirks.sync_read_missing == "wait":
+                at += self._byte_time(None) * (length + OVERHEAD)
 
-    def _syncs(self, servo: Servo) -> bool:
-        if self._read_by_map:
-            return servo.model.control.sync_read
-        wish = self.switches.sync_read
-        return servo.model.control.sync_read if wish == "by_map" else wish == "yes"
+    # -- the wire ----------------------------------------------------------------------------------
 
-    def _in_turn(self, speaking: list[tuple[Servo, Answer]], at: float) -> None:
-        for one in sorted(speaking, key=lambda pair: pair[0].id):
-            at = self._at_once([one], at)
-
-    def _at_once(self, speaking: Sequence[tuple[Servo, Answer]], at: float) -> float:
-        """Each begins when its return delay is over; those who overlap garble each other. Gives the last end."""
-        if len(speaking) == 1:
-            return self._alone(*speaking[0], at)
-        end = at
-        spoken = [Speech(*self._said(servo, answer, at), servo) for servo, answer in speaking]
-        for together in overlapping(spoken):
-            servo = together[0].servo
-            data = heard(
-                together, self._byte_time(None) / BITS, drop_unframed=self.switches.framing == "drop"
-            )
-            if data:
-                self._speak(together[0].start, data, servo)
-            end = max(end, *(one.end for one in together))
+    def _speak(self, replies: Iterable[Reply]) -> float:
+        """Send replies of one moment, those that overlap as one; returns the end (s) of the last one."""
+        end, together = -inf, list[Reply]()
+        for reply in sorted(replies, key=lambda reply: reply.when):
+            byte = self._byte_time(reply.servo)
+            if reply.when > end - SLACK * byte:
+                self._send(together)
+                together = []
+            together.append(reply)
+            end = max(end, reply.when + len(reply.data) * byte)
+        self._send(together)
         return end
 
-    def _alone(self, servo: Servo, answer: Answer, at: float) -> float:
-        """Nobody speaks with it, so that every byte is heard as it was sent. Gives its end."""
-        start, data, bit = self._said(servo, answer, at)
-        self._speak(start, data, servo)
-        return max(at, start + BITS * bit * len(data))
-
-    def _speak(self, when: float, data: bytes, servo: Servo | None) -> None:
-        """Somebody, or an echo, begins to send this at that moment."""
-        life, voices = servo.lives if servo else 0, self._voices
-        voice = _made(Voice, (when, next(self._order), data, servo, life))
-        if voices and when < voices[-1].when:
-            insort(voices, voice)
-        else:  # most follow one another
-            voices.append(voice)
-
-    def _said(self, servo: Servo, answer: Answer, at: float) -> tuple[float, bytes, float]:
-        """When it begins, what it sends, and for how long each bit of that (s)."""
-        parameters, id, later = answer
-        own, error, delay = servo.speaks()
-        bit = self._byte_time(servo) / BITS
-        if self._jitter:
-            later += self._jitter * self._random.random()
-        elif servo in self.twins:
-            later += _TWIN_JITTER * bit * self._random.random()
-        data = frame(own if id is None else id, error, parameters)
-        return at + delay + later, data, bit
+    def _send(self, together: Sequence[Reply]) -> None:
+        """Send replies that overlap."""
+        wire = bytearray()
+        for reply in together:
+            late = (reply.when - together[0].when) / self._byte_time(reply.servo)
+            start = ceil(late - SLACK)
+            wire += b"\xff" * (start + len(reply.data) - len(wire))
+            for place, byte in enumerate(reply.data, start):
+                wire[place] &= byte
+        if together:
+            insort(self._replies, together[0]._replace(order=next(self._order), data=bytes(wire)))
 
     def _byte_time(self, servo: Servo | None) -> float:
-        """Seconds of a byte on the wire: ten bits."""
-        return 10 / (self.rate or (servo and servo.baud_rate) or _USUAL_RATE)
-
-    def _hearing(self, servos: Iterable[Servo], at: float) -> list[Servo]:
-        return [servo for servo in servos if servo.hears(self.rate, at)]
-
-    def _ids(self) -> dict[int, list[Servo]]:
-        if self._by_id is None:
-            self._by_id, self._by_second = {}, {}
-            for servo in self.servos:
-                self._by_id.setdefault(servo.id, []).append(servo)
-                second = servo.second_id
-                if second is not None and second != servo.id:
-                    self._by_second.setdefault(second, []).append(servo)
-        return self._by_id
-
-    def _forget_ids(self) -> None:
-        self._by_id = None
-
-
-def _checked(id: int) -> int:
-    if not 0 <= id <= MAX_ID:
-        raise RequestError(f"id {id} is not possible", expected=f"0 to {MAX_ID}")
-    return id
+        """Seconds of a byte on the wire."""
+        return BITS / (self.rate or (servo and servo.baud_rate) or USUAL_RATE)

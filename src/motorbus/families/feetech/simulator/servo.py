@@ -1,114 +1,121 @@
-"""One simulated servo: its memory, its shaft, and what an alarm or a power cut does to them.
-
-It knows nothing of packets; `bus.py` does. Each method that may change something takes the moment at which it
-happens. What was measured on a real one is said with its source; what nobody knows is a switch. What the registers
-ask for is worked out in `settings.py`. What is read of it stands in `feedback.py`, what a write or an order does to it
-in `effects.py`: both know the servo, which knows neither.
-"""
+"""One simulated servo: registers, shaft, supply and alarms. It knows no packets."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from math import inf, tau
+from typing import Final, Generic, TypeVar
 
 from motorbus.core import units
-from motorbus.core.plant import move, rest
+from motorbus.core.plant import Motion, move, rest
+from motorbus.core.simulated import PoweredDevice
 from motorbus.errors import RequestError
-from motorbus.families.feetech.simulator import motor, power
-from motorbus.families.feetech.simulator.body import Body
-from motorbus.families.feetech.simulator.memory import Layout
-from motorbus.families.feetech.simulator.model import Model
-from motorbus.families.feetech.simulator.protection import OVERLOAD
-from motorbus.families.feetech.simulator.settings import Asked, Registers
-from motorbus.families.feetech.simulator.switches import Switches
-from motorbus.families.feetech.table import Mode, alarms
+from motorbus.families.feetech.protocol import MAX_ID
+from motorbus.families.feetech.registers.codes import BAUD_CODES, alarms
+from motorbus.families.feetech.registers.rows import AMPERE
+from motorbus.families.feetech.simulator.memory import Memory
+from motorbus.families.feetech.simulator.models import Model
+from motorbus.families.feetech.simulator.motor import (
+    FEEBLE,
+    FULL_ACCELERATION,
+    TO_A_PLACE,
+    Course,
+    Order,
+    follow,
+    limp,
+)
+from motorbus.families.feetech.simulator.protection import HEAT, LATCHED, OVERLOAD, VOLTAGE, Overload
+from motorbus.families.feetech.simulator.quirks import Quirks
+from motorbus.families.feetech.traits import Mode
 
-_VOLTAGE = 0x01
-_HAND_SPEED = 1.0
-"""rad/s of a limp shaft that is pushed. # assumption"""
-_LONGEST_PUSH = 10 * tau
+AMBIENT: Final = 30.0  # °C of a servo, whatever it does # assumption
+LEAST_SMS_DELAY: Final = 50  # FEETECH page on SMS servos: smaller values of register 7 act as 50
+HAND_SPEED: Final = 1.0  # rad/s of a limp shaft that is pushed # assumption
+LONGEST_PUSH: Final = 10 * tau
+ACCELERATION_UNIT: Final = 100.0  # counts/s² (memory table V3.6; servolab measured 104 to 105)
+FARTHEST: Final = 7.5  # turns to a goal over many turns (memory table V3.6: 30719 counts)
+MIDDLE: Final = 128  # in torque_enable
+LOADED: Final = {
+    "torque_limit": "max_torque",  # STS3215 memory table V3.6; FD: SMBL and HLS as well
+    "goal_torque": "protection_current",  # HLS memory table, as the three below
+    "live_p": "position_p",
+    "live_d": "position_d",
+    "live_i": "position_i",
+}
+"""RAM row -> EEPROM row from which it is loaded at power-up."""
+REVERSES: Final = {"sts": 0x80, "smbl": 0x80, "hls": 0x80, "scs": 0x01, "scs2": 0x01}
+"""Map -> bit of `phase` that reverses position feedback, and the drive with it. # assumption"""
+_COUNTING: Final = {"operating_mode", "homing_offset", "phase", "angular_resolution"}
+_LIMITS: Final = {"min_position_limit", "max_position_limit"}
+T = TypeVar("T")
 
 
-class Servo(Body):
-    """A servo as a test pokes it.
+class Influence(Generic[T]):
+    """An attribute that a test may set at any time; the servo then starts a new course."""
 
-    `model`        what it is; `model.table` are its registers
-    `motion`       the movement of its shaft in counts, on the bus's clock; `motion.start` says since when
-    `memory`       its control table; `memory["goal_position"]` is a raw value, `memory.wear` counts EEPROM writes
-    `alarm`        alarm bits that a test raises; voltage and temperature raise theirs by themselves
-    `voltage`      its supply in V, and `temperature` in °C
-    `torque`       what the outside takes of its stall torque, -1 to 1
-    `plugged`      whether its cable is in; `lives` counts how often its supply came or went
-    `pending`      what REG WRITE left for ACTION
-    `zero`         the place of the encoder that reads 0; `facing` -1 when the encoder counts against the shaft;
-                   `fold` counts of the encoder make one of a position
-    `deaf_until`   it hears nothing before this moment
+    def __set_name__(self, owner: type[object], name: str) -> None:
+        self._name = f"_{name}"
+
+    def __get__(self, servo: Servo, owner: type[object]) -> T:
+        value: T = getattr(servo, self._name)
+        return value
+
+    def __set__(self, servo: Servo, value: T) -> None:
+        setattr(servo, self._name, value)
+        servo.move()
+
+
+class Servo(PoweredDevice):
+    """A simulated servo.
+
+    `memory`      its registers; `memory["goal_position"]` is a raw value
+    `motion`      of its shaft, in counts of the encoder without end
+    `zero`        the place of the encoder that reads 0
+    `voltage`     supply, V; outside min_voltage to max_voltage it is an alarm
+    `temperature` in °C; above max_temperature it is an alarm
+    `alarm`       more alarm bits, until a restart
+    `load`        share of the stall torque that the outside takes; positive pushes to smaller positions
+    `blocked`     places that the shaft cannot leave; None: it is free
+    `pending`     address and data of a REG WRITE
+    `lacks`       codes of instructions that it does not know
+    `jitter`      bits by which its replies may be late
+    `lives`       number of losses of supply and restarts; a reply of an earlier life is not sent
+    `deaf_until`  moment (s) before which it receives nothing
     """
 
-    __slots__ = (
-        *("lives", "pending", "zero", "facing", "fold", "deaf_until", "renamed"),
-        *("_registers", "_alarm"),
-    )
+    voltage = Influence[float]()
+    temperature = Influence[float]()
+    alarm = Influence[int]()
+    load = Influence[float]()
+    blocked = Influence[tuple[float, float] | None]()
 
-    def __init__(
-        self,
-        id: int,
-        model: Model,
-        layout: Layout,
-        switches: Switches,
-        now: Callable[[], float],
-        renamed: Callable[[], None],
-        position: int | None = None,
-    ) -> None:
-        super().__init__(model, layout, switches, now, model.turn // 2 if position is None else position)
-        self._registers = Registers(model, self.memory, switches)
-        self.lives = 0
+    def __init__(self, id: int, model: Model, quirks: Quirks, now: Callable[[], float]) -> None:
+        self.model = model
+        self.quirks = quirks
+        self.memory = Memory(model.layout, now, quirks.store_time, quirks.torn)
+        self.overload = Overload(self.memory)
         self.pending: tuple[int, bytes] | None = None
-        self.zero = 0
-        self.facing = 1
-        self.fold = 1
-        self.deaf_until = -inf
-        self.renamed = renamed
-        self._alarm = 0
-        # What the second id ships as is not known: at first it is the main id, so that it changes nothing.
-        for name in ("id", "second_id"):
+        self.lacks: set[int] = set()
+        self.lives = self.jitter = self.zero = self._alarm = 0
+        self._voltage, self._temperature = model.voltage, AMBIENT
+        self._load, self._blocked = 0.0, None
+        self._now = now
+        self._traits = model.traits
+        self._reversed = False
+        position = model.traits.turn // 2 if quirks.position < 0 else quirks.position
+        self.course = Course(rest(now(), position))
+        # The second id of an HLS is shipped as its first one. # assumption
+        for name, raw in {"id": id, "second_id": id, **model.stored}.items():
             if name in model.table:
-                self.memory[name] = id
-        for name, raw in model.set_to.items():
-            self.memory[name] = raw
+                self.memory[name] = raw
         self.memory.stored[:] = self.memory.live
-        self.power_up(now())
+        self.power_on()
         self.deaf_until = -inf
 
-    # What a test or a control socket does to it.
-
-    def unplug(self) -> None:
-        """Pull its cable, bus and supply in one. The shaft stays where it is; a reply on its way is lost, and so is
-        what was on its way to the EEPROM."""
-        self.plugged = False
-        self.lives += 1
-        self.memory.flash.cut()
-        self.move(self._now())
-
-    def plug(self) -> None:
-        """Put its cable back: it powers up. Does nothing when it is in."""
-        if not self.plugged:
-            self.plugged = True
-            self.power_up(self._now())
-
-    def power_cycle(self) -> None:
-        """Take its supply away and give it back: RAM and turn count are lost, the EEPROM is as it was stored."""
-        if self.plugged:
-            self.power_up(self._now())
-
-    def midway(self) -> float:
-        """When the EEPROM cell under work is half done; infinity while none is."""
-        flash = self.memory.flash
-        return flash.moment_of(flash.done + 0.5)
+    # -- for tests and the control socket ----------------------------------------------------------
 
     def status(self) -> dict[str, object]:
-        """How it is, as plain data."""
-        now = self._now()
+        """Its state as plain data; positions in raw counts."""
         return {
             "id": self.id,
             "model": self.model.name,
@@ -117,274 +124,381 @@ class Servo(Body):
             "raw_position": self.raw_position,
             "raw_goal_position": self.memory["goal_position"],
             "torque_enabled": self.memory["torque_enable"] == 1,
-            "moving": self.motion.moving(now),
+            "moving": self.motion.moving(self._now()),
             "locked": self.locked,
             "alarm": list(alarms(self.error, self.model.table.name)),
             "voltage": self.voltage,
             "temperature": self.temperature,
         }
 
-    @property
-    def alarm(self) -> int:
-        """Alarm bits that were raised by hand; they stay until they are cleared or the power is cut."""
-        return self._alarm
-
-    @alarm.setter
-    def alarm(self, bits: int) -> None:
-        self._alarm = bits
-        self.move(self._now())
+    def midway(self) -> float:
+        """The moment (s) at which the EEPROM cell in work is half stored; inf without one."""
+        return self.memory.midway()
 
     @property
     def raw_position(self) -> int:
-        """The present position in counts, as register 56 tells it."""
+        """Present position in raw counts; setting it turns the shaft by hand."""
         return self.position(self._now())
 
     @raw_position.setter
-    def raw_position(self, counts: int) -> None:
-        """Turn the shaft by hand, at rest afterwards."""
-        now = self._now()
-        turned = self._along * (counts - self.raw_position)
-        self.motion = rest(now, round(self.motion.position(now)) + turned)
-        self.stands(now)
+    def raw_position(self, raw: int) -> None:
+        place = round(self.motion.position(self._now())) + (raw - self.raw_position) * self._resolution
+        self._start(Course(rest(self._now(), place)))
 
     def block_shaft(self, between: tuple[float, float] | None = None) -> None:
-        """Block the shaft where it is, or between two positions (rad). Raises RequestError when it is outside them."""
+        """Block the shaft here, or between two positions (rad).
+
+        Raises RequestError when it is outside of them.
+        """
         here = round(self.motion.position(self._now()))
-        if between is None:
-            self.blocked = here, here
-            return
-        first, last = (here + self._counts(angle) - self._along * self.raw_position for angle in between)
-        low, high = min(first, last), max(first, last)
+        present = self.raw_position * self.model.angle
+        low, high = sorted(here + self._counts(angle - present) for angle in between or (present, present))
         if not low <= here <= high:
-            present = units.show(
-                self.raw_position * self.memory.layout.scales["present_position"], "position"
+            raise RequestError(
+                f"the shaft is at {units.show(present, 'position')}",
+                expected="a range that contains this position",
             )
-            raise RequestError(f"the shaft is at {present}", expected="a range that contains this position")
         self.blocked = low, high
 
     def push_shaft(self, angle: float) -> None:
-        """Turn the shaft by hand by an angle (rad): a limp one at 1 rad/s; one with torque at once, and it returns."""
-        if abs(angle) > _LONGEST_PUSH:
+        """Turn the shaft by hand by an angle (rad): a limp one at 1 rad/s, another one at once; it returns."""
+        if abs(angle) > LONGEST_PUSH:
             raise RequestError(f"{units.show(angle, 'position')} is too far", expected="at most 10 turns")
         now = self._now()
         here = self.motion.position(now)
         goal = here + self._counts(angle)
         if self.blocked is not None:
             goal = min(max(goal, self.blocked[0]), self.blocked[1])
-        if self.strong:
-            self.motion = rest(now, goal)
-            self.move(now)
+        if self.driven:
+            self.course = Course(rest(now, goal))
+            self.move()
         else:
-            speed = abs(self._counts(_HAND_SPEED))
-            self.go_freely(move(now, here, goal, speed=speed, acceleration=10 * speed), 0.0, now)
+            speed = abs(self._counts(HAND_SPEED))
+            self._start(Course(move(now, here, goal, speed=speed, acceleration=10 * speed)))
 
     def load_shaft(self, share: float) -> None:
-        """Let the outside take this share of the stall torque, -1 to 1; positive pushes towards smaller positions."""
+        """Load the shaft with this share of the stall torque, -1 to 1; positive: to smaller positions."""
         if not -1.0 <= share <= 1.0:
             raise RequestError(f"{share:.0%} is not possible", expected="-100% to 100%")
-        self.torque = self.facing * share
+        self.load = share
 
     def release_shaft(self) -> None:
-        """End what block, push and load do."""
-        self.torque, self.blocked = 0.0, None
+        """End block and load."""
+        self.load, self.blocked = 0.0, None
 
-    @property
-    def _along(self) -> int:
-        """Counts of the shaft for one count of a position, signed."""
-        return self.facing * self.fold
+    # -- supply ------------------------------------------------------------------------------------
 
-    def _counts(self, angle: float) -> float:
-        """An angle (rad) in counts of the shaft."""
-        return self._along * angle / self.memory.layout.scales["present_position"]
-
-    # What its supply does to it.
-
-    def power_up(self, at: float, *, cut: bool = True) -> None:
-        """Start anew at this moment: limp, at rest, within one turn, and nothing pending (users of STS servos).
-
-        With `cut` the supply was away, and what was on its way to the EEPROM is lost.
-        """
-        switches = self.switches
+    def power_off(self) -> None:
+        """The supply goes: what is not stored is lost, the shaft stays."""
         self.lives += 1
-        self.pending = None
-        self._alarm = 0
-        self.protection.forget()
-        power.begin(self.memory, switches, cut=cut)
-        self.forget_turns(at)
-        if switches.goal_at_power_up == "present" or switches.torque_at_power_up:
-            self.memory["goal_position"] = self.position(at)
-        self.deaf_until = at + switches.startup_time if switches.startup_time else -inf
-        self.renamed()
-        self.move(at)
+        self.memory.power_off()
+        self._start(limp(self.motion, self._now()))
 
-    def brown_out(self, at: float) -> None:
-        """The supply was too low for a moment, and the torque is off whatever it is after a real power-up.
+    def power_on(self) -> None:
+        """The supply comes. An impossible id or baud rate is replaced by the shipped one. # assumption"""
+        self.restart()
+        for name, possible in (("id", range(MAX_ID + 1)), ("baud_rate", BAUD_CODES)):
+            if self.memory[name] not in possible:
+                address = self.model.table[name].address
+                self.memory.live[address] = self.model.layout.shipped[address]
+        self.deaf_until = self._now() + self.quirks.startup_time if self.quirks.startup_time else -inf
 
-        A servo that held its load again at once would fall again at once, and for ever; what real ones do is not known.
-        """
-        self.power_up(at)
-        if self.memory["torque_enable"]:
-            self.memory["torque_enable"] = 0
-            self.move(at)
+    def restart(self) -> None:
+        """Start the firmware: limp, within one turn, nothing pending, no alarm (users of STS servos)."""
+        now, memory, quirks = self._now(), self.memory, self.quirks
+        self.lives += 1
+        self.pending, self._alarm = None, 0
+        self.overload.clear()
+        memory.restart()
+        for row, source in LOADED.items():
+            if row in self.model.table:
+                memory[row] = memory[source]
+        memory["lock"] = quirks.lock_at_power_up
+        memory["torque_enable"] = quirks.torque_at_power_up
+        self.forget_turns()
+        if quirks.goal_at_power_up == "present" or quirks.torque_at_power_up:
+            memory["goal_position"] = self.position(now)
+        self.move()
 
-    # What the bus asks.
+    # -- settings ----------------------------------------------------------------------------------
 
     @property
     def id(self) -> int:
-        """The id it answers to."""
         return self.memory["id"]
 
-    @property
-    def second_id(self) -> int | None:
-        """The id by which it takes writes as well; None when its map has none."""
-        return self.memory["second_id"] if "second_id" in self.model.table else None
+    def obeys(self, id: int) -> bool:
+        """Whether it carries out writes to this id; an HLS has a second one (HLS memory table)."""
+        names = [name for name in ("id", "second_id") if name in self.model.table]
+        return any(self.memory[name] == id for name in names)
 
     @property
     def baud_rate(self) -> int | None:
-        """The rate it is set to, in bit/s; None for a code that means nothing: it hears nobody."""
-        return self._registers.asked.rate
+        """Bit/s; None for an unknown code: it receives nothing."""
+        # The codes 8 to 11 are rates in all maps. # assumption
+        return BAUD_CODES.get(self.memory["baud_rate"])
 
     @property
-    def return_delay(self) -> float:
-        """Seconds between the end of a request and the beginning of the reply."""
-        return self._registers.asked.delay
+    def reply_delay(self) -> float:
+        """Seconds from request to reply: register 7 in 2 µs (memory table V3.6; HLS has no such row)."""
+        steps = self.memory["return_delay"] if "return_delay" in self.model.table else 0
+        least = LEAST_SMS_DELAY if self.model.table.name in ("smbl", "smcl") else 0
+        return max(steps, least) * 2e-6
 
     @property
     def locked(self) -> bool:
-        """Whether writes to the EEPROM area are lost at power-off."""
-        return self._registers.asked.locked
-
-    @property
-    def told_voltage(self) -> int:
-        """What register 62 says of its supply, in 0.1 V."""
-        return round(self.voltage * 10) if self._sag else self._told_voltage
-
-    @property
-    def error(self) -> int:
-        """The error byte of its status packets, which register 65 repeats: alarms and nothing else."""
-        return self._error(self._registers.asked)
-
-    def _error(self, asked: Asked) -> int:
-        least, most = asked.volts
-        bits = self._alarm | self.protection.error
-        told = self.told_voltage if self._sag else self._told_voltage
-        return bits if least <= told <= most else bits | _VOLTAGE
-
-    def speaks(self) -> tuple[int, int, float]:
-        """What belongs to each of its packets: its id, its error byte, and the return delay before it (s)."""
-        asked = self._registers.asked
-        memory = self.memory
-        return memory.live[memory.layout.id], self._error(asked), asked.delay
-
-    def hears(self, rate: int | None, at: float) -> bool:
-        """Whether it is there, awake and set to this rate (None: whichever it is)."""
-        if not self.plugged or at < self.deaf_until or (self._sag and not self.fed(at)):
-            return False
-        return rate is None or rate == self._registers.asked.rate
-
-    # What it does.
-
-    @property
-    def asked(self) -> Asked:
-        """What its registers ask for."""
-        return self._registers.asked
+        """Writes to the EEPROM are lost at power-off."""
+        return self.memory["lock"] != 0
 
     @property
     def mode(self) -> Mode | None:
-        """What it heeds; None when the number in its mode register is not explained by anybody."""
-        return self.asked.mode
+        """None for a code that no source explains."""
+        code = self.memory["operating_mode"] if self._traits.modes else None
+        return self._traits.mode_of(code, self._limits)
+
+    @property
+    def _limits(self) -> tuple[int, int]:
+        return self.memory["min_position_limit"], self.memory["max_position_limit"]
+
+    @property
+    def _resolution(self) -> int:
+        """Encoder counts for one count of a position (memory table V3.6)."""
+        # It multiplies in single-turn mode too. # assumption
+        if "angular_resolution" not in self.model.table:
+            return 1
+        return self.memory["angular_resolution"] or 1
+
+    @property
+    def error(self) -> int:
+        """The error byte of its status packets: alarms only."""
+        memory = self.memory
+        bits = self._alarm | (OVERLOAD if self.overload.tripped else 0)
+        if not memory["min_voltage"] <= round(self._voltage * 10) <= memory["max_voltage"]:
+            bits |= VOLTAGE
+        return bits | (HEAT if self._temperature > memory["max_temperature"] else 0)
 
     @property
     def available(self) -> float:
-        """The share of the stall torque that the motor may give just now, 0 to 1; 0: it is limp.
+        """Share of the stall torque that the motor may use, 0 to 1; 0: limp.
 
-        Supply, torque on, no alarm that unloads it, torque limit and current cap: this is the one place for them.
+        An HLS with goal_torque 0 is limp in position and velocity mode (seen on hardware).
         """
-        return self._available(self._registers.asked)
-
-    def _available(self, asked: Asked) -> float:
-        """The same, by what the registers allow."""
-        if not self.plugged or not asked.on:
+        memory, traits = self.memory, self._traits
+        if not self.plugged or memory["torque_enable"] != 1:
             return 0.0
-        unloading, limit = self._error(asked), asked.limit
-        if not unloading:
-            return limit if limit < 1.0 else 1.0
-        if self.tripped and not self._alarm & OVERLOAD:
-            unloading &= ~OVERLOAD  # it leaves a part of the torque
-        return 0.0 if unloading & self.memory["unload_mask"] else min(limit, self.protection.left)
+        share = memory[traits.limit or "max_torque"] / 1000
+        if traits.current and self.mode in (Mode.POSITION, Mode.VELOCITY):
+            share = min(share, abs(self._current))
+        releasing = self.error & memory["unload_mask"]
+        if releasing & OVERLOAD and not self._alarm & OVERLOAD:
+            share = min(share, self.overload.torque)
+            releasing &= ~OVERLOAD
+        return 0.0 if releasing else min(share, 1.0)
 
     @property
-    def strong(self) -> bool:
-        """Whether the motor pushes at all."""
-        return self.available >= motor.FEEBLE
+    def driven(self) -> bool:
+        """Whether the motor has torque."""
+        return self.available >= FEEBLE
 
     @property
-    def burden(self) -> float:
-        """What the outside takes of the stall torque just now: nothing of a limp servo."""
-        if not self._world.torque:
-            return 0.0
-        available = self.available
-        return max(-available, min(available, self.torque)) if available >= motor.FEEBLE else 0.0
+    def _current(self) -> float:
+        """Goal or limit of the current, a share of that at stall."""
+        return self.memory[self._traits.current] * AMPERE / self.model.drive.stall_current
 
-    def encoder(self, at: float) -> float:
-        """Where the encoder is, in counts without end."""
-        return self.facing * self.motion.position(at)
+    def receives(self, rate: int | None, at: float) -> bool:
+        """Whether it receives a packet of this rate (None: any)."""
+        return self.plugged and at >= self.deaf_until and rate in (None, self.baud_rate)
+
+    # -- motion ------------------------------------------------------------------------------------
+
+    @property
+    def motion(self) -> Motion:
+        return self.course.motion
+
+    def trip(self) -> None:
+        """The overload protection trips; `overload.next` is the moment."""
+        self.overload.tripped = True
+        self.move()
 
     def position(self, at: float) -> int:
-        """The present position in counts, as it says it."""
-        settings = self._registers.asked.settings
-        encoder = self.facing * self.motion.position(at)
-        return motor.reading(encoder, self.zero, settings.told, settings.turn, self.fold)
+        """The present position in counts, as its register has it: within one turn without phase bit 4."""
+        counts = round((round(self.motion.position(at)) - self.zero) / self._resolution)
+        return counts if self._traits.tells_turns(self.memory["phase"]) else counts % self._traits.turn
 
-    def arrived(self, at: float) -> bool:
-        """Whether it is where its goal is, within the dead band of its position."""
-        band = max(self.memory["dead_band_cw"], self.memory["dead_band_ccw"])
-        return abs(self.position(at) - self.memory["goal_position"]) <= band
+    def move(self, *, step: bool = False) -> None:
+        """Start the course that registers and world ask for now; `step`: the one that a step orders."""
+        now = self._now()
+        self._start(follow(self._order(now, step), self.motion, now, self.model.drive))
 
-    def move(self, at: float) -> None:
-        """Think again about where to go."""
-        self._go(motor.plan, at)
+    def _start(self, course: Course) -> None:
+        self.course = course
+        self.overload.watch(course, self._now())
 
-    def step(self, at: float) -> None:
-        """Take the step that a write of the goal orders in step mode."""
-        self._go(motor.step, at)
-
-    def _go(self, planned: motor.Planner, at: float) -> None:
-        self.protection.weigh(at)
-        wanted, motion = self._wanted(self._registers.asked), self.motion
-        if self.facing > 0 and wanted.torque >= 1 and self.free:  # most are like that
-            self.go_freely(planned(wanted, motion, at, self.model.drive, self.switches), wanted.torque, at)
-        elif self.facing > 0:
-            self.bear(lambda drive: planned(wanted, motion, at, drive, self.switches), wanted, at)
-        else:
-            before, turned = (
-                motor.mirrored(motion),
-                wanted._replace(duty=-wanted.duty, current=-wanted.current),
-            )
-            self.bear(
-                lambda drive: motor.mirrored(planned(wanted, before, at, drive, self.switches)), turned, at
-            )
-
-    def _wanted(self, asked: Asked) -> motor.Settings:
-        goal = self.memory["goal_position"]
-        return motor.settings(
-            asked.settings, self._available(asked), self.facing * self.burden, goal, self.zero
+    def _order(self, now: float, step: bool) -> Order:
+        memory, traits, table = self.memory, self._traits, self.model.table
+        mode, phase = self.mode, memory["phase"]
+        unit = table["goal_velocity"].scale / table["goal_position"].scale
+        velocity = memory["goal_velocity"] * round(unit) * traits.velocity_scale(phase)
+        acceleration = memory[traits.acceleration] * ACCELERATION_UNIT if traits.acceleration else 0.0
+        goal = 0.0
+        match mode:
+            case Mode.POSITION:
+                goal = self._place(now)
+            case Mode.STEP:  # a step counts from the last goal, where it is on its way # assumption
+                goal = self._last_goal(now)
+                if step:
+                    goal = round(goal) + memory["goal_position"] * self._resolution
+            case Mode.VELOCITY:
+                goal = velocity
+            case Mode.CURRENT:
+                goal = self._current
+            case Mode.PWM if traits.duty:  # of HLS the row is not published: nothing moves # assumption
+                goal = max(-1.0, min(1.0, memory.decode(traits.duty_row(table)) / 1000))
+                # STS: to smaller angles (servolab, measured); other maps: to larger ones. # assumption
+                goal *= -1 if table.name == "sts" else 1
+        return Order(
+            mode=mode,
+            goal=goal,
+            speed=abs(velocity) or (inf if traits.zero_is_maximum(phase) else 0.0),
+            # Only SCS use it; of STS3215 "some firmware" (memory table V3.6), here none. # assumption
+            time=0.0 if traits.modes else memory[traits.time] / 1000,
+            acceleration=acceleration or FULL_ACCELERATION,
+            torque=self.available,
+            load=self._load,
+            blocked=self._blocked,
         )
 
-    def face(self, at: float) -> None:
-        """Count in the direction and the steps that the registers say; when they change, the turn count begins anew."""
-        if (self.facing, self.fold) != (self.asked.facing, self.asked.fold):
-            self.count_anew(at)
+    def _place(self, now: float) -> float:
+        """The place of goal_position; within one turn the way does not cross the seam (STS_servos#7)."""
+        # A goal beyond the limits is clamped. # assumption
+        goal, (low, high) = self.memory["goal_position"], self._limits
+        if low == high == 0 and self._traits.many_turns:
+            farthest = int(FARTHEST * self._traits.turn) - 1
+            return self.zero + max(-farthest, min(goal, farthest)) * self._resolution
+        goal = max(low, min(goal, high))
+        return round(self.motion.position(now)) + (goal - self.position(now)) * self._resolution
 
-    def forget_turns(self, at: float) -> None:
+    def _last_goal(self, now: float) -> float:
+        """The goal of the present movement; where it is if it has none."""
+        motion = self.motion
+        return motion.goal if motion.moving(now) and not motion.cruise else motion.position(now)
+
+    def _counts(self, angle: float) -> float:
+        """An angle (rad) in counts of the encoder."""
+        return angle / self.model.angle * self._resolution
+
+    def forget_turns(self) -> None:
         """Stand still, within the first turn."""
-        self.facing, self.fold = self.asked.facing, self.asked.fold
-        self.motion = rest(at, self.facing * (self.encoder(at) % self.model.turn))
-        self.count_anew(at)
+        now = self._now()
+        self.course = Course(rest(now, self.motion.position(now) % self._traits.turn))
+        self.set_zero()
 
-    def count_anew(self, at: float) -> None:
-        """Put zero where the homing offset says, in position mode only (feetech-cli, servolab, on STS3215)."""
-        self.facing, self.fold = self.asked.facing, self.asked.fold
-        applied = "homing_offset" in self.model.table and self.mode is Mode.POSITION
-        offset = self.memory["homing_offset"] if applied else 0
-        self.zero = motor.zero_for(self.encoder(at), offset * self.fold, self.model.turn)
+    def set_zero(self) -> None:
+        """Apply the homing offset, in position mode only (feetech-cli, servolab, on STS3215)."""
+        now, memory, turn = self._now(), self.memory, self._traits.turn
+        reverses = REVERSES.get(self.model.table.name, 0)
+        if self._reversed is not bool(memory["phase"] & reverses):
+            self._reversed = not self._reversed
+            self.course = Course(rest(now, -self.motion.position(now)))
+        applies = "homing_offset" in self.model.table and self.mode is Mode.POSITION
+        offset = memory["homing_offset"] * self._resolution if applies else 0
+        counts = round(self.motion.position(now))
+        self.zero = counts - (counts - offset) % turn
+
+    # -- requests ----------------------------------------------------------------------------------
+
+    def read(self, address: int, count: int) -> bytes:
+        """The bytes of a READ."""
+        for row in self.memory.layout.touched(address, count):
+            if row.name in FEEDBACK:
+                self.memory[row.name] = FEEDBACK[row.name](self, self._now())
+        return self.memory.read(address, count)
+
+    def write(self, address: int, data: bytes) -> None:
+        """Obey a WRITE."""
+        memory, traits, quirks = self.memory, self._traits, self.quirks
+        torque = memory["torque_enable"]
+        strict = quirks.out_of_range == "drop"
+        names = memory.write(address, data, locked=self.locked, strict=strict)
+        switched = "torque_enable" in names
+        if switched and memory["torque_enable"] == MIDDLE and traits.modes and traits.calibrates == "offset":
+            memory["torque_enable"] = torque  # 128 is a command and does not stay # assumption
+            self.calibrate(traits.turn // 2)
+            return
+        if switched and not memory["torque_enable"] and quirks.overload_clears == "torque_off":
+            self.overload.clear()
+            self._alarm &= ~LATCHED
+        if names & _COUNTING or (not traits.modes and names & _LIMITS):
+            self.set_zero()
+        ordered = "goal_position" in names
+        if ordered and traits.goal_switches_on and self.mode in TO_A_PLACE:
+            memory["torque_enable"] = 1
+        if names - {"lock"}:
+            self.move(step=ordered)
+
+    def calibrate(self, counts: int) -> None:
+        """Give the present pose this position by the homing offset, cut to the range of its row; then hold.
+
+        At one pose an STS is one count beside (lerobot#3370).
+        """
+        memory, turn, row = self.memory, self._traits.turn, self.model.table["homing_offset"]
+        difference = round(self.motion.position(self._now())) - counts * self._resolution
+        offset = round(((difference + turn // 2) % turn - turn // 2) / self._resolution)
+        memory["homing_offset"] = max(row.low, min(row.high, offset))
+        if not self.locked:  # the offset of a calibration is stored only with the lock open # assumption
+            memory.store_row("homing_offset")
+        self.set_zero()
+        self._hold()
+
+    def clear_turns(self) -> None:
+        """Count the position within one turn again (FTServo_Python, hls/reset.py); then hold."""
+        self.forget_turns()
+        self._hold()
+
+    def _hold(self) -> None:
+        self.memory["goal_position"] = self.raw_position
+        self.move()
+
+
+def _velocity(servo: Servo, at: float) -> int:
+    table = servo.model.table
+    unit = servo.model.traits.velocity_scale(servo.memory["phase"])
+    return round(
+        servo.motion.velocity(at) / unit * table["present_position"].scale / table["present_velocity"].scale
+    )
+
+
+def _load(servo: Servo, at: float) -> int:
+    """The duty of the motor, in 0.1 %."""
+    if not servo.driven:
+        return 0
+    return round(1000 * servo.model.drive.duty(servo.motion.velocity(at), servo.course.torque(at)))
+
+
+def _current(servo: Servo, at: float) -> int:
+    if not (servo.driven and servo.model.traits.tells_current(servo.memory["phase"])):
+        return 0
+    return round(servo.model.drive.current(servo.motion.velocity(at), servo.course.torque(at)) / AMPERE)
+
+
+def _moving(servo: Servo, at: float) -> int:
+    """Bit 0: it moves; bit 1 (HLS memory table): the goal is not reached."""
+    memory, moving = servo.memory, int(servo.motion.moving(at))
+    if 1 in servo.model.table["moving"].bits:
+        band = max(memory["dead_band_cw"], memory["dead_band_ccw"])
+        moving |= 2 * (abs(servo.position(at) - memory["goal_position"]) > band)
+    return moving
+
+
+FEEDBACK: Final[dict[str, Callable[[Servo, float], int]]] = {
+    "present_position": Servo.position,
+    "present_velocity": _velocity,
+    "present_load": _load,
+    "present_voltage": lambda servo, at: round(servo.voltage * 10),
+    "present_temperature": lambda servo, at: round(servo.temperature),
+    "reg_write_pending": lambda servo, at: int(servo.pending is not None),
+    "hardware_error": lambda servo, at: servo.error,
+    "moving": _moving,
+    "goal_position_echo": lambda servo, at: servo.memory["goal_position"],
+    "present_current": _current,
+}
+"""Row -> raw value at this moment (s)."""

@@ -1,45 +1,58 @@
-"""The one controller of a line, as far as a host can know it: which motor it has, and how its projects are told.
-
-There is no address in its frames, so there is one of them on a line, and it is called 1. The motor's number, which
-does stand in its frames, is another thing: the manual has 3 in all of them.
-"""
+"""The controller of a line, and what its driver remembers. It reports neither state nor position."""
 
 from __future__ import annotations
 
 from typing import Final
 
-from motorbus.core import units
-from motorbus.core.register import Register, RegisterMap, Value
-from motorbus.core.request import Request
+from motorbus.core.register import Register, RegisterMap, Value, shown
 from motorbus.errors import RequestError
-from motorbus.families.stepper import wire
-from motorbus.families.stepper.driver.memory import Memory
-from motorbus.families.stepper.table import TABLE, Order, checked_order
+from motorbus.families.stepper.parameters import LEDS, OUTPUTS, TABLE, Order, Project, checked_order
+from motorbus.families.stepper.protocol import MOTOR, ONLY, checked_motor
+
+
+class BusState:
+    """What was read from and sent to the controller of one open bus. Other hosts, buttons and power cycles change it.
+
+    `projects`        as they were read last; forgotten at an own write, a missing reply and a reconnect
+    `unsaved`         the project that was edited last and not saved; None: none
+    `stops_asked`     number of calls of `stop`
+    `stops_accepted`  number of stops that the controller acknowledged
+    `stopping`        number of stops that are being sent
+    `may_run`         a project was started; since then neither its notice came nor a stop was acknowledged
+    `outputs`         the level last sent, by output 1 to 3 and 5 for the LEDs; None: unknown
+    """
+
+    def __init__(self) -> None:
+        self.projects: dict[int, Project] = {}
+        self.unsaved: Project | None = None
+        self.stops_asked = 0
+        self.stops_accepted = 0
+        self.stopping = 0
+        self.may_run = False
+        self.outputs: dict[int, bool | None] = dict.fromkeys((*range(1, OUTPUTS + 1), LEDS))
 
 
 class Node:
-    """The controller of a line. Raises RequestError for another id.
+    """The one controller of a line, id 1; its frames carry no address. Raises RequestError for another id.
 
-    `motor` is the number that motor commands name, `order` says which byte of a number comes first in its dumps,
-    `memory` is what was said to it on this bus, `kept` are the exchanges that read its inputs, by port.
+    `motor` is the number in motor commands, `order` the byte order in dumps, `state` that of the open bus.
     """
 
     def __init__(
         self,
-        node: int = wire.ONLY,
-        motor: int = wire.MOTOR,
+        node: int = ONLY,
+        motor: int = MOTOR,
         order: Order = "little",
-        memory: Memory | None = None,
+        state: BusState | None = None,
     ) -> None:
         self.node: Final = checked_id(node)
         self.motor: Final = checked_motor(motor)
         self.order: Final[Order] = checked_order(order)
-        self.memory: Final = memory if memory is not None else Memory()
-        self.kept: Final[dict[int, Request[bool]]] = {}
+        self.state: Final = BusState() if state is None else state
 
     @property
     def alarm(self) -> tuple[str, ...]:
-        """Always empty: the protocol has no word for an error."""
+        """Always empty: the protocol reports no errors."""
         return ()
 
     @property
@@ -47,36 +60,17 @@ class Node:
         """The parameters of one project."""
         return TABLE
 
-    def value(self, row: Register, raw: int) -> Value:
-        """Raw value of a parameter -> value in the row's unit."""
-        return row.to_value(raw)
-
     def raw(self, row: Register, value: Value) -> int:
-        """Value in the row's unit -> raw value. Raises RequestError when it is not a finite number."""
+        """Value in the unit of the row -> raw value. Raises RequestError if it is not a finite number."""
         return row.to_raw(value)
 
 
 def checked_id(node: int) -> int:
-    """The id of the only controller. Raises RequestError for every other one."""
-    if isinstance(node, int) and not isinstance(node, bool) and node == wire.ONLY:
+    """The id of the only controller. Raises RequestError for another one."""
+    if isinstance(node, int) and not isinstance(node, bool) and node == ONLY:
         return node
     raise RequestError(
-        f"{node!r} is not the id of a stepper controller",
-        expected=f"{wire.ONLY}: there is one of them on a line",
-        cause="its frames carry no address",
-        advice="open a line for each of them; nothing was sent",
+        f"{shown(node)} is not the id of a stepper controller",
+        expected=f"{ONLY}: a line has one controller, whose frames carry no address",
+        advice="open a line for each controller",
     )
-
-
-def checked_motor(number: object) -> int:
-    """The number of a motor, also as text. Raises RequestError for one that no frame can name."""
-    try:
-        found = units.whole(str(number))
-    except ValueError:
-        found = 0
-    if found not in wire.MOTORS:
-        raise RequestError(
-            f"motor={number} is not the number of a motor",
-            expected="1 to 255, not ending in E in hex; the manual knows 3 only",
-        )
-    return found

@@ -1,141 +1,321 @@
-"""How a controller gets from one moment to the next: a pure function of what it is, what is asked of it, and when.
+"""A controller that carries out projects and manual motions, over time and with its inputs and outputs.
 
-Every function takes a `State` and a moment and gives the next `State` with what happened. First all that ends by
-itself until then takes place, in order and at its own moments, so nothing depends on how often somebody looks. A moment
-before the present phase began counts as its beginning.
+Time is an argument. What ends by itself ends at its own moment, so nothing depends on how often `advance` is called.
+Source of each transition: stepper controller serial protocol manual; `# assumption` marks what it does not say.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from functools import partial
+from math import inf
+from typing import Final, NamedTuple
 
-from motorbus.families.stepper.execution import order
-from motorbus.families.stepper.execution.behaviour import USUAL, Behaviour
-from motorbus.families.stepper.execution.state import After, Phase, State
-from motorbus.families.stepper.execution.turn import Next, Turn
-from motorbus.families.stepper.table import HOME_INPUT, Project, after_port
+from motorbus.families.stepper import parameters
+from motorbus.families.stepper.execution import ramp, sequence
+from motorbus.families.stepper.execution.ramp import Motion
+from motorbus.families.stepper.execution.sequence import Place
+from motorbus.families.stepper.parameters import HOME_INPUT, START_INPUT, STOP_INPUT, Project, Step
 
-
-def due(state: State) -> float:
-    """The next moment (s) at which something happens by itself; infinity when nothing does."""
-    return state.until
-
-
-def advance(state: State, to: float) -> Next:
-    """Let time pass until this moment."""
-    return Turn(state, to).result()
+FIRST: Final = Place(1)
+EMPTY_PASS: Final = 0.001  # s of a pass of an endless project in which nothing takes time # assumption
 
 
-def start(state: State, project: Project, at: float, *, asked: bool = True) -> Next:
-    """Start a project; `asked` by a command (else by input 3). What runs already is heeded as `busy` says."""
-    turn = Turn(state, at)
-    if turn.may_start():
-        turn.start(project, asked)
-    return turn.result()
+class Phase(Enum):
+    """The present activity; the first three belong to a step of a project."""
+
+    WAIT = "waiting for an input"
+    MOVE = "moving"
+    PAUSE = "pausing"
+    IDLE = "idle"
+    JOG = "jogging"
+    ONCE = "making one move"
+    HOMING = "homing"
+    SLOWING = "slowing down"
+    OFF = "off"
 
 
-def stop_project(state: State, at: float) -> Next:
-    """Stop the project, by command or by input 4."""
-    turn = Turn(state, at)
-    turn.stop_project()
-    return turn.result()
+class Happening(NamedTuple):
+    """An event: its moment (s), and the step of the project (0: none).
+
+    `kind` is "waits", "begins" (a step, with its outputs), "moved", "ended" (a project, by itself), "completed" (the
+    notice), "stopped" (a project), "homed", or "rests" (the end of a manual motion).
+    """
+
+    at: float
+    kind: str
+    step: int = 0
 
 
-def stop_motor(state: State, at: float) -> Next:
-    """Stop the motor, whatever makes it turn."""
-    turn = Turn(state, at)
-    turn.stop_motor()
-    return turn.result()
+@dataclass(slots=True)
+class Run:
+    """A project that runs: its place, the pass (from 1) and when that began, and whether a command started it."""
+
+    project: Project
+    by_command: bool
+    began: float
+    place: Place = FIRST
+    round: int = 1
+
+    @property
+    def step(self) -> Step:
+        return self.project.step(self.place.step)
 
 
-def jog(state: State, project: Project, sign: int, at: float) -> Next:
-    """Turn until stopped, forward (1) or in reverse (-1), with the speed of step 1 of this project."""
-    turn = Turn(state, at)
-    now = turn.state
-    if now.phase is Phase.JOG and now.motion is not None:
-        turn.accepted = now.motion.sign != sign and now.how.jog_reverse_while_jogging == "reverse"
-        if turn.accepted:
-            turn.halt(After.REVERSE)
-    elif turn.may_start():
-        turn.by_hand(Phase.JOG, project, None, sign)
-    return turn.result()
+class Machine:
+    """The state of a controller.
 
+    `outputs` has three bits, bit 0 is output 1; `inputs` are the active ones, 1 to 5; `motion` is the move since
+    `since`, from the position `base`. `events` collects all `Happening`s; the caller empties it.
+    """
 
-def run_once(state: State, project: Project, at: float) -> Next:
-    """Make the move of step 1 of this project once; neither its inputs nor its output nor its delay are heeded."""
-    turn = Turn(state, at)
-    if turn.may_start():
+    def __init__(self, *, tick_ms: float = ramp.TICK_MS) -> None:
+        self.tick_ms = tick_ms
+        self.phase = Phase.IDLE
+        self.since = 0.0
+        self.until = inf  # end of the phase
+        self.motion: Motion | None = None
+        self.base = 0
+        self.run: Run | None = None
+        self.outputs = 0
+        self.leds = False
+        self.inputs: frozenset[int] = frozenset()
+        self.stop_mode = 0
+        self.is_homed = False
+        self.events: list[Happening] = []
+        self._now = 0.0
+        self._then: Callable[[], None] = self._end_manual  # after a slow stop
+
+    @property
+    def is_busy(self) -> bool:
+        return self.phase not in (Phase.IDLE, Phase.OFF)
+
+    def position(self, at: float) -> int:
+        """In pulses."""
+        if self.motion is None:
+            return self.base
+        is_over = self.motion.pulses is not None and at >= self.until
+        done = self.motion.pulses if is_over else self.motion.done(at - self.since)
+        return self.base + self.motion.sign * (done or 0)
+
+    def frequency(self, at: float) -> float:
+        """In pulses per second, negative in reverse."""
+        if self.motion is None or at >= self.until:
+            return 0.0
+        return self.motion.sign * self.motion.frequency(at - self.since)
+
+    def advance(self, to: float) -> None:
+        """Let time pass until this moment."""
+        while self.until <= to:
+            self._now = self.until
+            self._end_phase()
+        self._now = max(self._now, to)
+
+    # -- commands --------------------------------------------------------------------------------------------------
+
+    def power_on(self, at: float, *, home_with: Project | None = None) -> None:
+        """Power on at rest, with all outputs off; with `home_with` home with the speed of its step 1."""
+        self._now = at
+        self._rest()
+        self.stop_mode = home_with.stop_mode if home_with else 0
+        if home_with:
+            self.home(home_with, at)
+
+    def power_off(self, at: float) -> None:
+        """Without supply; the motor stays in its place."""
+        self.advance(at)
+        self._rest(Phase.OFF)
+        self.run = None
+        self.outputs, self.leds, self.is_homed = 0, False, False
+
+    def start(self, project: Project, at: float, *, by_command: bool = True) -> bool:
+        """Start a project. False if it is busy."""
+        return self._begin(at, partial(self._start, project, by_command))
+
+    def jog(self, project: Project, sign: int, at: float) -> bool:
+        """Turn until stopped with the speed of step 1 of this project; False if it is busy."""
+        turn = partial(self._move_by_hand, Phase.JOG, project, None, sign)
+        if self._begin(at, turn):
+            return True
+        if self.phase is not Phase.JOG or self.motion is None or self.motion.sign == sign:
+            return False
+        self._stop(turn)  # the opposite jog command stops and reverses # assumption
+        self.advance(at)
+        return True
+
+    def run_once(self, project: Project, at: float) -> bool:
+        """Make the move of step 1 of this project, without its inputs, output and pause; False if it is busy."""
         step = project.step(1)
-        count: int | None = order.pulses(project, step, turn.state.how)[0]
-        if not step.distance and turn.state.how.zero_distance == "endless":
-            count = None
-        turn.by_hand(Phase.ONCE, project, count, step.sign)
-    return turn.result()
+        pulses = ramp.pulses_of(project, step)
+        return self._begin(at, partial(self._move_by_hand, Phase.ONCE, project, pulses, step.sign))
 
+    def home(self, project: Project, at: float) -> bool:
+        """Turn in reverse with the speed of step 1 of this project until input 5; False if it is busy.
 
-def home(state: State, project: Project, at: float) -> Next:
-    """Turn in reverse with the speed of step 1 of this project until input 5 is active.
+        It ends at once, without a motion, if the input is active.
+        """
+        turn = partial(self._move_by_hand, Phase.HOMING, project, None, -1)
+        return self._begin(at, self._end_manual if HOME_INPUT in self.inputs else turn)
 
-    If it is already, homing is over at once: nothing turns, and what is counted stays as it is.
-    """
-    turn = Turn(state, at)
-    if turn.may_start():
-        if HOME_INPUT in turn.state.inputs:
-            turn.homed_already()
+    def stop_project(self, at: float) -> None:
+        """Stop the project."""
+        self.advance(at)
+        if self.run is not None:  # stop project leaves a manual motion alone # assumption
+            self._stop(partial(self._finish, "stopped"))
+            self.advance(at)
+
+    def stop_motor(self, at: float) -> None:
+        """Stop the motor."""
+        self.stop_project(at)  # stop motor ends the project too # assumption
+        if self.is_busy and self.run is None:
+            self._stop(self._end_manual)
+            self.advance(at)
+
+    def set_output(self, port: int, level: int, at: float) -> None:
+        """Switch outputs (1 to 3, 4 for all) or the LEDs (5), at any time."""
+        self.advance(at)
+        if port == parameters.LEDS:
+            self.leds = bool(level)
+        self.outputs = parameters.outputs_after_port(self.outputs, port, level)
+
+    def set_input(self, port: int, active: bool, at: float, *, start: Project | None = None) -> None:
+        """Set an input, 1 to 5; `start` is the project that input 3 starts."""
+        self.advance(at)
+        rises = active and port not in self.inputs
+        self.inputs = self.inputs | {port} if active else self.inputs - {port}
+        if not rises:
+            return
+        if port == HOME_INPUT and self.phase is Phase.HOMING:
+            self._rest()  # homing ends at once in every stop mode # assumption
+            self.base, self.is_homed = 0, True
+            self._happen("homed")
+            self._end_manual()
+        elif self.run and self.phase is Phase.WAIT and self.run.step.start_input == port:
+            self._begin_motion()
+        elif self.run and self.phase is Phase.MOVE and self.run.step.stop_input == port:
+            self._end_motion()
+        if port == STOP_INPUT:
+            self.stop_project(at)
+        elif port == START_INPUT and start:
+            self.start(start, at, by_command=False)
+        self.advance(at)
+
+    # -- motion ----------------------------------------------------------------------------------------------------
+
+    def _go(self, phase: Phase, motion: Motion) -> None:
+        self.base = self.position(self._now)
+        self.phase, self.motion, self.since = phase, motion, self._now
+        self.until = self._now + motion.duration
+
+    def _rest(self, phase: Phase = Phase.IDLE, until: float = inf) -> None:
+        self.base = self.position(self._now)
+        self.phase, self.motion, self.since, self.until = phase, None, self._now, until
+
+    def _stop(self, then: Callable[[], None]) -> None:
+        """Stop the motion as the stop mode says, then call `then`; a slow stop that began continues."""
+        self._then = then
+        slow = self.motion.slowing(self._now - self.since) if self.motion else None
+        if self.phase is Phase.SLOWING:
+            return
+        if slow is None or self.stop_mode == parameters.IMMEDIATE:
+            self._rest()
+            then()
         else:
-            turn.by_hand(Phase.HOMING, project, None, -1)
-    return turn.result()
+            self._go(Phase.SLOWING, slow)
 
+    def _begin(self, at: float, begin: Callable[[], None]) -> bool:
+        """Begin something, with all of it that takes no time; False if it is busy."""
+        self.advance(at)
+        if self.phase is not Phase.IDLE:  # a busy controller acknowledges and ignores a start # assumption
+            return False
+        begin()
+        self.advance(at)
+        return True
 
-def set_input(
-    state: State, port: int, active: bool, at: float, *, in3_project: Project | None = None
-) -> Next:
-    """An input, 1 to 5, becomes active or inactive; `in3_project` is what input 3 starts."""
-    turn = Turn(state, at)
-    rises = active and port not in turn.state.inputs
-    inputs = turn.state.inputs | {port} if active else turn.state.inputs - {port}
-    turn.become(inputs=inputs)
-    if rises:
-        turn.input_rises(port, in3_project)
-    return turn.result()
+    def _move_by_hand(self, phase: Phase, project: Project, pulses: int | None, sign: int) -> None:
+        self.stop_mode = project.stop_mode
+        speed = ramp.ramp_of(project, project.step(1))
+        self._go(phase, ramp.motion(speed, pulses, sign, self.tick_ms))
 
+    def _end_manual(self) -> None:
+        self._happen("rests")
 
-def set_output(state: State, port: int, level: int, at: float) -> Next:
-    """Switch outputs (port 1 to 3, 4 for all) or both LEDs (5) by command, whatever runs."""
-    turn = Turn(state, at)
-    if port == 5:
-        turn.become(leds=bool(level))
-    turn.become(outputs=after_port(turn.state.outputs, port, level))
-    return turn.result()
+    def _end_phase(self) -> None:
+        """The phase ends by itself."""
+        if self.phase is Phase.MOVE:
+            self._end_motion()
+        elif self.phase is Phase.PAUSE:
+            self._next_step()
+        elif self.phase is Phase.SLOWING:
+            self._rest()
+            self._then()
+        else:  # one move is made, or a manual motion has no speed
+            self._rest()
+            self._end_manual()
 
+    # -- a project -------------------------------------------------------------------------------------------------
 
-def set_stop_mode(state: State, mode: int) -> Next:
-    """From now on a stop is slow (0) or immediate (1); one that is under way goes on as it began."""
-    return Next(replace(state, stop_mode=mode))
+    def _running(self) -> Run:
+        assert self.run is not None, "only a project has steps"
+        return self.run
 
+    def _start(self, project: Project, by_command: bool) -> None:
+        self.stop_mode = project.stop_mode  # the stop mode belongs to each project # assumption
+        self.run = Run(project, by_command, self._now)
+        if sequence.last_step(project):
+            self._begin_step()
+        else:
+            self._finish("ended")  # a project without steps ends at once, with a notice # assumption
 
-def power_on(
-    at: float,
-    how: Behaviour = USUAL,
-    *,
-    inputs: frozenset[int] = frozenset(),
-    home_with: Project | None = None,
-    base: int = 0,
-) -> Next:
-    """The supply comes: at rest and all outputs off, or homing with the speed of step 1 of this project.
+    def _begin_step(self) -> None:
+        port = self._running().step.start_input
+        if port and port not in self.inputs:  # an active input starts a step at once # assumption
+            self._rest(Phase.WAIT)
+            self._happen("waits")
+        else:
+            self._begin_motion()
 
-    `base` is where the motor stands, in pulses of the count before: without supply it does not turn, but whoever counts
-    has lost count.
-    """
-    state = State(since=at, how=how, inputs=inputs, base=base)
-    if home_with is None:
-        return Next(state)
-    return home(replace(state, stop_mode=home_with.stop_mode), home_with, at)
+    def _begin_motion(self) -> None:
+        """Outputs and motor at the same moment."""
+        run = self._running()
+        project, step = run.project, run.step
+        self.outputs = parameters.outputs_after_step(self.outputs, step.output)
+        pulses = ramp.pulses_of(project, step)
+        self._go(Phase.MOVE, ramp.motion(ramp.ramp_of(project, step), pulses, step.sign, self.tick_ms))
+        self._happen("begins")
+        if step.stop_input in self.inputs:
+            self._end_motion()
 
+    def _end_motion(self) -> None:
+        """The motion is over, or its stop input ends it at once."""
+        self._rest(Phase.PAUSE, self._now + self._running().step.delay / 1000)
+        self._happen("moved")
 
-def power_off(state: State, at: float) -> Next:
-    """The supply goes: motion, project and outputs with it."""
-    turn = Turn(state, at)
-    turn.rest(Phase.OFF)
-    turn.become(run=None, outputs=0, leds=False, homed=False)
-    return turn.result()
+    def _next_step(self) -> None:
+        run = self._running()
+        place = sequence.following(run.project, run.place)
+        passes = sequence.passes(run.project)
+        if place is None and passes is not None and run.round >= passes:
+            self._finish("ended")
+            return
+        if place is None and passes is None and self._now <= run.began:
+            run.began = -inf
+            self._rest(Phase.PAUSE, self._now + EMPTY_PASS)
+            return
+        if place is None:
+            run.round, run.began = run.round + 1, self._now
+        run.place = place or FIRST
+        self._begin_step()
+
+    def _finish(self, kind: str) -> None:
+        """The project has ended. The notice follows a natural end of one that a command started."""
+        self._happen(kind)
+        self._rest()
+        if kind == "ended" and self._running().by_command:
+            self._happen("completed")
+        self.run = None  # the outputs stay as they are at its end # assumption
+
+    def _happen(self, kind: str) -> None:
+        self.events.append(Happening(self._now, kind, self.run.place.step if self.run else 0))

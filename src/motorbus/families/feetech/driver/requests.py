@@ -1,0 +1,265 @@
+"""Requests to one servo: read registers, write registers, and prove a write.
+
+A servo acknowledges the receipt of a write, or nothing at all (status return level 0), or its acknowledgement is lost;
+`confirmed` tells these apart by reading back. Source: FEETECH serial bus servo protocol manual V1.01; STS3215 memory
+table V3.6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from typing import Final, NamedTuple, TypeVar
+
+from motorbus import errors
+from motorbus.core.request import (
+    Effect,
+    Expected,
+    Precondition,
+    Priority,
+    Request,
+    Response,
+    Stops,
+    TimeoutClass,
+)
+from motorbus.core.setpoint import Deferred, Setpoint
+from motorbus.errors import (
+    MotorbusError,
+    NoReply,
+    OutcomeUnknown,
+    RequestError,
+    VerificationFailed,
+    WireError,
+)
+from motorbus.families.feetech import protocol
+from motorbus.families.feetech.driver.node import Node
+
+T = TypeVar("T")
+
+PRESENT: Final = 56  # where feedback begins in every map: the present position
+TORQUE_ENABLE: Final = 40  # in every map
+ON: Final = b"\1"  # of the torque switch; any other value is limp
+STORE: Final = TimeoutClass.STORE
+ACKNOWLEDGED: Final = protocol.OVERHEAD  # bytes of a reply without parameters
+DATA: Final = 5  # offset of the parameters in a reply
+DOUBTS: Final = (NoReply, OutcomeUnknown, WireError)
+"""Failures of a write that the servo may have received."""
+
+
+class Block(NamedTuple):
+    """Adjoining registers to write at once, and what that does.
+
+    `repeatable`  writing it twice has the same effect as writing it once
+    `unless`      a further reason not to send it
+    """
+
+    address: int
+    data: bytes
+    effect: Effect = Effect.NONE
+    goals: tuple[Setpoint, ...] = ()
+    repeatable: bool = True
+    unless: Precondition | None = None
+
+
+def read_block(
+    node: Node,
+    address: int,
+    count: int,
+    take: Callable[[bytes], T],
+    *,
+    priority: Priority = Priority.POLL,
+    timeout: TimeoutClass = TimeoutClass.REPLY,
+    kept: bool = False,
+) -> Request[T]:
+    """READ `count` bytes; `take` makes the value of them. `kept`: the request is run again and again."""
+    size = protocol.OVERHEAD + count
+    head = protocol.HEADER + bytes((node.node, count + 2, 0))  # 0: no alarm
+
+    def decode(answer: Response) -> T:
+        frame = answer.replies[0].data
+        node.note_reply(frame[4], answer.at)
+        return take(frame[DATA : DATA + count])
+
+    def decode_exact(data: bytes, at: float) -> T | None:
+        if len(data) != size or data[:DATA] != head or not protocol.is_valid(data):
+            return None
+        node.at, node.alarm = at, ()
+        return take(data[DATA : DATA + count])
+
+    return Request(
+        protocol.read(node.node, address, count),
+        (Expected(node.node, node.node, size),),
+        decode,
+        priority=priority,
+        reply_within=timeout,
+        repeatable=True,
+        reports_position=reports_position({node.node: node}, address, count),
+        decode_exact=decode_exact if kept else None,
+    )
+
+
+def reports_position(
+    nodes: Mapping[int, Node], address: int, count: int
+) -> bool | Callable[[Response], Mapping[int, float]]:
+    """`Request.reports_position` of a read of these registers."""
+    return address == PRESENT and count > 1 and partial(_positions, nodes)
+
+
+def _positions(nodes: Mapping[int, Node], answer: Response) -> dict[int, float]:
+    found = {}
+    for reply in answer.replies:
+        node = nodes.get(reply.data[2])
+        if node is not None and node.table is not None and node.settings is not None:
+            row = node.table["present_position"]
+            if row.unit:
+                found[node.node] = float(node.value(row, row.decode(reply.data[DATA : DATA + row.size])))
+    return found
+
+
+def write_block(
+    node: Node,
+    block: Block,
+    *,
+    priority: Priority = Priority.CONTROL,
+    timeout: TimeoutClass = TimeoutClass.REPLY,
+) -> Request[None]:
+    """WRITE adjoining registers. The acknowledgement proves receipt only."""
+    wire = protocol.write(node.node, block.address, block.data)
+    return acknowledged(node, wire, block, priority=priority, timeout=timeout)
+
+
+def acknowledged(
+    node: Node,
+    wire: bytes,
+    block: Block,
+    *,
+    priority: Priority = Priority.CONTROL,
+    timeout: TimeoutClass = TimeoutClass.REPLY,
+    deferred: Deferred | None = None,
+) -> Request[None]:
+    """A request with an acknowledgement, or no reply at status return level 0.
+
+    It is refused once the settings of the servo differ from those of the moment when it was made.
+    """
+
+    def decode(answer: Response) -> None:
+        for reply in answer.replies:
+            node.note_reply(reply.data[4], answer.at)
+        if deferred is not None:
+            deferred.done = True
+
+    return Request(
+        wire,
+        (Expected(node.node, node.node, ACKNOWLEDGED),) if node.answers_writes else (),
+        decode,
+        priority=priority,
+        effect=block.effect,
+        setpoints=block.goals,
+        reply_within=timeout,
+        repeatable=block.repeatable,
+        precondition=unchanged([node], block.unless),
+        deferred=deferred,
+    )
+
+
+def unanswered(
+    wire: bytes,
+    effect: Effect,
+    goals: tuple[Setpoint, ...] = (),
+    *,
+    priority: Priority = Priority.CONTROL,
+    unless: Precondition | None = None,
+    deferred: Deferred | None = None,
+) -> Request[None]:
+    """A request without a reply, as every broadcast; it counts as carried out once it was sent."""
+
+    def decode(_: Response) -> None:
+        if deferred is not None:
+            deferred.done = True
+
+    return Request(
+        wire,
+        (),
+        decode,
+        priority=priority,
+        effect=effect,
+        setpoints=goals,
+        repeatable=priority is Priority.STOP,
+        precondition=unless,
+        deferred=deferred,
+    )
+
+
+def unchanged(nodes: Iterable[Node], further: Precondition | None = None) -> Precondition:
+    """Refuses a request once one of these servos has other settings than now: its goals would mean something else."""
+    made = [(node, node.settings) for node in nodes]
+
+    def refusal(stops: Stops) -> MotorbusError | None:
+        for node, settings in made:
+            if node.settings is not settings:
+                return outdated(node)
+        return further(stops) if further is not None else None
+
+    return refusal
+
+
+def outdated(node: Node) -> RequestError:
+    """The error for an order that was made by other settings than the servo has now."""
+    what = "has other settings than when this order was made, which may mean something else now"
+    return node.refusal(what, "give the order again; in a loop, begin another")
+
+
+async def confirmed(
+    node: Node,
+    block: Block,
+    *,
+    priority: Priority = Priority.CONTROL,
+    timeout: TimeoutClass = TimeoutClass.REPLY,
+) -> None:
+    """WRITE; without an acknowledgement read back.
+
+    Raises OutcomeUnknown if nothing can be read, VerificationFailed if it reads different.
+    """
+    doubt: MotorbusError | None = None
+    request = write_block(node, block, priority=priority, timeout=timeout)
+    try:
+        await request
+    except DOUBTS as error:
+        doubt = error
+    if doubt is None and request.expected:
+        return
+    if doubt is not None and not block.repeatable:
+        raise doubt
+    await verified(node, block, doubt, timeout=timeout)
+
+
+async def verified(
+    node: Node,
+    block: Block,
+    doubt: MotorbusError | None = None,
+    *,
+    timeout: TimeoutClass = TimeoutClass.REPLY,
+) -> None:
+    """Read back what was written; `doubt` is how the write failed. Raises as `confirmed`."""
+    try:
+        found = await read_block(node, block.address, len(block.data), bytes, timeout=timeout)
+    except DOUBTS as error:
+        node.forget_settings()  # it may be another servo when it answers again
+        if isinstance(doubt, OutcomeUnknown):
+            raise doubt from error
+        raise errors.unread(doubt or error, node=node.node) from error
+    if found != block.data:
+        raise _differs(node, block, found) from doubt
+
+
+def _differs(node: Node, block: Block, found: bytes) -> VerificationFailed:
+    last = block.address + len(block.data) - 1
+    where = f"register {block.address}" + (f" to {last}" if last > block.address else "")
+    return VerificationFailed(
+        f"node {node.node}: {where} reads back different",
+        sent=block.data,
+        received=found,
+        cause="the write was lost, the servo does not take this value, or another program writes it too",
+        advice="close other programs on this bus, then write it again",
+        node=node.node,
+    )

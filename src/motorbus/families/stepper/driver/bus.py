@@ -1,0 +1,136 @@
+"""The driver of one open bus: times, probe, stop, and what the controller can do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from typing import Any, ClassVar, Final
+
+from motorbus.core import units
+from motorbus.core.family import AxisDriver, Explanation, Family, Identity, Receiver, Stop
+from motorbus.core.half_duplex import BITS, HalfDuplexSerial
+from motorbus.core.request import Request, Response, TimeoutClass
+from motorbus.core.steps import Runnable
+from motorbus.errors import NoReply, RequestError
+from motorbus.families.stepper import protocol
+from motorbus.families.stepper.driver import manual, run, stop
+from motorbus.families.stepper.driver.node import BusState, Node
+from motorbus.families.stepper.driver.projects import dump_once
+from motorbus.families.stepper.driver.requests import STOPS, command, ignore
+from motorbus.families.stepper.parameters import PROJECTS, checked_order
+
+MODEL: Final = "stepper controller"
+UNKNOWN: Final = "unknown"  # it reports no version
+DUMP_END: Final = 0.6  # s from a request to the end of its dump, at 9600 baud # assumption
+GAP: Final = 0.05  # s within an old reply # assumption
+
+_AXIS: Final = AxisDriver(
+    move_by=manual.move_by,
+    jog=manual.jog,
+    home=manual.home,
+    keep_time=manual.keep_time,
+    run=run.run,
+    stop=stop.stop,
+)
+
+
+class StepperDriver(HalfDuplexSerial):
+    """A stepper controller on one open bus; see `core.family.BusDriver`. `state` is what was sent and read on it."""
+
+    full_duplex = True  # a stop does not wait for the end of a dump
+    probe_after = 0  # its probe takes 0.24 s; that no reply comes twice is an assumption
+    ids: ClassVar[Sequence[int]] = (protocol.ONLY,)
+    delays: ClassVar[Mapping[TimeoutClass, float]] = {
+        TimeoutClass.REPLY: 0.2,
+        TimeoutClass.SCAN: 0.2,
+        TimeoutClass.STORE: 1.0,
+    }  # assumption
+    longest_reply: ClassVar[int] = protocol.DUMP_LENGTH
+    longest_gap: ClassVar[float] = GAP
+
+    def __init__(self, family: Family, motor: object = protocol.MOTOR, dump_order: object = "little") -> None:
+        super().__init__(family)
+        self.motor: Final = protocol.checked_motor(_number(motor))
+        self.order: Final = checked_order(dump_order)
+        self.state = BusState()
+
+    def __copy__(self) -> StepperDriver:
+        """A copy with a state of its own: what a dry run sends is not remembered."""
+        copied = StepperDriver(self.family, self.motor, self.order)
+        copied.state = deepcopy(self.state)
+        return copied
+
+    def node(self, node: int = protocol.ONLY) -> Node:
+        """The controller of this bus. Raises RequestError for another id than 1."""
+        return Node(node, self.motor, self.order, self.state)
+
+    def turnaround(self, request: Request[Any]) -> float:
+        if isinstance(request.expected, tuple) and protocol.DUMP_LENGTH in [
+            one.length for one in request.expected
+        ]:
+            return DUMP_END - protocol.DUMP_LENGTH * BITS / protocol.RATE
+        return super().turnaround(request)
+
+    def receiver(self) -> Receiver:
+        return protocol.Receiver()
+
+    def probe(self, node: int, attempt: int) -> Request[bool]:
+        """Read a project, in turn: the bus doubts the last replies, so what was read before is forgotten.
+
+        A frame that begins with a motor number or with 00 would write registers of an inertial sensor with this header.
+        """
+        self.state.projects.clear()
+        number = attempt % PROJECTS + 1
+        return dump_once(self.node(node), number).convert(
+            lambda data: data[protocol.REPLY_LENGTH] in (0, number)
+        )
+
+    def stop(self, nodes: Mapping[int, Response | None]) -> Stop:
+        """Both stop commands; without waiting for a reply if the controller has not replied yet."""
+        requests = [command(self.node(), name, ignore) for name in STOPS]
+        frames = [
+            Request[Response](
+                one.wire,
+                one.expected if nodes else (),
+                priority=one.priority,
+                effect=one.effect,
+                repeatable=True,
+            )
+            for one in requests
+        ]
+        return Stop(tuple(frames), stop.Promise.STOP_ACCEPTED.value)
+
+    def identify(self, node: int) -> Runnable[Identity]:
+        return identify(self.node(node))
+
+    def axis(self, identity: Identity) -> AxisDriver:
+        return _AXIS if identity.model == MODEL else AxisDriver()
+
+    def decode(self, data: bytes) -> list[Explanation]:
+        from motorbus.families.stepper.decode import explain
+
+        return explain(data, self.order)
+
+
+async def ping(node: Node) -> bool:
+    """Whether it replies with a dump of project 1; silence gives False."""
+    try:
+        await dump_once(node, 1)
+    except NoReply:
+        return False
+    return True
+
+
+async def identify(node: Node) -> Identity:
+    """A controller that replies with a dump; it reports no model, version or number."""
+    await dump_once(node, 1)
+    return Identity(node.node, MODEL, UNKNOWN, node.table.name, {"motor": node.motor, "projects": PROJECTS})
+
+
+def _number(motor: object) -> int:
+    try:
+        return units.whole(str(motor))
+    except ValueError:
+        raise RequestError(
+            f"motor={motor} is not a whole number", expected="1 to 255; the manual knows 3"
+        ) from None

@@ -1,0 +1,403 @@
+"""Manual motion: by an angle, for a time, to the home switch, together with others.
+
+A jog with a velocity is a single move of velocity times time, so a host that dies leaves a motor that stops by itself.
+Neither a position nor a notice comes back: angle and time of such a motion are estimates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from dataclasses import replace
+from fractions import Fraction
+from functools import partial
+from math import inf, tau
+from typing import Final, NamedTuple
+
+from motorbus.core.register import is_number, shown
+from motorbus.core.setpoint import Setpoint
+from motorbus.core.steps import Emit, Progress, SetBitrate, Sleep
+from motorbus.core.timing import Timing, Turned
+from motorbus.errors import NotHomed, RequestError
+from motorbus.families.stepper.driver.io import check_seconds, read_input
+from motorbus.families.stepper.driver.loan import lend
+from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.driver.projects import MANUAL, cached
+from motorbus.families.stepper.driver.requests import command, ignore
+from motorbus.families.stepper.driver.stop import Promise, Watch
+from motorbus.families.stepper.execution.ramp import Motion, motion, pulses_of, ramp_of, slowest
+from motorbus.families.stepper.parameters import HOME_INPUT, REVERSE, Project
+from motorbus.families.stepper.protocol import REQUEST_LENGTH
+
+LONGEST_JOG: Final = 60.0  # s
+DEADLINE: Final = 30.0  # s, of homing
+LONGEST_HOMING: Final = 600.0  # s
+READINGS: Final = 2  # of input 5 in a row
+REPORT: Final = 0.1  # s between two reports of progress, and two looks for a stop
+CLOCK: Final = 1.02  # its clock may be slower by so much # assumption
+SPARE: Final = 0.05  # s # assumption
+ROUNDING: Final = 0.1  # share by which a velocity may differ from a whole RPM
+EXACT: Final = 1 + 1e-9  # an RPM that was converted to rad/s and back
+START: Final = 50  # Hz, where step 1 has none: the example of item 5
+ACCELERATION: Final = 30  # Hz, likewise, of item 6
+HUNDREDTHS: Final = 36000  # of a degree in a turn: the unit where a pulse as unit does not fit
+MAX_DISTANCE: Final = 0xFFFFFF
+MAX_RPM: Final = 0xFFFF
+
+
+class Moved(NamedTuple):
+    """A motion that was requested and had its time; all of it is estimated.
+
+    `angle` in rad and `velocity` in rad/s, forward positive; `seconds` that it takes at most; `promise` of the stop.
+    """
+
+    node: int
+    angle: float
+    velocity: float
+    seconds: float
+    promise: Promise
+
+    def __str__(self) -> str:
+        rpm = abs(self.velocity) * 60 / tau
+        return f"estimated: {self.angle:.6g} rad at {rpm:.0f} RPM in at most {self.seconds:.3f} s"
+
+
+class Homed(NamedTuple):
+    """Input 5 was active after `seconds` in reverse at `velocity` (rad/s, estimated), and the stop was acknowledged."""
+
+    node: int
+    seconds: float
+    velocity: float
+    promise: Promise
+
+    def __str__(self) -> str:
+        rpm = self.velocity * 60 / tau
+        return f"input {HOME_INPUT} was active after {self.seconds:.1f} s in reverse at {rpm:.0f} RPM"
+
+
+# -- by an angle, for a time -------------------------------------------------------------------------------------------
+
+
+async def move_by(node: Node, angle: float, *, velocity: float | None = None, wait: bool = True) -> Moved:
+    """Turn by `angle` (rad, forward positive, in whole pulses) with a loan of project 1, wait for its time, then stop.
+
+    `velocity` in rad/s, above 0, in whole RPM; None: that of step 1. `wait=False` is refused: project 1 has to be given
+    back. Raises RequestError, with nothing written, for a velocity more than 10 % off a whole RPM, less than a pulse,
+    and as `lend`; Interrupted if it is stopped; OutcomeUnknown without an acknowledgement. The position is unknown
+    after each error that is not `unmoved`.
+    """
+    if not wait:
+        raise RequestError("a move of the stepper controller is always waited for")
+    check_finite("angle", angle)
+    return await lend(node, "move_by", _shaped(angle, _rpm(velocity)), _move_once)
+
+
+async def jog(node: Node, velocity: float, seconds: float) -> Moved:
+    """Turn at `velocity` (rad/s, forward positive) for `seconds`, at most 60, then stop.
+
+    It is a single move of velocity times time, so it ends by itself if the host dies. Its ramps make it a little
+    longer. Returns and raises as `move_by`.
+    """
+    check_seconds("seconds", seconds, LONGEST_JOG)
+    check_finite("velocity", velocity)
+    return await lend(node, "jog", _shaped(velocity * seconds, _rpm(abs(velocity))), _move_once)
+
+
+async def run_once(node: Node) -> Moved:
+    """Make the move of step 1 of project 1 (item 19), wait for its time, then stop.
+
+    Nothing is edited. Raises RequestError if it has none, and as `move_by`.
+    """
+    return await lend(node, "run_once", checked, _move_once)
+
+
+async def jog_forward(node: Node, seconds: float) -> Moved:
+    """Turn forward for `seconds`, at most 60, with the speed of step 1 of project 1 (item 18), then stop.
+
+    The command itself has no end: if the host dies, the motor turns on. `jog` ends by itself. Raises RequestError
+    without a speed, and as `move_by`.
+    """
+    check_seconds("seconds", seconds, LONGEST_JOG)
+    return await lend(node, "jog_forward", checked, _jog("jog_forward", 1, seconds), ends=False)
+
+
+async def jog_reverse(node: Node, seconds: float) -> Moved:
+    """Turn in reverse for `seconds` (item 17b); see `jog_forward`."""
+    check_seconds("seconds", seconds, LONGEST_JOG)
+    return await lend(node, "jog_reverse", checked, _jog("jog_reverse", -1, seconds), ends=False)
+
+
+async def _move_once(watch: Watch, project: Project) -> Moved:
+    pulses, sign = checked_pulses(project), project.step(1).sign
+    angle = sign * pulses * pulse_angle(project)
+    seconds = longest(project, pulses)
+    await _request(watch, "run_once", "relative", angle, project)
+    await _wait(watch, seconds, "moving")
+    return Moved(watch.node.node, angle, sign * velocity_of(project), seconds, Promise.STOP_ACCEPTED)
+
+
+def _jog(name: str, sign: int, seconds: float) -> Callable[[Watch, Project], Awaitable[Moved]]:
+    async def turn(watch: Watch, project: Project) -> Moved:
+        velocity = sign * velocity_of(project)
+        await _request(watch, name, "velocity", velocity, project)
+        await _wait(watch, seconds, name)
+        angle = sign * motion_of(project, None).done(seconds) * pulse_angle(project)
+        return Moved(watch.node.node, angle, velocity, seconds, Promise.STOP_ACCEPTED)
+
+    return turn
+
+
+# -- to the home switch ------------------------------------------------------------------------------------------------
+
+
+async def home(
+    node: Node, *, deadline: float = DEADLINE, velocity: float | None = None, at_most: float | None = None
+) -> Homed:
+    """Turn in reverse until input 5 is active (item 22), at most `deadline` s (up to 600), then stop in each case.
+
+    The speed is that of step 1 of project 1; `velocity` (rad/s, above 0, in whole RPM) takes a loan for another one,
+    `at_most` (rad/s) only if step 1 is faster. Reports `Progress` in ms. That the motor stops at the switch at once is
+    an assumption.
+
+    Raises NotHomed if input 5 is active before (nothing is moved), or not by the deadline; RequestError without a
+    speed, and as `lend`; Interrupted; OutcomeUnknown if command or stop is not acknowledged.
+    """
+    check_seconds("deadline", deadline, LONGEST_HOMING)
+    rpm = _rpm(velocity)
+
+    def change(project: Project) -> Project:
+        if rpm is not None:
+            return paced(project, rpm)
+        checked(project)
+        is_slow = at_most is None or velocity_of(project) <= at_most * EXACT
+        return project if is_slow else paced(project, rpm_below(at_most or 0.0))
+
+    async def turn(watch: Watch, project: Project) -> Homed:
+        begun = await Sleep(0)
+        await _request(watch, "home", "velocity", -velocity_of(project), project)
+        seconds = await _until_home(watch, begun, deadline)
+        return Homed(node.node, seconds, velocity_of(project), Promise.STOP_ACCEPTED)
+
+    return await lend(node, "home", change, turn, prepare=partial(_check_released, node))
+
+
+async def _check_released(node: Node) -> None:
+    for _ in range(READINGS):
+        if await read_input(node, HOME_INPUT):
+            raise NotHomed(
+                f"input {HOME_INPUT} is active before homing",
+                cause="it stands at the home switch, or the switch is stuck or active at rest",
+                advice="move forward, away from the switch",
+                node=node.node,
+            )
+
+
+async def _until_home(watch: Watch, begun: float, deadline: float) -> float:
+    """Read input 5 until it is active; return the time (s) since `begun`. Raises NotHomed at the deadline."""
+    now, active, reported = begun, 0, -inf
+    while now - begun < deadline:
+        active = active + 1 if await read_input(watch.node, HOME_INPUT) else 0
+        watch.check()
+        now = await Sleep(0)
+        if active == READINGS:
+            return now - begun
+        if now - reported >= REPORT:
+            reported = now
+            await Emit(Progress(round(1000 * (now - begun)), round(1000 * deadline), "homing"))
+    raise NotHomed(
+        f"input {HOME_INPUT} was not active within {deadline:g} s",
+        cause="the switch is farther away, its wire is broken, or the motor does not turn",
+        advice=f"check input {HOME_INPUT} by hand, then home again with a longer deadline",
+        node=watch.node.node,
+    )
+
+
+# -- together with others ----------------------------------------------------------------------------------------------
+
+
+async def keep_time(
+    node: Node, angle: float, timing: Timing, *, velocity: float, acceleration: float | None = None
+) -> Turned:
+    """Turn by `angle` (rad) with a loan of project 1; begin with the devices of `timing`, end with them or soon after.
+
+    At most at `velocity` (rad/s) and, in each reading of the controller's number, at most at `acceleration` (rad/s²).
+    The speed is the highest whole RPM that is slow enough for the others, at least 1. All values of the result are
+    estimated. Less than a pulse takes part without a motion. Raises RequestError for a velocity below 1 RPM, and as
+    `move_by`; `timing.fails` gets each error once the others were asked.
+    """
+    check_finite("angle", angle)
+    rpm = rpm_below(velocity)
+    project = paced(await cached(node, MANUAL), rpm)
+    if not round(abs(angle) / pulse_angle(project)):
+        await timing.agreed(0.0, lambda seconds: seconds)
+        return Turned(node.node, 0.0, await timing.start(0.0), 0.0, lambda at: 0.0)
+    quickest = _limited(_shaped(angle, rpm)(project), acceleration)
+    seconds = await timing.agreed(_lasts(quickest), lambda least: _lasts(_slowed(quickest, least)))
+
+    def change(project: Project) -> Project:
+        return _slowed(_limited(_shaped(angle, rpm)(project), acceleration), seconds)
+
+    async def turn(watch: Watch, project: Project) -> Turned:
+        move = motion_of(project, checked_pulses(project))
+        first, pulse = move.moment(1), move.sign * pulse_angle(project)
+        lead = REQUEST_LENGTH * 10 / await SetBitrate(0) + first
+        await timing.start(lead)
+        begun = await Sleep(0) + lead
+        whole = pulse * (move.pulses or 0)
+        await _request(watch, "run_once", "relative", whole, project)
+        await _wait(watch, longest(project, move.pulses or 0), "moving")
+        return Turned(node.node, whole, begun, _lasts(project), lambda at: pulse * move.done(first + at))
+
+    return await lend(node, "keep_time", change, turn, on_error=timing.fails)
+
+
+def _limited(project: Project, acceleration: float | None) -> Project:
+    """The move with a ramp that is in no reading steeper than this (rad/s²), as far as the number 1 allows."""
+    if acceleration is None:
+        return project
+    step = project.step(1)
+    number = int(acceleration / pulse_angle(project) / max(1000.0, ramp_of(project, step).run))
+    return project.with_step(1, acceleration=max(1, min(number, step.acceleration)))
+
+
+def _slowed(quickest: Project, seconds: float) -> Project:
+    """The same move at the highest whole RPM with which it lasts so long (s); at 1 RPM if none does."""
+    low, high = 1, quickest.step(1).speed
+    while low < high:
+        middle = (low + high + 1) // 2
+        if _lasts(paced(quickest, middle)) >= seconds:
+            low = middle
+        else:
+            high = middle - 1
+    return paced(quickest, low)
+
+
+def _lasts(project: Project) -> float:
+    """s from the first pulse of the single move to its last."""
+    move = motion_of(project, checked_pulses(project))
+    return move.duration - move.moment(1)
+
+
+# -- requests and waits ------------------------------------------------------------------------------------------------
+
+
+async def _request(watch: Watch, name: str, quantity: str, value: float, project: Project) -> None:
+    """Send a motion, for the gate with its way or velocity; the controller knows no limits of travel."""
+    node = watch.node
+    setpoints = [Setpoint(node.node, quantity, value, -inf, inf)]
+    if quantity == "relative":
+        setpoints.append(Setpoint(node.node, "speed", velocity_of(project), -inf, inf))
+    await command(node, name, ignore, setpoints=tuple(setpoints), precondition=watch.precondition)
+
+
+async def _wait(watch: Watch, seconds: float, what: str) -> None:
+    """Let this time pass; reports `Progress` in ms. Raises Interrupted after a stop."""
+    now = begun = await Sleep(0)
+    while now < begun + seconds:
+        await Emit(Progress(round(1000 * (now - begun)), round(1000 * seconds), f"{what}, estimated"))
+        now = await Sleep(min(REPORT, begun + seconds - now))
+        watch.check()
+
+
+def longest(project: Project, pulses: int) -> float:
+    """s that a move may take, by the slowest reading of its ramp and a slow clock."""
+    return slowest(project, project.step(1), pulses) * CLOCK + SPARE
+
+
+def motion_of(project: Project, pulses: int | None) -> Motion:
+    """The motion of step 1 over time; None: without end."""
+    return motion(ramp_of(project, project.step(1)), pulses, project.step(1).sign)
+
+
+def velocity_of(project: Project) -> float:
+    """rad/s of step 1."""
+    return project.step(1).speed * tau / 60
+
+
+def pulse_angle(project: Project) -> float:
+    """rad of one pulse."""
+    return tau / float(project.pulses_per_turn or 1)
+
+
+# -- project 1 for a motion --------------------------------------------------------------------------------------------
+
+
+def checked(project: Project) -> Project:
+    """This project 1. Raises RequestError if it gives no pulses per turn, or no speed."""
+    if project.pulses_per_unit and project.step(1).speed and not project.is_cleared:
+        return project
+    raise RequestError("project 1 gives no speed in step 1, or no pulses per turn", advice="write project 1")
+
+
+def checked_pulses(project: Project) -> int:
+    """The pulses of the single move. Raises RequestError for none: that may be a move without end."""
+    if pulses := pulses_of(project, project.step(1)):
+        return pulses
+    raise RequestError(f"this move is less than one pulse of {pulse_angle(project):.4g} rad")
+
+
+def _rpm(velocity: float | None) -> int | None:
+    """The RPM of a velocity (rad/s) above 0; None stays None. Raises RequestError if it is more than 10 % off."""
+    if velocity is None:
+        return None
+    check_finite("velocity", velocity)
+    exact = min(velocity * 60 / tau, MAX_RPM + 1.0)
+    rpm = round(exact)
+    if 0 < rpm <= MAX_RPM and abs(rpm - exact) <= ROUNDING * exact:
+        return rpm
+    raise RequestError(
+        f"velocity {velocity:.6g} rad/s is {velocity * 60 / tau:.4g} RPM, and speeds are whole RPM",
+        expected=f"a whole RPM, from {tau / 60:.4g} rad/s (1 RPM) to {MAX_RPM} RPM",
+    )
+
+
+def rpm_below(velocity: float) -> int:
+    """The highest whole RPM that is not above this velocity (rad/s). Raises RequestError below 1 RPM."""
+    check_finite("velocity", velocity)
+    rpm = int(min(velocity * 60 / tau * EXACT, MAX_RPM))
+    if rpm >= 1:
+        return rpm
+    raise RequestError(f"velocity {velocity:.4g} rad/s is below {tau / 60:.4g} rad/s, which is 1 RPM")
+
+
+def paced(project: Project, rpm: int) -> Project:
+    """Project 1 with this speed in step 1 and a start frequency below it. Raises RequestError without a geometry."""
+    step = project.step(1)
+    project = checked(project.with_step(1, speed=rpm))
+    running = ramp_of(project, project.step(1)).run
+    start = step.start_frequency or START
+    return project.with_step(
+        1,
+        start_frequency=start if start < running else max(1, int(running / 2)),
+        acceleration=step.acceleration or ACCELERATION,
+    )
+
+
+def _shaped(angle: float, rpm: int | None) -> Callable[[Project], Project]:
+    """What makes project 1 a move by this angle (rad), in whole pulses; None: at its own speed.
+
+    The unit is a pulse, or a part of one where a turn has no whole number of pulses; a hundredth of a degree where that
+    does not fit. Raises RequestError for less than a pulse, and for too much.
+    """
+
+    def change(project: Project) -> Project:
+        project = paced(project, checked(project).step(1).speed if rpm is None else rpm)
+        turn = project.pulses_per_turn or Fraction(0)
+        turns = Fraction(abs(angle) / tau)
+        unit, distance = turn.numerator, turn.denominator * round(turns * turn)
+        if max(unit, distance) > MAX_DISTANCE:
+            unit, distance = HUNDREDTHS, round(turns * HUNDREDTHS)
+        if distance > MAX_DISTANCE:
+            most = MAX_DISTANCE * tau / unit
+            raise RequestError(f"{angle:.6g} rad is too far for one move", expected=f"at most {most:.6g} rad")
+        direction = REVERSE if angle < 0 else 1 - REVERSE
+        move = replace(project, turn_distance=unit).with_step(1, distance=distance, direction=direction)
+        checked_pulses(move)
+        return move
+
+    return change
+
+
+def check_finite(name: str, value: float) -> None:
+    """Raise RequestError unless this is a finite number."""
+    if not is_number(value):
+        raise RequestError(f"{name} {shown(value)} is not a finite number")

@@ -1,0 +1,402 @@
+"""Projects: read, write, save, clear, back up and restore, each verified.
+
+A dump has no checksum: two equal dumps count, and one if it is as wanted. An acknowledgement repeats no value, so every
+write is read back. Edits go to a copy that a save stores; the first edit selects the project, and whether that loads
+what is stored is an assumption. So a project that does not read as wanted after the edits is written in full, once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from typing import Any, Final, NamedTuple
+
+from motorbus.core.register import Value
+from motorbus.core.request import Request
+from motorbus.core.steps import ASKED, READABLE, Emit, Exclusive, JournalEntry, Progress, catch
+from motorbus.errors import (
+    FramingError,
+    OutcomeUnknown,
+    RequestError,
+    UnexpectedReply,
+    VerificationFailed,
+    WireError,
+)
+from motorbus.families.stepper import parameters
+from motorbus.families.stepper.driver.io import read_input
+from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.driver.requests import command, ignore
+from motorbus.families.stepper.driver.stop import check_idle
+from motorbus.families.stepper.edits import Edit, edits, edits_between
+from motorbus.families.stepper.parameters import PROJECTS, STEPS, Project, check_value, differences
+from motorbus.families.stepper.program.backup import Backup
+from motorbus.families.stepper.program.file import Program
+from motorbus.families.stepper.protocol import REPLY_LENGTH
+
+READINGS: Final = 5  # dumps of which two must be equal
+TRIES: Final = 3  # of a save; flash wears
+SHOWN: Final = 6  # differences that an error lists
+MANUAL: Final = 1  # the project from whose step 1 manual motion takes distance and speed
+
+Changes = Mapping[str, tuple[int, int]]
+"""Parameter name -> raw value before and after."""
+
+
+class Written(NamedTuple):
+    """The result of a write. `proof` is what is known:
+
+    unchanged  it read as wanted, so nothing was sent; edits of another program that were not saved read the same
+    edited     it reads as wanted, and power-off loses it
+    saved      it reads as wanted after the save was acknowledged
+    """
+
+    project: int
+    changes: Changes
+    proof: str
+
+    def __str__(self) -> str:
+        return f"project {self.project} {self.proof}, parameters changed: {len(self.changes)}"
+
+
+# -- read --------------------------------------------------------------------------------------------------------------
+
+
+def dump_once(node: Node, project: int) -> Request[bytes]:
+    """The 226 bytes of project 1 to 4 (item 15), read once."""
+    return command(node, "read_project", bytes, project=project)
+
+
+async def dump(node: Node, project: int = 1) -> bytes:
+    """The 226 bytes of project 1 to 4 by two equal readings, about 0.5 s.
+
+    Raises FramingError if no two of five readings are equal, UnexpectedReply for the image of another project.
+    """
+    seen: list[bytes] = []
+    while (data := await dump_once(node, project)) not in seen:
+        seen.append(data)
+        if len(seen) == READINGS:
+            raise FramingError(
+                f"project {project} read different {READINGS} times",
+                cause="the line damages bytes, and a dump has no checksum",
+                advice="check cable and ground",
+                node=node.node,
+            )
+    found = _decode(node, data)
+    if found.number not in (0, project) or found.total_steps > STEPS:
+        raise UnexpectedReply(
+            f"the dump of project {project} is of project {found.number} with {found.total_steps} steps",
+            received=data,
+            node=node.node,
+        )
+    node.state.projects[project] = replace(found, number=project)
+    return data
+
+
+def _decode(node: Node, data: bytes) -> Project:
+    return parameters.decode_image(data[REPLY_LENGTH:], node.order)
+
+
+async def read_image(node: Node, number: int) -> Project:
+    """A project by two equal dumps. Raises as `dump`."""
+    await dump(node, number)
+    return node.state.projects[number]
+
+
+async def cached(node: Node, number: int) -> Project:
+    """A project as it was read last, else by two dumps.
+
+    An input is read first: after a missing reply or a reconnect the bus then probes, which forgets the projects.
+    """
+    if number in node.state.projects:
+        await read_input(node, 1)
+    return node.state.projects.get(number) or await read_image(node, number)
+
+
+async def read_project(node: Node, project: int = 1) -> Program:
+    """Project 1 to 4 as a program (item 15). Raises as `dump`, RequestError for numbers that no program can hold."""
+    return Program.from_dump(await dump(node, project), name=f"project {project}", order=node.order)
+
+
+async def read(node: Node, /, *names: str, project: int = 1) -> dict[str, Value]:
+    """Parameters of a project in API units by name; without a name all. Raises as `dump`, RequestError for a name."""
+    raws = await read_raw(node, *names, project=project)
+    return {name: node.table[name].to_value(raw) for name, raw in raws.items()}
+
+
+async def read_raw(node: Node, /, *names: str, project: int = 1) -> dict[str, int]:
+    """Parameters of a project as raw values by name; see `read`."""
+    rows = [node.table[name] for name in names or node.table]
+    values = parameters.values_of(await read_image(node, project))
+    return {row.name: values[row.name] for row in rows}
+
+
+# -- edit, and read back -----------------------------------------------------------------------------------------------
+
+
+async def read_back(node: Node, wanted: Project) -> Project:
+    """The project of this number as it reads now: by one dump if it is as wanted, else by two equal ones."""
+    shown = _decode(node, await dump_once(node, wanted.number))
+    if replace(shown, number=wanted.number) != wanted:
+        return await read_image(node, wanted.number)
+    node.state.projects[wanted.number] = wanted
+    return wanted
+
+
+async def bring(node: Node, shown: Project, wanted: Project) -> bool:
+    """Edit a project until it reads as wanted, without a save. False: it still reads as `shown`.
+
+    What differs is edited, then everything, each followed by a read; everything at once if nothing differs. A
+    controller that reads as before after both shows what is stored, so its edits cannot be read. Raises
+    VerificationFailed if it reads as neither, OutcomeUnknown for a command without an acknowledgement. Call it inside
+    `Exclusive`.
+    """
+    for orders in (edits_between(shown, wanted), edits(wanted, rows=STEPS)):
+        if orders:
+            await _send(node, wanted.number, orders)
+            found = await read_back(node, wanted)
+            if found == wanted:
+                return True
+    if found == shown:
+        return False
+    raise _different(node, wanted, found, "it was edited; power-off brings back what is stored")
+
+
+async def _send(node: Node, project: int, orders: list[Edit]) -> None:
+    requests = []
+    for edit in orders:
+        values: dict[str, Any] = dict(edit.values)
+        requests.append(command(node, edit.command, ignore, expert=True, **values))
+    for done, request in enumerate(requests, 1):
+        await request
+        await Emit(Progress(done, len(requests), f"writing project {project}"))
+
+
+def _different(node: Node, wanted: Project, found: Project, state: str) -> VerificationFailed:
+    wrong = [f"{name}: {old} -> {new}" for name, (old, new) in differences(wanted, found).items()]
+    more = f" and {len(wrong) - SHOWN} more" if len(wrong) > SHOWN else ""
+    return VerificationFailed(
+        f"project {wanted.number} reads different from what was written: {state}",
+        expected=f"(wanted -> read) {'; '.join(wrong[:SHOWN])}{more}",
+        cause="it lost its supply, another program edits it, it refuses a value, or dump_order is wrong",
+        advice="write it again",
+        node=node.node,
+    )
+
+
+async def check_free(node: Node, verb: str) -> None:
+    """Raise RequestError while a project may run, or a change of this bus is unfinished in the journal."""
+    check_idle(node, f"{verb}()")
+    await Emit(JournalEntry(verb, ASKED, {"node": node.node}))
+
+
+# -- write -------------------------------------------------------------------------------------------------------------
+
+
+async def write_project(
+    node: Node, program: Program, project: int | None = None, *, save: bool = True, expert: bool = False
+) -> Written:
+    """Write a program into project 1 to 4 (None: its own number), read it back, save it, read it back again.
+
+    Only what differs is written; steps beyond the last are kept. A controller has one copy that is edited: edits of
+    another project that were not saved are lost. `expert` allows errors of lint. Reports `Progress`. Raises
+    RequestError, with nothing written; VerificationFailed if it reads different after three tries; OutcomeUnknown for a
+    command without an acknowledgement. A second call completes what an error has left.
+    """
+    number, change = _merge(program, project, expert)
+    return await Exclusive(_write(node, "write_project", number, change, save))
+
+
+async def difference(node: Node, program: Program, project: int | None = None) -> Changes:
+    """What `write_project` would change. Only reads. Raises as it does before anything is written."""
+    number, change = _merge(program, project, True)
+    before = await read_image(node, number)
+    return differences(before, change(before))
+
+
+async def write(node: Node, /, *, project: int = 1, save: bool = True, **values: Value) -> Written:
+    """Write parameters of a project by name, in API units: `write(project=2, step_3_delay=0.5)`; see `write_project`.
+
+    Raises RequestError for what is unknown, out of range or not written by name, and for a cleared project unless
+    `total_steps` is among them.
+    """
+    check_value("project", project)
+    raws = {name: _raw(node, name, value) for name, value in values.items()}
+
+    def change(before: Project) -> Project:
+        if before.is_cleared and "total_steps" not in raws:
+            raise RequestError(f"project {project} has no steps", advice="write total_steps, 1 to 10, too")
+        return parameters.amended(before, raws)
+
+    return await Exclusive(_write(node, "write", project, change, save))
+
+
+def _merge(program: Program, project: int | None, expert: bool) -> tuple[int, Callable[[Project], Project]]:
+    """The number of the project to write, and what it becomes. Raises RequestError for what cannot be written."""
+    number = program.project.number if project is None else project
+    check_value("project", number)
+    wanted = replace(program.project, number=number)
+    for error in parameters.check_project(wanted, expert=True):
+        raise error
+    errors = [str(one) for one in program.lint() if one.level == "error"]
+    if errors and not expert:
+        raise RequestError(
+            f"the program has errors: {'; '.join(errors)}", advice="correct it, or say expert=True"
+        )
+    return number, lambda before: replace(wanted, steps=wanted.used + before.steps[wanted.total_steps :])
+
+
+def _raw(node: Node, name: str, value: Value) -> int:
+    row = node.table[name]
+    if row.protected or not row.writable:
+        raise RequestError(f"{name} is not written by name", cause=row.note, advice="write a program")
+    raw = row.to_raw(value)
+    row.encode(raw, row.given(value))  # raises
+    return raw
+
+
+async def _write(
+    node: Node, verb: str, number: int, change: Callable[[Project], Project], save: bool
+) -> Written:
+    await check_free(node, verb)
+    before = await read_image(node, number)
+    wanted = change(before)
+    changes = differences(before, wanted)
+    unsaved = node.state.unsaved is not None and node.state.unsaved.number == number
+    if not changes and not (save and unsaved):
+        return Written(number, {}, "unchanged")
+    if save:
+        await _store(node, before, wanted)
+        return Written(number, changes, "saved")
+    await bring(node, before, wanted)
+    node.state.unsaved = wanted
+    return Written(number, changes, "edited")
+
+
+async def _store(node: Node, before: Project, wanted: Project) -> None:
+    """Edit, read back, save, read back.
+
+    A save without an acknowledgement is followed by all edits: a controller that lost its supply has another project
+    selected, and a save alone would store that one.
+    """
+    for _ in range(TRIES):
+        shows_edits = await bring(node, before, wanted)
+        error = await catch(command(node, "save_project", ignore, project=wanted.number))
+        if error is not None and not isinstance(error, OutcomeUnknown | WireError):
+            raise error
+        before = await read_back(node, wanted)
+        if before == wanted and (error is None or not shows_edits):
+            node.state.unsaved = None
+            return
+    raise _different(node, wanted, before, f"saved {TRIES} times")
+
+
+# -- save, clear -------------------------------------------------------------------------------------------------------
+
+
+async def save(node: Node, project: int) -> Written:
+    """Save the edits that this host has made of a project and not saved, as `write_project` does.
+
+    Everything is written again first: no request tells which project is selected, and a save stores that one. Raises
+    RequestError without such edits; `save_project` saves whatever is edited.
+    """
+    unsaved = node.state.unsaved
+    if unsaved is None or unsaved.number != project:
+        raise RequestError(f"project {project} has no edits of this host that are not saved")
+    wanted = unsaved
+    return await Exclusive(_write(node, "save", project, lambda before: wanted, True))
+
+
+async def clear(node: Node, project: int, *, expert: bool = False) -> Written:
+    """Set all of project 1 to 4 to zero, stored and edited, and read it back (item 17a).
+
+    Raises RequestError for project 1 unless `expert`: manual motion takes its speed from it. Raises VerificationFailed
+    if it does not read as cleared, OutcomeUnknown without an acknowledgement in two tries.
+    """
+    check_value("project", project)
+    if project == MANUAL and not expert:
+        raise RequestError(
+            "project 1 is kept: manual motion takes its speed from it", advice="say expert=True"
+        )
+    return await Exclusive(_clear(node, project))
+
+
+async def _clear(node: Node, number: int) -> Written:
+    await check_free(node, "clear")
+    before, blank = await read_image(node, number), Project(number=number)
+    if is_blank(before):
+        return Written(number, {}, "unchanged")
+    if node.state.unsaved is not None and node.state.unsaved.number == number:
+        node.state.unsaved = None
+    error = await catch(command(node, "clear_project", ignore, project=number))
+    if isinstance(error, OutcomeUnknown | WireError):
+        error = await catch(command(node, "clear_project", ignore, project=number))  # twice is as once
+    if error is not None:
+        raise error
+    found = await read_image(node, number)
+    if not is_blank(found):
+        raise _different(node, blank, found, "it was cleared")
+    return Written(number, differences(before, blank), "saved")
+
+
+def is_blank(project: Project) -> bool:
+    """Nothing is left of it, except flags that may belong to the device."""
+    return replace(project, number=0, stop_mode=0, mode4=0, power_on_home=0) == Project()
+
+
+# -- back up and restore -----------------------------------------------------------------------------------------------
+
+
+async def backup(node: Node, projects: Iterable[int] = range(1, PROJECTS + 1)) -> Backup:
+    """Read these projects, each by two equal dumps; only reads.
+
+    Edits that were not saved are read in place of what is stored, an assumption. Reports `Progress`. Raises
+    RequestError for another number, and while project 1 is lent to an unfinished motion; else as `dump`.
+    """
+    numbers = tuple(dict.fromkeys(projects))
+    for number in numbers:
+        check_value("project", number)
+
+    async def read_all() -> Backup:
+        await Emit(JournalEntry("backup", ASKED, {"node": node.node, READABLE: True}))
+        dumps = {}
+        for done, number in enumerate(numbers, 1):
+            dumps[number] = await dump(node, number)
+            await Emit(Progress(done, len(numbers), "reading projects"))
+        return Backup(dumps=dumps, order=node.order)
+
+    return await Exclusive(read_all())
+
+
+async def restore(node: Node, backup: Backup, projects: Iterable[int] | None = None) -> tuple[Written, ...]:
+    """Write projects of a backup (None: all), save them and read them back, one after the other.
+
+    Steps beyond the last are written too, a project that was cleared is cleared, and lint is not asked. Bytes that the
+    manual does not name cannot be written. Raises RequestError, with nothing sent, for numbers that no request can
+    carry; else as `write_project`, with a note that names the restored projects.
+    """
+    numbers = dict.fromkeys(backup.projects if projects is None else projects)
+    wanted = [replace(backup.project(number), number=number) for number in numbers]
+    for project in wanted:
+        for error in [] if project.is_cleared else parameters.check_project(project, expert=True):
+            raise RequestError(
+                f"project {project.number} of this backup: {error.summary}", expected=error.expected
+            )
+    done: list[Written] = []
+
+    async def write_all() -> tuple[Written, ...]:
+        for project in wanted:
+            number, change = project.number, _constant(project)
+            blank = project.is_cleared
+            work = _clear(node, number) if blank else _write(node, "restore", number, change, True)
+            done.append(await work)
+        return tuple(done)
+
+    try:
+        return await Exclusive(write_all())
+    except BaseException as error:
+        error.add_note(f"restored: {', '.join(str(one.project) for one in done) or 'no project'}")
+        raise
+
+
+def _constant(project: Project) -> Callable[[Project], Project]:
+    return lambda before: project
