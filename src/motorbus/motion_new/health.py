@@ -14,7 +14,7 @@ from typing import Final
 from motorbus.bus.base import BaseBus
 from motorbus.core.family import Health, State
 from motorbus.core.request import Request
-from motorbus.core.steps import catch
+from motorbus.core.steps import catch, discard
 from motorbus.errors import Faulted, MotorbusError, Overloaded
 from motorbus.motion_new.program import LOST, OnBuses, run
 from motorbus.motion_new.state import Axis
@@ -83,8 +83,11 @@ class HealthMonitor:
             now = axis.bus.now()
             if axis.bus in due or "health" not in axis.driver or now < self._free.get(axis.bus, -inf):
                 continue
+            if now < self._record(axis).asked + PERIOD:
+                continue
             request = axis.driver.health(axis.device)
-            if now < self._record(axis).asked + PERIOD or not isinstance(request, Request):
+            if not isinstance(request, Request):
+                discard(request)
                 continue
             due[axis.bus] = axis, request
             self._free[axis.bus] = now + axis.bus.driver.air_time(request, axis.bus.rate) / SHARE

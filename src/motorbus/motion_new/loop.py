@@ -12,7 +12,7 @@ from msgspec import Struct
 from motorbus.bus.base import BaseBus
 from motorbus.core.family import Positions, PositionStream
 from motorbus.core.request import Precondition, Request, SetpointGroup, SetpointWrite, Stops
-from motorbus.core.steps import catch, gather
+from motorbus.core.steps import catch, discard, gather
 from motorbus.core.stream import read_positions
 from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, NoReply, RequestError
 from motorbus.motion_new.gate import check_owned
@@ -487,11 +487,12 @@ async def _open(
     stream = await led[0].driver.stream([axis.device for axis in led], rate=bus.rate) if led else None
     reads = list(stream.positions) if stream is not None else []
     for axis in axes:
-        request = (
-            axis.driver.position(axis.device) if axis.config.is_wheel and "position" in axis.driver else None
-        )
-        if isinstance(request, Request):
-            reads.append(read_positions(axis.config.node, request))
+        if axis.config.is_wheel and "position" in axis.driver:
+            await axis.driver.position(axis.device)  # from then on it is one request
+            request = axis.driver.position(axis.device)
+            if isinstance(request, Request):
+                reads.append(read_positions(axis.config.node, request))
+            discard(request)
     return stream, tuple(reads)
 
 

@@ -46,6 +46,11 @@ class Quantity(float):
         made.kind = kind
         return made
 
+    @property
+    def is_linear(self) -> bool:
+        """It measures a linear axis."""
+        return self.kind.startswith("l")  # length, linear velocity
+
     @classmethod
     def parse(cls, value: object) -> Self:
         """`"90 deg"` -> 1.571. Raises ValueError without a unit, with a wrong unit, and for an impossible number."""
@@ -377,11 +382,7 @@ def _check_axis(where: str, axis: AxisConfig) -> None:
         raise RequestError(f"{where}: low and high are needed together")
     for key in ("low", "high", "max_step", "max_velocity", "max_acceleration"):
         value = getattr(axis, key)
-        if (
-            value is not None
-            and value.kind != "raw"
-            and ("le" in value.kind or "linear" in value.kind) != bool(axis.travel)
-        ):
+        if value is not None and value.kind != "raw" and value.is_linear != bool(axis.travel):
             raise RequestError(
                 f"{where}.{key}: this axis is {'linear' if axis.travel else 'not linear'}",
                 advice='an axis with travel = "5 mm" (length per turn) is linear',

@@ -147,13 +147,13 @@ def _position(axis: AxisConfig, value: float) -> str:
 
 
 def _text(value: float, quantity: str, unit: str) -> str:
-    """The fewest digits in `unit` that are read as the same number."""
+    """The fewest digits in `unit`, or in the API unit, that are read as the same number."""
     number = value / units.SCALES[quantity][unit]
-    for digits in range(1, 18):
-        text = f"{number:.{digits}g}"
+    for digits in range(1, DIGITS):
+        text = f"{float(f'{number:.{digits}g}'):.{DIGITS}g}"
         if float(text) * units.SCALES[quantity][unit] == value:
-            return f"{float(text):.17g} {unit}" if len(text) > DIGITS else f"{float(text):g} {unit}"
-    return f"{number!r} {unit}"
+            return f"{text} {unit}"
+    return f"{float(value)!r} {next(iter(units.SCALES[quantity]))}"
 
 
 def _quoted(text: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from math import isfinite
+from math import inf, isfinite
 from typing import Any, Final, NamedTuple
 
 from motorbus.bus.base import BaseBus
@@ -101,7 +101,7 @@ def _check_goal(axis: Axis, goal: float, *, relative: bool) -> None:
         raise RequestError(f"{axis.name}: a wheel has no position", advice="jog it", node=config.node)
     if not axis.follows_setpoints:
         axis.require("plan_move")
-        if axis.status.estimate is None and not relative:
+        if axis.status.estimate is None and not (relative and axis.range == (-inf, inf)):
             raise NotHomed(f"{axis.name}: its position is not known", advice=f'robot.home("{axis.name}")')
     if not isfinite(goal):
         raise LimitExceeded(f"{axis.name}: {goal} is not finite", node=config.node)

@@ -130,7 +130,7 @@ class OpenMachine:
     config: MachineConfig
 
     def __init__(self) -> None:
-        self.buses: dict[str, BaseBus] = {}
+        self.buses: dict[str, Any] = {}
         self.axes: dict[str, Axis] = {}
         self.gates: dict[BaseBus, SafetyGate] = {}
         self.targets: dict[str, float] = {}
@@ -141,7 +141,8 @@ class OpenMachine:
 
     def now(self) -> float:
         """s on the link clock."""
-        return next(iter(self.buses.values())).now()
+        bus: BaseBus = next(iter(self.buses.values()))
+        return bus.now()
 
     @property
     def lease(self) -> Lease | None:
