@@ -1,6 +1,7 @@
 """Commands of a robot and their results, as Structs: one definition for shell, web and schema.
 
-Positions are in rad (m), velocities in rad/s (m/s), times in s. `axes` name axes, groups and buses; None means all.
+Positions are in rad (m), velocities in rad/s (m/s), times in s. `name` is an axis; `names` are axes, groups and buses,
+None means all axes. The fields of a command are the arguments of its program, see `robot.PROGRAMS`.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ class Pose(Struct, frozen=True, tag="pose"):
 class Jog(Struct, frozen=True, tag="jog"):
     """Move an axis at a velocity for a time."""
 
-    axis: str
+    name: str
     velocity: float
     seconds: float
 
@@ -43,14 +44,14 @@ class Jog(Struct, frozen=True, tag="jog"):
 class Home(Struct, frozen=True, tag="home"):
     """Move to the reference switch."""
 
-    axes: AxisNames = None
+    names: AxisNames = None
     timeout: float = 30.0
 
 
 class RunProgram(Struct, frozen=True, tag="run"):
     """Run a stored program of the device of an axis."""
 
-    axis: str
+    name: str
     number: int
     timeout: float | None = None
 
@@ -70,7 +71,7 @@ class Teach(Struct, frozen=True, tag="teach"):
 
     file: str
     seconds: float
-    axes: AxisNames = None
+    names: AxisNames = None
     rate: float = 50.0
     keep_torque: bool = False
 
@@ -87,13 +88,13 @@ class Torque(Struct, frozen=True, tag="torque"):
     """Switch torque; on holds the present position."""
 
     on: bool
-    axes: AxisNames = None
+    names: AxisNames = None
 
 
 class Stop(Struct, frozen=True, tag="stop"):
     """Decelerate and hold. `verify`: watch until each axis rests."""
 
-    axes: AxisNames = None
+    names: AxisNames = None
     verify: bool = False
 
 
@@ -108,35 +109,35 @@ class Reset(Struct, frozen=True, tag="reset"):
 class SetPosition(Struct, frozen=True, tag="set_position"):
     """Declare the position of an axis whose device reports none."""
 
-    axis: str
+    name: str
     position: float
 
 
 class ClearFault(Struct, frozen=True, tag="clear_fault"):
     """Clear faults, so that the axes may move again."""
 
-    axes: AxisNames = None
+    names: AxisNames = None
 
 
 class ReadRegisters(Struct, frozen=True, tag="read_registers"):
     """Read registers of the device of an axis."""
 
-    axis: str
+    name: str
     registers: tuple[str, ...]
 
 
 class WriteRegisters(Struct, frozen=True, tag="write_registers"):
     """Write registers of the device of an axis."""
 
-    axis: str
+    name: str
     values: dict[str, float]
 
 
 class DeviceCommand(Struct, frozen=True, tag="device_command"):
     """Call a driver function of the device of an axis by its name."""
 
-    axis: str
     name: str
+    function: str
     arguments: dict[str, float | int | str | bool] = {}
 
 

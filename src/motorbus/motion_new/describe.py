@@ -6,7 +6,8 @@ from math import isfinite
 
 from msgspec import Struct
 
-from motorbus.motion_new.state import Axis, OpenMachine
+from motorbus.motion_new.axis import Axis
+from motorbus.motion_new.state import OpenMachine
 
 
 class AxisDescription(Struct, frozen=True):

@@ -16,8 +16,8 @@ from motorbus.core.family import Health, State
 from motorbus.core.request import Request
 from motorbus.core.steps import catch, discard
 from motorbus.errors import Faulted, MotorbusError, Overloaded
+from motorbus.motion_new.axis import Axis
 from motorbus.motion_new.program import LOST, OnBuses, run
-from motorbus.motion_new.state import Axis
 
 PERIOD: Final = 0.25  # s after which an axis is asked again
 SHARE: Final = 0.1  # of what the wire carries

@@ -15,12 +15,13 @@ from motorbus.core.request import Precondition, Request, SetpointGroup, Setpoint
 from motorbus.core.steps import catch, discard, gather
 from motorbus.core.stream import read_positions
 from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, NoReply, RequestError
+from motorbus.motion_new.axis import Axis, by_bus
 from motorbus.motion_new.gate import check_owned
 from motorbus.motion_new.health import HealthMonitor
 from motorbus.motion_new.machine import SLACK, Names
 from motorbus.motion_new.profile import Limits, SetpointGenerator
 from motorbus.motion_new.program import LOST, Exchange, OnBuses, raise_first
-from motorbus.motion_new.state import Axis, OpenMachine, by_bus
+from motorbus.motion_new.state import OpenMachine
 
 Policy: TypeAlias = Literal["reject", "clamp"]
 MAX_MISSED: Final = 2  # cycles without a position after which an axis gets no goal
@@ -67,22 +68,16 @@ class LoopAxis:
     """
 
     __slots__ = (
-        "axis",
-        "claimed",
-        "generator",
-        "high",
-        "low",
-        "missed",
-        "owner",
-        "position",
-        "sent",
-        "silent_since",
-        "target",
-    )
+        "axis", "claimed", "config", "generator", "high", "low", "missed", "name", "owner", "position", "sent",
+        "silent_since", "status", "target",
+    )  # fmt: skip
 
     def __init__(self, axis: Axis) -> None:
         config = axis.config
         self.axis: Final = axis
+        self.config: Final = config
+        self.status: Final = axis.status
+        self.name: Final = axis.name
         self.low, self.high = (
             (-config.max_velocity, float(config.max_velocity)) if config.is_wheel else axis.range
         )
@@ -94,10 +89,10 @@ class LoopAxis:
         self.missed = 0
         self.silent_since = 0.0
 
-    @property
-    def name(self) -> str:
-        """The name of the axis."""
-        return self.axis.name
+    def allows(self, target: float) -> bool:
+        """Whether a target is inside the limits, or leads back towards them; never NaN."""
+        low, high, here = self.low, self.high, self.position
+        return low - SLACK <= target <= high + SLACK or here <= target <= low or high <= target <= here
 
     def release(self) -> None:
         """It gets no goals until its next target."""
@@ -105,11 +100,11 @@ class LoopAxis:
 
     def show(self, value: float) -> str:
         """A target with its unit."""
-        return f"{value:.4g} rad/s" if self.axis.config.is_wheel else self.axis.config.show(value)
+        return f"{value:.4g} rad/s" if self.config.is_wheel else self.config.show(value)
 
     def restart(self) -> None:
         """Go on from the measured position, at rest."""
-        if not self.axis.config.is_wheel:
+        if not self.config.is_wheel:
             self.sent = self.position
             self.generator.reset(self.position)
 
@@ -150,7 +145,7 @@ class BusGroup:
     def lost(self, lease: Any) -> MotorbusError | None:
         """The error if the loop does not own one of its axes any more."""
         return check_owned(
-            [(one.axis.status, one.owner) for one in self.axes.values() if one.owner is not None], lease
+            [(one.status, one.owner) for one in self.axes.values() if one.owner is not None], lease
         )
 
 
@@ -166,7 +161,6 @@ class ControlLoop:
     def __init__(
         self,
         machine: OpenMachine,
-        health: HealthMonitor,
         names: Names = None,
         *,
         rate: float | None = None,
@@ -185,7 +179,6 @@ class ControlLoop:
         if policy not in ("reject", "clamp"):
             raise RequestError(f"policy {policy!r}", expected="reject or clamp")
         self.machine: Final = machine
-        self.health: Final = health
         self.members: Final = able
         self.names: Final = tuple(axis.name for axis in able)
         self.policy: Final = policy
@@ -206,17 +199,17 @@ class ControlLoop:
         axis = self.axes.get(name)
         if axis is None:
             raise RequestError(f"{name!r} is not in this loop", expected=f"one of {', '.join(self.names)}")
-        if not axis.low - SLACK <= target <= axis.high + SLACK:  # NaN fails, too
+        if not axis.allows(target):
             if self.policy == "reject" or target != target:
                 raise LimitExceeded(
                     f"{name}: {axis.show(target) if isfinite(target) else target} is outside {axis.show(axis.low)} "
                     f"to {axis.show(axis.high)}",
-                    node=axis.axis.config.node,
+                    node=axis.config.node,
                 )
             self.statistics.clamped[name] = self.statistics.clamped.get(name, 0) + 1
             target = min(max(target, axis.low), axis.high)
         if axis.target is None:
-            axis.claimed = axis.axis.status.owner  # a stop before the torque-on withdraws the target
+            axis.claimed = axis.status.owner  # a stop before the torque-on withdraws the target
         axis.target = target
         self.machine.targets[name] = target
 
@@ -230,7 +223,7 @@ class ControlLoop:
         for bus, axes in groups.items():
             members = [LoopAxis(axis) for axis in axes]
             stream, reads = opened[bus]
-            self.groups.append(BusGroup(bus, {one.axis.config.node: one for one in members}, stream, reads))
+            self.groups.append(BusGroup(bus, {one.config.node: one for one in members}, stream, reads))
             self.axes |= {one.name: one for one in members}
         self._settle_rate()
         for _ in range(ENTRY_TRIES):
@@ -321,7 +314,7 @@ class ControlLoop:
         try:
             if not self.direct:
                 for axis in owned:
-                    axis.target = 0.0 if axis.axis.config.is_wheel else axis.generator.brake()
+                    axis.target = 0.0 if axis.config.is_wheel else axis.generator.brake()
                 while any(axis.owner is not None and not self._rests(axis) for axis in owned):
                     await self.cycle()
             self.settle()
@@ -331,8 +324,8 @@ class ControlLoop:
     def settle(self) -> None:
         """The axes that the loop owns have come to rest."""
         for axis in self.axes.values():
-            if axis.owner is not None and axis.owner == axis.axis.status.owner:
-                axis.axis.status.moving = axis.axis.status.endless = False
+            if axis.owner is not None and axis.owner == axis.status.owner:
+                axis.status.moving = axis.status.endless = False
 
     def close(self) -> None:
         """Send nothing more."""
@@ -343,7 +336,7 @@ class ControlLoop:
         self.groups = []
 
     def _rests(self, axis: LoopAxis) -> bool:
-        return not axis.sent if axis.axis.config.is_wheel else axis.generator.arrived
+        return not axis.sent if axis.config.is_wheel else axis.generator.arrived
 
     # -- parts of a cycle ------------------------------------------------------------------------------------------
 
@@ -374,12 +367,7 @@ class ControlLoop:
     def _goals(self, group: BusGroup, periods: int) -> dict[int, float]:
         goals = {}
         for node, axis in group.axes.items():
-            if (
-                axis.owner is None
-                or axis.target is None
-                or axis.missed > MAX_MISSED
-                or axis.axis.config.is_wheel
-            ):
+            if axis.owner is None or axis.target is None or axis.missed > MAX_MISSED or axis.config.is_wheel:
                 continue
             if self.direct:
                 axis.sent = axis.target
@@ -387,14 +375,14 @@ class ControlLoop:
                 if periods > CATCH_UP:
                     axis.generator.reset(axis.sent)
                 axis.sent = axis.generator.step(min(periods, CATCH_UP) / self.rate, axis.target)
-            goals[node] = axis.axis.config.to_device(axis.sent)
+            goals[node] = axis.config.to_device(axis.sent)
         return goals
 
     async def _turn_wheels(self, periods: int) -> None:
         """Bring the velocity of each wheel nearer to its target, within its acceleration."""
         changed: dict[BaseBus, list[LoopAxis]] = {}
         for axis in self.axes.values():
-            config = axis.axis.config
+            config = axis.config
             if not config.is_wheel or axis.owner is None or axis.target is None:
                 continue
             most = config.acceleration * min(periods, CATCH_UP) / self.rate
@@ -420,8 +408,8 @@ class ControlLoop:
                     at = reply.at
             for node, axis in group.axes.items():
                 angle = found.get(node)
-                if angle is not None and axis.axis.status.take(angle, at):
-                    axis.position = axis.axis.config.from_device(angle)
+                if angle is not None and axis.status.take(angle, at):
+                    axis.position = axis.config.from_device(angle)
                     if axis.missed > MAX_MISSED and axis.owner is not None:
                         axis.restart()
                     axis.missed = 0
@@ -436,26 +424,28 @@ class ControlLoop:
     async def _begin(self) -> None:
         """Torque on, without a jump, for axes with a first target."""
         fresh = [axis for axis in self.axes.values() if axis.target is not None and axis.owner is None]
-        stopped = [axis for axis in fresh if axis.axis.status.owner != axis.claimed]
+        stopped = [axis for axis in fresh if axis.status.owner != axis.claimed]
         for axis in stopped:
             axis.release()
         if stopped:
             raise Interrupted(f"{', '.join(axis.name for axis in stopped)}: stopped before the first goal")
         groups = by_bus([axis.axis for axis in fresh])
-        raise_first(await OnBuses({bus: start_axes(bus, axes, self.health) for bus, axes in groups.items()}))
+        raise_first(
+            await OnBuses({bus: start_axes(bus, axes, self.machine.health) for bus, axes in groups.items()})
+        )
         for axis in fresh:
-            if not axis.axis.config.is_wheel:
-                assert axis.axis.status.position is not None
-                axis.position = axis.axis.config.from_device(axis.axis.status.position)
+            if not axis.config.is_wheel:
+                assert axis.status.position is not None
+                axis.position = axis.config.from_device(axis.status.position)
             axis.restart()
-            axis.owner = axis.axis.status.claim()
+            axis.owner = axis.status.claim()
         self.slot = -1
 
     async def _look(self) -> None:
         owned = [axis for axis in self.axes.values() if axis.owner is not None]
         if owned:
-            goals = {a.name: a.axis.config.to_device(a.sent) for a in owned if not a.axis.config.is_wheel}
-            await self.health.look([axis.axis for axis in owned], goals)
+            goals = {a.name: a.config.to_device(a.sent) for a in owned if not a.config.is_wheel}
+            await self.machine.health.look([axis.axis for axis in owned], goals)
 
     def _check(self, values: Mapping[BaseBus, Any], state: LoopState) -> None:
         """Raise what is wrong: a silent axis first, then a lost owner, a lost bus, a refused goal."""
@@ -464,14 +454,14 @@ class ControlLoop:
             silence = self.machine.now() - axis.silent_since
             if axis.owner is not None and silence > SILENCE:
                 raise NoReply(
-                    f"{name} ({axis.axis.config.device}) has not answered for {silence:.2f} s while it was led",
+                    f"{name} ({axis.config.device}) has not answered for {silence:.2f} s while it was led",
                     cause="its cable or supply, or a device in between",
-                    node=axis.axis.config.node,
+                    node=axis.config.node,
                 )
         lost = [error for group in self.groups if (error := group.lost(self.machine.lease)) is not None]
         if lost:
             for axis in self.axes.values():
-                if axis.owner != axis.axis.status.owner:
+                if axis.owner != axis.status.owner:
                     axis.release()
             raise lost[0]
         raise_first(values)
@@ -499,8 +489,8 @@ async def _open(
 async def _set_velocities(axes: list[LoopAxis]) -> None:
     """Procedure: send the velocity of these wheels, unless a stop has taken them."""
     for one in axes:
-        if one.owner == one.axis.status.owner:
-            await one.axis.driver.set_velocity(one.axis.device, one.sent * one.axis.config.ratio)
+        if one.owner == one.status.owner:
+            await one.axis.driver.set_velocity(one.axis.device, one.sent * one.config.ratio)
 
 
 async def start_axes(bus: BaseBus, axes: list[Axis], health: HealthMonitor) -> None:

@@ -36,7 +36,7 @@ WHEEL_EXITS: Final = ("stop", "torque_off", "leave")
 class Quantity(float):
     """A number in API units, written as text with a unit of one of these `kinds`."""
 
-    kinds: ClassVar[tuple[str, ...]] = ()
+    kinds: ClassVar[tuple[str, ...]]
     counts: ClassVar[bool] = False  # `raw` is a unit, too
     above_zero: ClassVar[bool] = False
     kind: str

@@ -9,15 +9,15 @@ from typing import Any, Final, NamedTuple
 from motorbus.bus.base import BaseBus
 from motorbus.core.family import SelfTimedMove
 from motorbus.core.request import Request
-from motorbus.core.steps import Guard, Sleep, catch, gather
+from motorbus.core.steps import Guard, Sleep, catch
 from motorbus.errors import LimitExceeded, MotionError, MotorbusError, NotHomed, RequestError, Stalled
+from motorbus.motion_new.axis import Axis, by_bus, on_axes
 from motorbus.motion_new.commands import AxisResult, LoopResult, MoveResult, StopResult, StopState
-from motorbus.motion_new.health import HealthMonitor
 from motorbus.motion_new.loop import ControlLoop, LoopState, start_axes
 from motorbus.motion_new.machine import Names
 from motorbus.motion_new.profile import Kind, Limits, Move, Synchronized, synchronize
 from motorbus.motion_new.program import Exchange, OnBuses, raise_first
-from motorbus.motion_new.state import Axis, OpenMachine, by_bus, on_axes
+from motorbus.motion_new.state import OpenMachine
 
 TOLERANCE: Final = 0.05  # rad of the device; a servo under load stays 30 counts off its goal (user reports)
 SETTLE_TIME: Final = 1.0  # s after the end of the profile within which an axis must be in position
@@ -56,7 +56,6 @@ def add_notes(error: BaseException, results: Mapping[str, Any]) -> None:
 
 async def move(
     machine: OpenMachine,
-    health: HealthMonitor,
     goals: Mapping[str, float],
     *,
     duration: float | None = None,
@@ -73,16 +72,14 @@ async def move(
     RequestError, LimitExceeded, NotHomed before anything moves; Stalled, NoReply, Faulted, Overloaded, Interrupted when
     all have been told to stop.
     """
-    axes = [axis for name in goals for axis in machine.chosen(name)]
-    if {axis.name for axis in axes} != set(goals):
-        raise RequestError("a move names axes", expected=", ".join(machine.axes))
+    axes = [machine.axis(name) for name in goals]
     if not (isfinite(speed) and 0 < speed <= 1):
         raise RequestError(f"speed {speed}", expected="above 0, at most 1")
     for axis in axes:
         _check_goal(axis, goals[axis.name], relative=relative)
     led = [axis for axis in axes if axis.follows_setpoints]
     timed = [axis for axis in axes if axis not in led]
-    loop = ControlLoop(machine, health, [axis.name for axis in led], direct=True) if led else None
+    loop = ControlLoop(machine, [axis.name for axis in led], direct=True) if led else None
     async with StopsIfInterrupted(machine, axes):
         try:
             if loop is not None:
@@ -93,6 +90,14 @@ async def move(
         finally:
             if loop is not None:
                 loop.close()
+
+
+async def pose(machine: OpenMachine, name: str, **options: Any) -> MoveResult:
+    """Move to a pose of the machine file. Options and errors as for `move`."""
+    poses = machine.config.poses
+    if name not in poses:
+        raise RequestError(f"no pose {name!r}", expected=f"one of {', '.join(poses) or 'none'}")
+    return await move(machine, poses[name], **options)
 
 
 def _check_goal(axis: Axis, goal: float, *, relative: bool) -> None:
@@ -265,14 +270,14 @@ async def _check_lag(loop: ControlLoop, course: Course, elapsed: float) -> None:
     wanted = course.positions(elapsed)
     for name, peak in course.peaks.items():
         axis = loop.axes[name]
-        most = max(LAG, LAG_TIME * peak * abs(axis.axis.config.ratio))
+        most = max(LAG, LAG_TIME * peak * abs(axis.config.ratio))
         if not axis.missed and _error(loop, name, wanted[name]) > most:
             raise await _stalled(loop, name, f"does not follow: it should be at {axis.show(wanted[name])}")
 
 
 async def _stalled(loop: ControlLoop, name: str, what: str) -> MotionError:
     axis = loop.axes[name].axis
-    await loop.health.examine(axis)
+    await loop.machine.health.examine(axis)
     return Stalled(
         f"{name} {what}, it is at {axis.config.show(loop.axes[name].position)}",
         cause="something blocks it, the load is too heavy, or it is slower than max_velocity",
@@ -283,7 +288,7 @@ async def _stalled(loop: ControlLoop, name: str, what: str) -> MotionError:
 
 def _error(loop: ControlLoop, name: str, goal: float) -> float:
     axis = loop.axes[name]
-    return abs((axis.position - goal) * axis.axis.config.ratio)
+    return abs((axis.position - goal) * axis.config.ratio)
 
 
 # -- jog, home, run --------------------------------------------------------------------------------------------
@@ -291,7 +296,6 @@ def _error(loop: ControlLoop, name: str, goal: float) -> float:
 
 async def jog(
     machine: OpenMachine,
-    health: HealthMonitor,
     name: str,
     velocity: float,
     seconds: float | None = None,
@@ -301,9 +305,7 @@ async def jog(
 
     A position axis stops at its limits. A wheel needs a lease, for its motion has no end of its own.
     """
-    (axis,) = machine.chosen(name) if name in machine.axes else [None]
-    if axis is None:
-        raise RequestError(f"no axis {name!r}", expected=", ".join(machine.axes))
+    axis = machine.axis(name)
     config = axis.config
     if not 0 < abs(velocity) <= config.max_velocity:
         raise LimitExceeded(
@@ -312,7 +314,7 @@ async def jog(
     check_seconds(seconds)
     if not axis.follows_setpoints:
         return await _jog_self_timed(machine, axis, velocity, seconds)
-    loop = ControlLoop(machine, health, [name], policy="clamp")
+    loop = ControlLoop(machine, [name], policy="clamp")
     async with StopsIfInterrupted(machine, [axis]), Running(loop):
         led = loop.axes[name]
         end = led.high if velocity > 0 else led.low
@@ -377,7 +379,7 @@ async def home(machine: OpenMachine, names: Names = None, timeout: float = 30.0)
 
 async def run_stored(machine: OpenMachine, name: str, number: int, timeout: float | None = None) -> str:
     """Run a stored program of the device of an axis; its position is unknown then."""
-    (axis,) = machine.chosen(name)
+    axis = machine.axis(name)
     axis.require("run")
     axis.status.claim()
     axis.status.estimate = None
@@ -412,20 +414,9 @@ async def stop(machine: OpenMachine, names: Names = None, *, verify: bool = Fals
 
 async def stop_axes(axes: list[Axis]) -> dict[str, Any]:
     """Program: stop these axes, all at the same time; gives the StopState or the error of each."""
-
-    async def stop_all(members: list[Axis]) -> dict[str, Any]:
-        results = await gather(*[catch(_stop(axis)) for axis in members])
-        return {axis.name: result for axis, result in zip(members, results, strict=True)}
-
     for axis in axes:
         axis.status.stopped()
-    groups = by_bus(axes)
-    values = await OnBuses({bus: stop_all(members) for bus, members in groups.items()}) if groups else {}
-    found: dict[str, Any] = {}
-    for bus, members in groups.items():
-        value = values[bus]
-        found |= value if isinstance(value, dict) else {axis.name: value for axis in members}
-    return found
+    return await on_axes(axes, _stop)
 
 
 async def _stop(axis: Axis) -> StopState:
@@ -457,9 +448,7 @@ async def _watch_rest(axis: Axis) -> bool | None:
     return False
 
 
-async def switch_torque(
-    machine: OpenMachine, health: HealthMonitor, on: bool, names: Names = None
-) -> tuple[str, ...]:
+async def switch_torque(machine: OpenMachine, on: bool, names: Names = None) -> tuple[str, ...]:
     """Torque on without a jump, or off, for these axes; None means all that can. Gives their names."""
     axes = machine.chosen(names)
     able = [axis for axis in axes if (axis.follows_setpoints if on else "disable_torque" in axis.driver)]
@@ -468,7 +457,9 @@ async def switch_torque(
         raise RequestError(f"{others}: torque cannot be switched {'on' if on else 'off'}")
     groups = by_bus(able)
     if on:
-        raise_first(await OnBuses({bus: start_axes(bus, members, health) for bus, members in groups.items()}))
+        raise_first(
+            await OnBuses({bus: start_axes(bus, members, machine.health) for bus, members in groups.items()})
+        )
     else:
         raise_first(await release_torque(able))
     machine.publish()
@@ -483,7 +474,7 @@ async def release_torque(axes: list[Axis]) -> dict[str, Any]:
         await axis.driver.disable_torque(axis.device)
         axis.status.engaged = False
 
-    return await on_axes(axes, release) if axes else {}
+    return await on_axes(axes, release)
 
 
 # -- shared by the clients of the loop -------------------------------------------------------------------------

@@ -15,11 +15,12 @@ from motorbus.core.family import Identity
 from motorbus.core.steps import READABLE, catch, gather
 from motorbus.errors import MotorbusError, NoReply, RequestError
 from motorbus.link.memory import MemoryLink, share_clock
+from motorbus.motion_new.axis import Axis
 from motorbus.motion_new.describe import notes_of
 from motorbus.motion_new.gate import SafetyGate
 from motorbus.motion_new.machine import AxisConfig, BusConfig, MachineConfig, Names, Velocity
 from motorbus.motion_new.program import OnBuses, raise_first
-from motorbus.motion_new.state import Axis, OpenMachine
+from motorbus.motion_new.state import OpenMachine
 from motorbus.motion_new.status import AxisStatus
 from motorbus.session.address import parse_address
 from motorbus.session.keeping import unfinished

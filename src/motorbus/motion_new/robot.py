@@ -21,21 +21,21 @@ from os import PathLike
 from threading import Event, Thread
 from typing import Any, Final, Self
 
-from motorbus.bus.base import BaseBus
+from msgspec import structs
+
 from motorbus.bus.interrupts import Interrupts, interrupts
-from motorbus.core.steps import gather
-from motorbus.errors import MotorbusError, Refused, RequestError
+from motorbus.errors import Refused, RequestError
 from motorbus.motion_new import commands, moves, teach
+from motorbus.motion_new.axis import Axis
 from motorbus.motion_new.blocks import Attendance, Loop
 from motorbus.motion_new.commands import EStopResult, RobotCommand
 from motorbus.motion_new.describe import MachineDescription, describe
-from motorbus.motion_new.health import HealthMonitor
 from motorbus.motion_new.loop import ControlLoop, Policy
 from motorbus.motion_new.machine import MachineConfig, Names
 from motorbus.motion_new.opening import UNTRUSTED, bus_options, identify, machine_at, select
-from motorbus.motion_new.program import OnBuses, Program, drive, drive_async, raise_first
+from motorbus.motion_new.program import Program, drive, drive_async, raise_first, run
 from motorbus.motion_new.shutdown import Shutdown
-from motorbus.motion_new.state import Axis, OpenMachine, Subscription, poll, read_all
+from motorbus.motion_new.state import OpenMachine, Subscription, poll, read_axes
 from motorbus.motion_new.trajectory import Trajectory
 from motorbus.session import open as open_bus
 from motorbus.session import open_async
@@ -53,9 +53,8 @@ class RobotMethods(OpenMachine):
     def __init__(self, config: MachineConfig, axes: Names = None) -> None:
         super().__init__()
         self.config = select(config, axes)
-        self.health = HealthMonitor()
-        self._poller: Any = None
         self._whole = config
+        self._closed = Event()
 
     @classmethod
     def load(cls, path: str | PathLike[str] = "motorbus.toml", axes: Names = None) -> Self:
@@ -71,6 +70,10 @@ class RobotMethods(OpenMachine):
     def carry_out(self, program: Program[Any]) -> Any:
         """Run a program; gives its value, or what is awaited for it."""
 
+    @property
+    def _is_virtual(self) -> bool:
+        return any(bus.link.virtual for bus in self.buses.values())
+
     # -- state -----------------------------------------------------------------------------------------------------
 
     def describe(self) -> MachineDescription:
@@ -79,29 +82,14 @@ class RobotMethods(OpenMachine):
 
     def states(self, names: Names = None) -> Any:
         """Read these axes; gives their `AxisState` by name."""
-        return self.carry_out(self._read(names))
-
-    async def _read(self, names: Names) -> Any:
-        axes = self.chosen(names)
-        groups: dict[BaseBus, list[Axis]] = {}
-        for axis in axes:
-            if self.health.is_due(axis):
-                groups.setdefault(axis.bus, []).append(axis)
-        if groups:
-            await OnBuses(
-                {
-                    bus: gather(*[self.health.note(axis) for axis in members])
-                    for bus, members in groups.items()
-                }
-            )
-        return await read_all(self, names)
+        return self.carry_out(read_axes(self, names))
 
     def positions(self, names: Names = None) -> Any:
         """Read the positions (rad, m) of these axes, by name; None where a device reports none."""
         return self.carry_out(self._read_positions(names))
 
     async def _read_positions(self, names: Names) -> dict[str, float | None]:
-        states = await self._read(names)
+        states = await read_axes(self, names)
         return {name: state.position for name, state in states.items()}
 
     @property
@@ -120,7 +108,7 @@ class RobotMethods(OpenMachine):
 
     def set_position(self, name: str, position: float) -> None:
         """Declare the position (rad, m) of an axis whose device reports none. Sends nothing."""
-        (axis,) = self.chosen(name)
+        axis = self.axis(name)
         if "position" in axis.driver:
             raise RequestError(
                 f"{name}: its device reports its position", advice="calibrate its zero instead"
@@ -128,97 +116,34 @@ class RobotMethods(OpenMachine):
         moves.check_reach(axis, position)
         axis.status.estimate = axis.config.to_device(position)
 
+    def subscribe(self, *, rate: float | None = None, depth: int = 64) -> Subscription:
+        """All states from now on, at most `rate` per s: of loops, else of a poll ten times a second.
+
+        In virtual time nothing is polled.
+        """
+        if not self.subscriptions and not self._is_virtual:
+            Thread(target=self._poll, name="motorbus poller", daemon=True).start()
+        return super().subscribe(rate=rate, depth=depth)
+
+    def _poll(self) -> None:
+        while not self._closed.wait(POLL_PERIOD) and self.subscriptions:
+            if not self.loops:
+                with suppress(Exception):  # a bus that is gone, or closed meanwhile
+                    drive(poll(self))
+
     # -- commands --------------------------------------------------------------------------------------------------
 
     def program(self, command: RobotCommand) -> Program[Any]:
         """The program that carries out a command."""
-        health = self.health
-        match command:
-            case commands.Move(goals, duration, speed, kind, relative):
-                return moves.move(
-                    self, health, goals, duration=duration, speed=speed, kind=kind, relative=relative
-                )
-            case commands.Pose(name, duration, speed):
-                return moves.move(self, health, self._pose(name), duration=duration, speed=speed)
-            case commands.Jog(axis, velocity, seconds):
-                return moves.jog(self, health, axis, velocity, seconds)
-            case commands.Home(axes, timeout):
-                return moves.home(self, axes, timeout)
-            case commands.RunProgram(axis, number, timeout):
-                return moves.run_stored(self, axis, number, timeout)
-            case commands.Replay(file, speed, smooth, repeat, skip_others):
-                trajectory = Trajectory.load(file, self.config.axes, skip_others=skip_others)
-                return teach.replay(self, health, trajectory, speed=speed, smooth=smooth, repeat=repeat)
-            case commands.Teach():
-                return self._teach_file(command)
-            case commands.Follow(pairs, seconds, rate):
-                return teach.follow(self, health, pairs, seconds=seconds, rate=rate)
-            case commands.Torque(on, axes):
-                return moves.switch_torque(self, health, on, axes)
-            case commands.Stop(axes, verify):
-                return moves.stop(self, axes, verify=verify)
-            case commands.ReadRegisters(axis, registers):
-                return self._call(axis, "read", registers, {})
-            case commands.WriteRegisters(axis, values):
-                return self._call(axis, "write", (), values)
-            case commands.DeviceCommand(axis, name, arguments):
-                return self._call(axis, name, (), arguments)
-            case _:
-                return self._at_once(command)
-
-    async def _at_once(self, command: RobotCommand) -> None:
-        match command:
-            case commands.Reset():
-                self.reset()
-            case commands.ClearFault(axes):
-                self.clear_fault(axes)
-            case commands.SetPosition(axis, position):
-                self.set_position(axis, position)
-            case _:
-                raise RequestError(f"{command!r} is not a command of a robot")
-
-    def _pose(self, name: str) -> dict[str, float]:
-        if name not in self.config.poses:
-            raise RequestError(
-                f"no pose {name!r}", expected=f"one of {', '.join(self.config.poses) or 'none'}"
-            )
-        return self.config.poses[name]
-
-    async def _teach_file(self, command: commands.Teach) -> commands.LoopResult:
-        with open(command.file, "x") as file:  # refused before anything is recorded
-            recorded = await teach.teach(
-                self,
-                self.health,
-                command.axes,
-                seconds=command.seconds,
-                rate=command.rate,
-                keep_torque=command.keep_torque,
-            )
-            file.write(recorded.text(self.config.axes))
-        return commands.LoopResult(
-            recorded.duration,
-            len(recorded.times),
-            recorded.positions(recorded.duration),
-            notes=recorded.notes,
-        )
-
-    async def _call(self, name: str, function: str, given: Sequence[Any], named: Mapping[str, Any]) -> Any:
-        """Program: a driver function of the device of an axis."""
-        (axis,) = self.chosen(name)
-        method: Any = getattr(type(axis.device), function, None)
-        if not hasattr(method, "function"):
-            raise RequestError(f"{name}: {axis.config.device} has no command {function!r}")
-        value = (await OnBuses({axis.bus: method.function(axis.device, *given, **named)}))[axis.bus]
-        raise_first({name: value})
-        return value
+        return PROGRAMS[type(command)](self, **structs.asdict(command))
 
     def move(self, goals: Mapping[str, float], **options: Any) -> Any:
         """Move axes together; gives a `MoveResult`. See `moves.move`."""
-        return self.carry_out(moves.move(self, self.health, goals, **options))
+        return self.carry_out(moves.move(self, goals, **options))
 
     def pose(self, name: str, **options: Any) -> Any:
         """Move to a pose of the machine file; gives a `MoveResult`."""
-        return self.move(self._pose(name), **options)
+        return self.carry_out(moves.pose(self, name, **options))
 
     def jog(
         self,
@@ -228,7 +153,7 @@ class RobotMethods(OpenMachine):
         until: Callable[[], bool] | None = None,
     ) -> Any:
         """Move an axis at a velocity (rad/s, m/s), then brake; gives a `LoopResult`. See `moves.jog`."""
-        return self.carry_out(moves.jog(self, self.health, name, velocity, seconds, until))
+        return self.carry_out(moves.jog(self, name, velocity, seconds, until))
 
     def home(self, names: Names = None, *, timeout: float = 30.0) -> Any:
         """Move to the reference switches; gives the positions by name. Needs `attended()`."""
@@ -244,19 +169,19 @@ class RobotMethods(OpenMachine):
 
     def torque(self, on: bool, names: Names = None) -> Any:
         """Switch torque; on holds the present position. Gives the names of the axes."""
-        return self.carry_out(moves.switch_torque(self, self.health, on, names))
+        return self.carry_out(moves.switch_torque(self, on, names))
 
     def teach(self, names: Names = None, **how: Any) -> Any:
         """Record axes that are moved by hand; gives a `Trajectory`. See `teach.teach`."""
-        return self.carry_out(teach.teach(self, self.health, names, **how))
+        return self.carry_out(teach.teach(self, names, **how))
 
     def replay(self, trajectory: Trajectory, **how: Any) -> Any:
         """Play a trajectory; gives a `LoopResult`. See `teach.replay`."""
-        return self.carry_out(teach.replay(self, self.health, trajectory, **how))
+        return self.carry_out(teach.replay(self, trajectory, **how))
 
     def follow(self, pairs: Mapping[str, str], **how: Any) -> Any:
         """Let axes track others, `{leader: follower}`; gives a `LoopResult`. See `teach.follow`."""
-        return self.carry_out(teach.follow(self, self.health, pairs, **how))
+        return self.carry_out(teach.follow(self, pairs, **how))
 
     # -- emergency stop --------------------------------------------------------------------------------------------
 
@@ -273,18 +198,16 @@ class RobotMethods(OpenMachine):
             else:
                 found[name] = EStopResult(outcome.acknowledged, outcome.silent, outcome.promise)
 
-        threads = []
-        for name, bus in self.buses.items():
-            thread = None if bus.link.virtual else Thread(target=stop, args=(name,), daemon=True)
-            try:
-                if thread is None:
-                    raise RuntimeError
-                thread.start()
-                threads.append(thread)
-            except RuntimeError:  # virtual time, or no thread is left
+        threads = {name: Thread(target=stop, args=(name,), daemon=True) for name in self.buses}
+        for thread in threads.values():
+            with suppress(RuntimeError):  # the system has no more threads
+                if not self._is_virtual:
+                    thread.start()
+        for name, thread in threads.items():
+            if thread.ident is None:
                 stop(name)
-        for thread in threads:
-            thread.join()
+            else:
+                thread.join()
         return {name: found[name] for name in self.buses}
 
     def trigger_estop(self) -> None:
@@ -308,7 +231,7 @@ class RobotMethods(OpenMachine):
         direct: bool = False,
     ) -> Loop:
         """A control loop of these axes, at `rate` Hz. See `ControlLoop`."""
-        loop = ControlLoop(self, self.health, names, rate=rate, policy=policy, direct=direct)
+        loop = ControlLoop(self, names, rate=rate, policy=policy, direct=direct)
         return Loop(loop, self.carry_out)
 
     def attended(self, seconds: float = inf) -> Attendance:
@@ -321,15 +244,79 @@ class RobotMethods(OpenMachine):
 
     # -- the end ---------------------------------------------------------------------------------------------------
 
-    def _report(self, ending: Shutdown, error: BaseException | None) -> None:
-        """Tell what the end did not achieve: as notes of the error that ends the program, else raise."""
-        self.warnings += ending.notes
-        for note in ending.notes:
-            LOG.warning("%s", note)
-            if error is not None:
-                error.add_note(note)
+    def shutdown(self) -> Any:
+        """Graceful stop: decelerate, hold, go to the pose `park` if there is one, torque off.
+
+        A second Ctrl-C, or a cancellation, releases at once. What failed is in `warnings`.
+        """
+        return self.carry_out(self._leave(None, graceful=True))
+
+    async def _leave(self, error: BaseException | None, *, graceful: bool = False) -> None:
+        """Program: the end. What it did not achieve is a note of `error`, which ends the program, else is raised."""
+        ending = Shutdown(self, graceful=graceful)
+        try:
+            await ending.run()
+        except BaseException as interrupt:
+            error = error or interrupt
+            raise
+        finally:
+            self.warnings += ending.notes
+            for note in ending.notes:
+                LOG.warning("%s", note)
+                if error is not None:
+                    error.add_note(note)
         if error is None:
             raise_first(ending.errors)
+
+
+async def call_device(robot: OpenMachine, name: str, function: str, arguments: Mapping[str, Any]) -> Any:
+    """Program: a driver function of the device of an axis."""
+    return await _call(robot.axis(name), function, (), arguments)
+
+
+async def read_registers(robot: OpenMachine, name: str, registers: Sequence[str]) -> Any:
+    """Program: registers of the device of an axis, by name."""
+    return await _call(robot.axis(name), "read", registers, {})
+
+
+async def write_registers(robot: OpenMachine, name: str, values: Mapping[str, float]) -> Any:
+    """Program: write registers of the device of an axis."""
+    return await _call(robot.axis(name), "write", (), values)
+
+
+async def _call(axis: Axis, function: str, given: Sequence[Any], named: Mapping[str, Any]) -> Any:
+    method: Any = getattr(type(axis.device), function, None)
+    if not hasattr(method, "function"):
+        raise RequestError(f"{axis.name}: {axis.config.device} has no command {function!r}")
+    return await run(axis.bus, method.function(axis.device, *given, **named))
+
+
+def _at_once(method: Callable[..., Any]) -> Callable[..., Program[Any]]:
+    async def program(robot: RobotMethods, **fields: Any) -> Any:
+        return method(robot, **fields)
+
+    return program
+
+
+PROGRAMS: Final[Mapping[type, Callable[..., Program[Any]]]] = {
+    commands.Move: moves.move,
+    commands.Pose: moves.pose,
+    commands.Jog: moves.jog,
+    commands.Home: moves.home,
+    commands.RunProgram: moves.run_stored,
+    commands.Replay: teach.replay_file,
+    commands.Teach: teach.teach_file,
+    commands.Follow: teach.follow,
+    commands.Torque: moves.switch_torque,
+    commands.Stop: moves.stop,
+    commands.EStop: _at_once(RobotMethods.estop),
+    commands.Reset: _at_once(RobotMethods.reset),
+    commands.SetPosition: _at_once(RobotMethods.set_position),
+    commands.ClearFault: _at_once(RobotMethods.clear_fault),
+    commands.ReadRegisters: read_registers,
+    commands.WriteRegisters: write_registers,
+    commands.DeviceCommand: call_device,
+}
 
 
 # -- blocking --------------------------------------------------------------------------------------------------
@@ -341,7 +328,6 @@ class Robot(RobotMethods):
     def __init__(self, config: MachineConfig, axes: Names = None) -> None:
         super().__init__(config, axes)
         self._stack = ExitStack()
-        self._closed = Event()
         self._signals: Interrupts | None = None
         with ExitStack() as stack:
             for name, bus in self.config.buses.items():
@@ -356,33 +342,7 @@ class Robot(RobotMethods):
 
     def execute(self, command: RobotCommand) -> Any:
         """Carry out a command and give its result."""
-        return self.estop() if isinstance(command, commands.EStop) else drive(self.program(command))
-
-    def subscribe(self, *, rate: float | None = None, depth: int = 64) -> Subscription:
-        """All states from now on, at most `rate` per s: of loops, else of a poll ten times a second.
-
-        In virtual time nothing is polled.
-        """
-        if not self.subscriptions and not any(bus.link.virtual for bus in self.buses.values()):
-            Thread(target=self._poll, name="motorbus poller", daemon=True).start()
-        return super().subscribe(rate=rate, depth=depth)
-
-    def _poll(self) -> None:
-        while not self._closed.wait(POLL_PERIOD) and self.subscriptions:
-            if not self.loops:
-                with suppress(Exception):  # a bus that is gone, or closed meanwhile
-                    drive(poll(self))
-
-    def shutdown(self) -> Shutdown:
-        """Graceful stop: decelerate, hold, go to the pose `park` if there is one, torque off. Then close it.
-
-        A second Ctrl-C releases at once. Gives errors and notes.
-        """
-        ending = Shutdown(self, self.health, graceful=True)
-        interrupted = self._carry_out(ending)
-        if interrupted is not None:
-            raise interrupted
-        return ending
+        return drive(self.program(command))
 
     def close(self) -> None:
         """Leave each axis as the machine file says, and give the ports back."""
@@ -400,34 +360,13 @@ class Robot(RobotMethods):
         if self._closed.is_set():
             return
         with interrupts():
-            interrupted: BaseException | None = None
             try:
-                ending = Shutdown(self, self.health)
-                interrupted = self._carry_out(ending)
-                self._report(ending, error or interrupted)
+                drive(self._leave(error))
             finally:
                 self._closed.set()
                 self._stack.close()
                 if self._signals is not None:
                     self._signals.cleanups -= 1
-            if interrupted is not None:
-                raise interrupted
-
-    def _carry_out(self, ending: Shutdown) -> BaseException | None:
-        """Run all programs of the end; gives the first signal that came meanwhile."""
-        interrupted: BaseException | None = None
-        while True:
-            try:
-                interrupts().raise_pending()
-                program = ending.next()
-                if program is None:
-                    return interrupted
-                drive(program)
-            except BaseException as signal:
-                if isinstance(signal, Exception) and not isinstance(signal, MotorbusError):
-                    raise
-                interrupted = interrupted or signal
-                ending.hurry()
 
 
 # -- asyncio ---------------------------------------------------------------------------------------------------
@@ -441,36 +380,11 @@ class AsyncRobot(RobotMethods):
 
     async def execute(self, command: RobotCommand) -> Any:
         """Carry out a command and give its result."""
-        if isinstance(command, commands.EStop):
-            return self.estop()
+        if isinstance(command, commands.EStop) and not self._is_virtual:
+            from asyncio import to_thread
+
+            return await to_thread(self.estop)
         return await drive_async(self.program(command))
-
-    def subscribe(self, *, rate: float | None = None, depth: int = 64) -> Subscription:
-        """All states from now on, see `Robot.subscribe`."""
-        import asyncio
-
-        if not self.subscriptions and not any(bus.link.virtual for bus in self.buses.values()):
-            self._poller = asyncio.create_task(self._poll())
-        return super().subscribe(rate=rate, depth=depth)
-
-    async def _poll(self) -> None:
-        import asyncio
-
-        while True:
-            await asyncio.sleep(POLL_PERIOD)
-            if not self.subscriptions:
-                return
-            if not self.loops:
-                with suppress(MotorbusError):
-                    await drive_async(poll(self))
-
-    async def shutdown(self) -> Shutdown:
-        """Graceful stop, see `Robot.shutdown`. A cancellation releases at once."""
-        ending = Shutdown(self, self.health, graceful=True)
-        interrupted = await self._carry_out(ending)
-        if interrupted is not None:
-            raise interrupted
-        return ending
 
     async def __aenter__(self) -> Self:
         from motorbus.bus.aio import TaskSignals
@@ -485,30 +399,9 @@ class AsyncRobot(RobotMethods):
         return self
 
     async def __aexit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        interrupted: BaseException | None = None
         try:
-            if self._poller is not None:
-                self._poller.cancel()
-            ending = Shutdown(self, self.health)
-            interrupted = await self._carry_out(ending)
-            self._report(ending, error or interrupted)
+            await self.carry_out(self._leave(error))
         finally:
+            self._closed.set()
             await self._stack.aclose()
             self._signals.end()
-        if interrupted is not None:
-            raise interrupted
-
-    async def _carry_out(self, ending: Shutdown) -> BaseException | None:
-        """Run all programs of the end; gives the first cancellation that came meanwhile."""
-        interrupted: BaseException | None = None
-        while (program := ending.next()) is not None:
-            try:
-                await drive_async(program)
-            except GeneratorExit:
-                raise
-            except BaseException as signal:
-                if isinstance(signal, Exception) and not isinstance(signal, MotorbusError):
-                    raise
-                interrupted = interrupted or signal
-                ending.hurry()
-        return interrupted

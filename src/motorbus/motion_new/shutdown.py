@@ -11,10 +11,10 @@ from typing import Any, Final
 
 from motorbus.core.steps import Sleep, catch
 from motorbus.errors import MotorbusError
-from motorbus.motion_new.health import HealthMonitor
+from motorbus.motion_new.axis import Axis, on_axes
 from motorbus.motion_new.moves import STILL, move, release_torque, stop_axes
 from motorbus.motion_new.program import Program
-from motorbus.motion_new.state import Axis, OpenMachine, on_axes
+from motorbus.motion_new.state import OpenMachine
 
 REST_WAIT: Final = 0.5  # s
 PERIOD: Final = 0.02  # s
@@ -22,17 +22,15 @@ PARK_SPEED: Final = 0.5  # share of the velocity of each axis
 
 
 class Shutdown:
-    """What is to be done before a machine is closed: run the programs of `next`, until it gives None.
+    """What is done before a machine is closed. `errors` by name of the axis; `notes` are for the user.
 
-    `hurry` is called after an interrupt. `errors` by name of the axis; `notes` are for the user. With `graceful` each
-    axis with torque goes to the pose `park`, if there is one, and is released, whatever the machine file says.
+    With `graceful` each axis with torque goes to the pose `park`, if there is one, and is released.
     """
 
-    def __init__(self, machine: OpenMachine, health: HealthMonitor, *, graceful: bool = False) -> None:
+    def __init__(self, machine: OpenMachine, *, graceful: bool = False) -> None:
         self.errors: dict[str, MotorbusError] = {}
         self.notes: list[str] = []
         self._machine = machine
-        self._health = health
         self._park = machine.config.poses.get("park", {})
         self._actions = {
             name: self._graceful_action(axis) if graceful else axis.config.exit_action
@@ -47,15 +45,21 @@ class Shutdown:
             return "park, torque_off"
         return "torque_off" if "disable_torque" in axis.driver else "hold"
 
-    def next(self) -> Program[Any] | None:
-        """The next program; None when all is done."""
-        return self._steps.pop(0)() if self._steps else None
-
-    def hurry(self) -> None:
-        """Wait for nothing and park nothing from now on; stop and release once more."""
-        if not self._hurried:
-            self._hurried = True
-            self._steps = [self._stop, self._release]
+    async def run(self) -> None:
+        """Program: all of it. A signal or cancellation shortens it, and is raised at the end."""
+        interrupt: BaseException | None = None
+        while self._steps:
+            try:
+                await self._steps.pop(0)()
+            except (Exception, GeneratorExit):
+                raise
+            except BaseException as signal:
+                if interrupt is None:
+                    self._steps = [self._stop, self._release]
+                interrupt = interrupt or signal
+                self._hurried = True
+        if interrupt is not None:
+            raise interrupt
 
     def _with(self, action: str) -> list[Axis]:
         axes = self._machine.axes
@@ -89,7 +93,7 @@ class Shutdown:
             return
         goals = {axis.name: self._park[axis.name] for axis in parked}
         try:
-            await move(self._machine, self._health, goals, speed=PARK_SPEED)
+            await move(self._machine, goals, speed=PARK_SPEED)
         except MotorbusError as error:
             self._note("park", dict.fromkeys(goals, error))
 

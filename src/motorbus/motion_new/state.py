@@ -3,64 +3,21 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
 from threading import Condition
 from typing import Any, Final
 
 from msgspec import Struct
 
 from motorbus.bus.base import BaseBus
-from motorbus.core.family import AxisDriver, State
-from motorbus.core.steps import catch
+from motorbus.core.family import State
 from motorbus.errors import RequestError
+from motorbus.motion_new.axis import Axis, on_axes, read_state
 from motorbus.motion_new.gate import SafetyGate
+from motorbus.motion_new.health import HealthMonitor
 from motorbus.motion_new.lease import Lease
-from motorbus.motion_new.machine import AxisConfig, MachineConfig, Names
-from motorbus.motion_new.program import OnBuses, raise_first
-from motorbus.motion_new.status import AxisStatus
-
-
-@dataclass(slots=True, eq=False)
-class Axis:
-    """One axis: its configuration, its device and what that can do, what is known of it.
-
-    `limits` are those of the device (rad); `top_velocity` is what its model can do (rad/s of the device), None if
-    unknown.
-    """
-
-    name: str
-    config: AxisConfig
-    bus: BaseBus
-    device: Any
-    driver: AxisDriver
-    status: AxisStatus
-    model: str = ""
-    limits: tuple[float, float] | None = None
-    top_velocity: float | None = None
-
-    def require(self, *capabilities: str) -> None:
-        """Raise RequestError if its device lacks one of these functions."""
-        for capability in capabilities:
-            if capability not in self.driver:
-                raise RequestError(
-                    f"{self.name}: {self.config.device} has no {capability.replace('_', ' ')}",
-                    node=self.config.node,
-                )
-
-    @property
-    def follows_setpoints(self) -> bool:
-        """A control loop can lead it."""
-        return ("set_velocity" if self.config.is_wheel else "stream") in self.driver
-
-    @property
-    def range(self) -> tuple[float, float]:
-        """Lowest and highest position (rad, m), by file and device."""
-        low, high = self.status.low, self.status.high
-        if self.limits is not None:
-            low, high = max(low, self.limits[0]), min(high, self.limits[1])
-        ends = self.config.from_device(low), self.config.from_device(high)
-        return min(ends), max(ends)
+from motorbus.motion_new.machine import MachineConfig, Names, nearest
+from motorbus.motion_new.program import raise_first
 
 
 class AxisState(Struct, frozen=True):
@@ -133,6 +90,7 @@ class OpenMachine:
         self.buses: dict[str, Any] = {}
         self.axes: dict[str, Axis] = {}
         self.gates: dict[BaseBus, SafetyGate] = {}
+        self.health = HealthMonitor()
         self.targets: dict[str, float] = {}
         self.warnings: list[str] = []
         self.loops = 0  # control loops that publish states at present
@@ -159,6 +117,12 @@ class OpenMachine:
         if not self.axes:
             raise RequestError("the machine is not open", advice="use `with Robot.load(…)`")
         return [self.axes[name] for name in self.config.axes_of(names)]
+
+    def axis(self, name: str) -> Axis:
+        """The axis of this name. Raises RequestError."""
+        if name not in self.axes:
+            raise RequestError(f"no axis {name!r}", advice=nearest(name, self.axes))
+        return self.axes[name]
 
     def publish(self) -> None:
         """Give the state of this moment to all subscribers."""
@@ -207,52 +171,10 @@ class OpenMachine:
         self.subscriptions.remove(subscription)
 
 
-def by_bus(axes: list[Axis]) -> dict[BaseBus, list[Axis]]:
-    """Axes by their bus."""
-    found: dict[BaseBus, list[Axis]] = {}
-    for axis in axes:
-        found.setdefault(axis.bus, []).append(axis)
-    return found
-
-
-async def on_axes(axes: list[Axis], visit: Any) -> dict[str, Any]:
-    """Run the procedure `visit(axis)` of each axis, all buses at the same time; the value or error of each by name."""
-
-    async def visit_all(members: list[Axis]) -> dict[str, Any]:
-        return {axis.name: await catch(visit(axis)) for axis in members}
-
-    groups = by_bus(axes)
-    values = await OnBuses({bus: visit_all(members) for bus, members in groups.items()})
-    found: dict[str, Any] = {}
-    for bus, members in groups.items():
-        value = values[bus]
-        found |= value if isinstance(value, dict) else {axis.name: value for axis in members}
-    return found
-
-
-async def read_state(axis: Axis) -> None:
-    """Procedure: read all that the device reports into its status."""
-    status = axis.status
-    if "state" in axis.driver:
-        state = await axis.driver.state(axis.device)
-        status.state = state
-        if state.position is not None:
-            status.take(state.position, state.at)
-    elif "position" in axis.driver:
-        await read_position(axis)
-
-
-async def read_position(axis: Axis) -> None:
-    """Procedure: read the position into its status; a suspect one is read again."""
-    for _ in range(3):
-        angle = await axis.driver.position(axis.device)
-        if axis.status.take(angle, axis.bus.now()):
-            return
-
-
-async def read_all(machine: OpenMachine, names: Names = None) -> Mapping[str, AxisState]:
+async def read_axes(machine: OpenMachine, names: Names = None) -> dict[str, AxisState]:
     """Program: read these axes; gives their state. Raises the first error of one, after all were visited."""
     axes = machine.chosen(names)
+    await on_axes([axis for axis in axes if machine.health.is_due(axis)], machine.health.note)
     raise_first(await on_axes(axes, read_state))
     machine.publish()
     state = machine.snapshot()

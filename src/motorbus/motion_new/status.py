@@ -25,24 +25,9 @@ class AxisStatus:
     """
 
     __slots__ = (
-        "at",
-        "config",
-        "endless",
-        "engaged",
-        "estimate",
-        "fault",
-        "high",
-        "low",
-        "moving",
-        "name",
-        "node",
-        "owner",
-        "position",
-        "read",
-        "response",
-        "state",
-        "suspect",
-    )
+        "at", "config", "endless", "engaged", "estimate", "fault", "high", "low", "moving", "name", "node", "owner",
+        "position", "read", "response", "state", "suspect",
+    )  # fmt: skip
 
     def __init__(self, name: str, config: AxisConfig) -> None:
         self.name: Final = name

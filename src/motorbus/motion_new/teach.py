@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from itertools import pairwise
-from typing import Final
+from pathlib import Path
+from typing import Any, Final
 
 from motorbus.errors import MotorbusError, RequestError
+from motorbus.motion_new.axis import Axis
 from motorbus.motion_new.commands import LoopResult
-from motorbus.motion_new.health import HealthMonitor
 from motorbus.motion_new.loop import ControlLoop, Policy
 from motorbus.motion_new.machine import Names
 from motorbus.motion_new.moves import (
@@ -24,7 +25,7 @@ from motorbus.motion_new.moves import (
     release_torque,
 )
 from motorbus.motion_new.program import raise_first
-from motorbus.motion_new.state import Axis, OpenMachine
+from motorbus.motion_new.state import OpenMachine
 from motorbus.motion_new.trajectory import MOST, Interpolation, Trajectory
 
 NEAR: Final = 0.005  # rad of the device that an axis may be off the start of a trajectory
@@ -32,7 +33,6 @@ NEAR: Final = 0.005  # rad of the device that an axis may be off the start of a 
 
 async def teach(
     machine: OpenMachine,
-    health: HealthMonitor,
     names: Names = None,
     *,
     seconds: float | None = None,
@@ -50,7 +50,7 @@ async def teach(
     axes = _taught(machine, names, keep_torque=keep_torque)
     if not keep_torque:
         raise_first(await release_torque(axes))
-    loop = ControlLoop(machine, health, [axis.name for axis in axes], rate=rate)
+    loop = ControlLoop(machine, [axis.name for axis in axes], rate=rate)
     recording = _Recording(axes)
     try:
         async with Running(loop):
@@ -108,7 +108,6 @@ class _Recording:
 
 async def replay(
     machine: OpenMachine,
-    health: HealthMonitor,
     trajectory: Trajectory,
     *,
     speed: float = 1.0,
@@ -130,7 +129,7 @@ async def replay(
     axes = machine.chosen(names)
     if smooth is not None:
         trajectory = trajectory.smoothed(smooth)
-    loop = ControlLoop(machine, health, names, rate=rate, direct=True)
+    loop = ControlLoop(machine, names, rate=rate, direct=True)
     async with StopsIfInterrupted(machine, axes):
         try:
             await loop.enter()
@@ -141,13 +140,13 @@ async def replay(
                     check_reach(axis, place)
             begun = machine.now()
             for _ in range(repeat):
-                await _play(machine, health, loop, goals)
+                await _play(machine, loop, goals)
         finally:
             loop.close()
     return loop_result(loop, machine.now() - begun, notes=trajectory.notes)
 
 
-async def _play(machine: OpenMachine, health: HealthMonitor, loop: ControlLoop, goals: Trajectory) -> None:
+async def _play(machine: OpenMachine, loop: ControlLoop, goals: Trajectory) -> None:
     start = goals.positions(0.0)
     far = {
         name: place
@@ -155,7 +154,7 @@ async def _play(machine: OpenMachine, health: HealthMonitor, loop: ControlLoop, 
         if abs(place - loop.axes[name].position) * abs(machine.axes[name].config.ratio) > NEAR
     }
     if far:
-        await move(machine, health, far)
+        await move(machine, far)
         await loop.read()
         for axis in loop.axes.values():
             axis.release()
@@ -171,7 +170,6 @@ async def _play(machine: OpenMachine, health: HealthMonitor, loop: ControlLoop, 
 
 async def follow(
     machine: OpenMachine,
-    health: HealthMonitor,
     pairs: Mapping[str, str],
     *,
     seconds: float | None = None,
@@ -190,13 +188,13 @@ async def follow(
     if not pairs or len(set(names)) < len(names):
         raise RequestError("each axis is in one pair", expected="{leader: follower}")
     for leader, follower in pairs.items():
-        first, second = (machine.chosen(name)[0].config for name in (leader, follower))
+        first, second = (machine.axis(name).config for name in (leader, follower))
         if bool(first.travel) != bool(second.travel) or first.is_wheel or second.is_wheel:
             raise RequestError(f"{follower} cannot follow {leader}: they measure different things")
     raise_first(
         await release_torque([one for one in machine.chosen(leaders) if "disable_torque" in one.driver])
     )
-    loop = ControlLoop(machine, health, names, rate=rate, policy=policy)
+    loop = ControlLoop(machine, names, rate=rate, policy=policy)
     held = dict.fromkeys(followers, 0)
     async with StopsIfInterrupted(machine, machine.chosen(followers)), Running(loop):
         begun = machine.now()
@@ -208,3 +206,19 @@ async def follow(
                 else:
                     loop.set_target(follower, state.position[leader])
     return loop_result(loop, machine.now() - begun, {name: count for name, count in held.items() if count})
+
+
+async def replay_file(
+    machine: OpenMachine, file: str, *, skip_others: bool = False, **options: Any
+) -> LoopResult:
+    """Play a trajectory file. Options and errors as for `Trajectory.load` and `replay`."""
+    trajectory = Trajectory.load(file, machine.config.axes, skip_others=skip_others)
+    return await replay(machine, trajectory, **options)
+
+
+async def teach_file(machine: OpenMachine, file: str, **options: Any) -> LoopResult:
+    """Record into a new file. Options and errors as for `teach`."""
+    with Path(file).open("x") as opened:  # refused before anything is recorded
+        made = await teach(machine, **options)
+        opened.write(made.text(machine.config.axes))
+    return LoopResult(made.duration, len(made.times), made.positions(made.duration), notes=made.notes)
