@@ -77,7 +77,7 @@ STEP = {"max_step": Step(0.2, "position")}
 TABLE: list[tuple[dict[str, Any], dict[str, Any], Request[Any], str]] = [
     # keys of the axis, what is known of it, request, reason ("" passes)
     ({}, {}, goal(0.9), ""),
-    ({}, {}, goal(1.0 + 1e-12), ""),
+    ({}, {}, goal(1.0026), ""),  # the next count of the device
     ({}, {}, goal(1.01), "limits"),
     ({}, {}, goal(-1.01, speed=1.0), "limits"),
     ({}, {}, goal(nan), "limits"),

@@ -13,11 +13,11 @@ from motorbus.core.setpoint import Setpoint, Stays
 from motorbus.core.steps import Runnable
 from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, NotHomed, Refused
 from motorbus.motion_new.lease import Lease, lease_lost
-from motorbus.motion_new.machine import SLACK
 from motorbus.motion_new.status import FRESH, AxisStatus
 
 LEAD_TIME: Final = 0.8  # s at the maximum velocity that a goal without a speed may be away
 NEAR: Final = 0.1  # rad that any goal may be away
+COUNT: Final = 0.0027  # rad; a device rounds a goal to its counts, the coarsest are 0.0051 rad apart
 SPEED_SLACK: Final = 0.01
 SPEED_UNIT: Final = 0.08
 """rad/s; a device rounds a speed up to its unit, so a legal speed never becomes illegal (50 counts/s of an STS)."""
@@ -76,9 +76,10 @@ def within_limits(gate: SafetyGate, axis: AxisStatus, setpoint: Setpoint, now: f
         goal += here
     elif setpoint.quantity != "position":
         return None
-    low = axis.low if setpoint.low is None else max(axis.low, setpoint.low)
-    high = axis.high if setpoint.high is None else min(axis.high, setpoint.high)
-    if low - SLACK <= goal <= high + SLACK:
+    low, high = axis.low, axis.high
+    if setpoint.low is not None and setpoint.high is not None:
+        low, high = max(low, setpoint.low), min(high, setpoint.high)
+    if low - COUNT <= goal <= high + COUNT:
         return None
     if here is not None and (here <= goal <= low or high <= goal <= here):
         return None
@@ -96,7 +97,7 @@ def within_step(gate: SafetyGate, axis: AxisStatus, setpoint: Setpoint, now: flo
     most = inf if config.max_step is None else abs(config.max_step * config.ratio)
     if axis.node not in gate.paced:
         most = min(most, LEAD_TIME * abs(config.max_velocity * config.ratio) + NEAR)
-    if distance <= most + SLACK:
+    if distance <= most + COUNT:
         return None
     far, allowed = (config.show(value / abs(config.ratio)) for value in (distance, most))
     return LimitExceeded(

@@ -260,6 +260,7 @@ class ControlLoop:
         """Send the next goals in the next slot of the grid, read all positions, publish the state."""
         if any(axis.target is not None and axis.owner is None for axis in self.axes.values()):
             await self._begin()
+        self._check_owned()
         periods = self._schedule(self.machine.now())
         await self._turn_wheels(periods)
         batches: dict[BaseBus, Sequence[Request[Any]]] = {
@@ -447,6 +448,15 @@ class ControlLoop:
             goals = {a.name: a.config.to_device(a.sent) for a in owned if not a.config.is_wheel}
             await self.machine.health.look([axis.axis for axis in owned], goals)
 
+    def _check_owned(self) -> None:
+        """Raise the error if a stop or another command has taken an axis; it gets no more goals."""
+        lost = [error for group in self.groups if (error := group.lost(self.machine.lease)) is not None]
+        if lost:
+            for axis in self.axes.values():
+                if axis.owner != axis.status.owner:
+                    axis.release()
+            raise lost[0]
+
     def _check(self, values: Mapping[BaseBus, Any], state: LoopState) -> None:
         """Raise what is wrong: a silent axis first, then a lost owner, a lost bus, a refused goal."""
         for name in state.missing:
@@ -458,12 +468,7 @@ class ControlLoop:
                     cause="its cable or supply, or a device in between",
                     node=axis.config.node,
                 )
-        lost = [error for group in self.groups if (error := group.lost(self.machine.lease)) is not None]
-        if lost:
-            for axis in self.axes.values():
-                if axis.owner != axis.status.owner:
-                    axis.release()
-            raise lost[0]
+        self._check_owned()
         raise_first(values)
         for value in values.values():
             raise_first({i: one for i, one in enumerate(value) if not isinstance(one, LOST)})
