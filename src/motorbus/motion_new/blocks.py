@@ -12,7 +12,7 @@ from motorbus.bus.base import BaseBus
 from motorbus.errors import RequestError
 from motorbus.motion_new.lease import Lease, LeaseWatch, lease_lost
 from motorbus.motion_new.loop import ControlLoop, LoopState
-from motorbus.motion_new.moves import StopsIfInterrupted, add_notes, stop_axes
+from motorbus.motion_new.moves import StopsIfInterrupted, stop_axes
 from motorbus.motion_new.program import Program, raise_first
 from motorbus.motion_new.shutdown import stop_bus
 from motorbus.motion_new.state import OpenMachine
@@ -62,13 +62,13 @@ class Loop:
 
     async def _finish(self, error: BaseException | None) -> None:
         loop = self._loop
-        async with StopsIfInterrupted(loop.machine, loop.members):
-            if error is None:
-                await loop.leave()
+        guard = StopsIfInterrupted(loop.members)
         if error is not None:
             loop.close()
-            moving = [axis for axis in loop.members if axis.status.moving and not axis.status.fault]
-            add_notes(error, await stop_axes(moving))
+            await guard.leave(error)
+            return
+        async with guard:
+            await loop.leave()
 
 
 class Attendance:

@@ -33,22 +33,16 @@ WATCH_TIME: Final = 1.0  # s
 class StopsIfInterrupted(Guard):
     """An error or interrupt inside the block stops these axes; notes of the error say what became of each."""
 
-    def __init__(self, machine: OpenMachine, axes: list[Axis]) -> None:
-        self._machine = machine
+    def __init__(self, axes: list[Axis]) -> None:
         self._axes = axes
 
     async def leave(self, error: BaseException | None) -> None:
         if error is None:
             return
-        axes = [axis for axis in self._axes if axis.status.moving or axis.status.endless]
-        add_notes(error, await stop_axes([axis for axis in axes if not axis.status.fault]))
-
-
-def add_notes(error: BaseException, results: Mapping[str, Any]) -> None:
-    """Note what became of the axes that were stopped because of an error."""
-    for name, result in results.items():
-        text = f"not stopped: {result.summary}" if isinstance(result, MotorbusError) else result.promise
-        error.add_note(f"{name}: {text}")
+        moving = [axis for axis in self._axes if axis.status.moving and not axis.status.fault]
+        for name, result in (await stop_axes(moving)).items():
+            text = f"not stopped: {result.summary}" if isinstance(result, MotorbusError) else result.promise
+            error.add_note(f"{name}: {text}")
 
 
 # -- move ------------------------------------------------------------------------------------------------------
@@ -80,7 +74,7 @@ async def move(
     led = [axis for axis in axes if axis.follows_setpoints]
     timed = [axis for axis in axes if axis not in led]
     loop = ControlLoop(machine, [axis.name for axis in led], direct=True) if led else None
-    async with StopsIfInterrupted(machine, axes):
+    async with StopsIfInterrupted(axes):
         try:
             if loop is not None:
                 await loop.enter()
@@ -315,7 +309,7 @@ async def jog(
     if not axis.follows_setpoints:
         return await _jog_self_timed(machine, axis, velocity, seconds)
     loop = ControlLoop(machine, [name], policy="clamp")
-    async with StopsIfInterrupted(machine, [axis]), Running(loop):
+    async with StopsIfInterrupted([axis]), Running(loop):
         led = loop.axes[name]
         end = led.high if velocity > 0 else led.low
         if not config.is_wheel:
@@ -341,7 +335,7 @@ async def _jog_self_timed(
     start, begun = axis.status.estimate, machine.now()
     if start is not None:
         check_reach(axis, axis.config.from_device(start) + velocity * seconds)
-    async with StopsIfInterrupted(machine, [axis]):
+    async with StopsIfInterrupted([axis]):
         moved = (
             await on_axes(
                 [axis], lambda one: one.driver.jog(one.device, velocity * one.config.ratio, seconds)
@@ -368,7 +362,7 @@ async def home(machine: OpenMachine, names: Names = None, timeout: float = 30.0)
         raise RequestError("no axis has a reference switch")
     for axis in axes:
         axis.require("home")
-    async with StopsIfInterrupted(machine, axes):
+    async with StopsIfInterrupted(axes):
         results = await on_axes(axes, lambda axis: axis.driver.home(axis.device, deadline=timeout))
         for axis in axes:
             if not isinstance(results[axis.name], MotorbusError):
@@ -384,7 +378,7 @@ async def run_stored(machine: OpenMachine, name: str, number: int, timeout: floa
     axis.status.claim()
     axis.status.estimate = None
     extra = {} if timeout is None else {"timeout": timeout}
-    async with StopsIfInterrupted(machine, [axis]):
+    async with StopsIfInterrupted([axis]):
         results = await on_axes([axis], lambda one: one.driver.run(one.device, number, **extra))
         raise_first(results)
     axis.status.moving = axis.status.endless = False
@@ -403,7 +397,7 @@ async def stop(machine: OpenMachine, names: Names = None, *, verify: bool = Fals
     results = await stop_axes(axes)
     raise_first(results)
     if verify:
-        seen = await on_axes(axes, _watch_rest)
+        seen = await on_axes(axes, watch_rest)
         raise_first(seen)
         for axis in axes:
             position = axis.status.known_position
@@ -427,12 +421,12 @@ async def _stop(axis: Axis) -> StopState:
     return StopState(getattr(promise, "value", str(promise)))
 
 
-async def _watch_rest(axis: Axis) -> bool | None:
-    """Procedure: whether an axis is seen at rest; None where its device reports no position."""
+async def watch_rest(axis: Axis, seconds: float = WATCH_TIME) -> bool | None:
+    """Procedure: whether an axis is seen at rest within `seconds`; None where its device reports no position."""
     if "position" not in axis.driver:
         return None
     seen: list[tuple[float, float]] = []
-    end = axis.bus.now() + WATCH_TIME
+    end = axis.bus.now() + seconds
     while axis.bus.now() < end:
         angle = await catch(axis.driver.position(axis.device))
         if isinstance(angle, MotorbusError):

@@ -9,15 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from motorbus.core.steps import Sleep, catch
+from motorbus.core.steps import catch
 from motorbus.errors import MotorbusError
 from motorbus.motion_new.axis import Axis, on_axes
-from motorbus.motion_new.moves import STILL, move, release_torque, stop_axes
+from motorbus.motion_new.moves import move, release_torque, stop_axes, watch_rest
 from motorbus.motion_new.program import Program
 from motorbus.motion_new.state import OpenMachine
 
 REST_WAIT: Final = 0.5  # s
-PERIOD: Final = 0.02  # s
 PARK_SPEED: Final = 0.5  # share of the velocity of each axis
 
 
@@ -75,7 +74,7 @@ class Shutdown:
         ]
         self._note("stop", await stop_axes(moving))
         if not self._hurried and moving:
-            await on_axes(moving, _wait_for_rest)
+            await on_axes(moving, lambda axis: watch_rest(axis, REST_WAIT))
 
     async def _park_axes(self) -> None:
         parked = []
@@ -106,20 +105,6 @@ class Shutdown:
             if isinstance(result, MotorbusError):
                 self.errors[name] = result
                 self.notes.append(f"{name}: {what} failed: {result.summary}")
-
-
-async def _wait_for_rest(axis: Axis) -> None:
-    """Procedure: wait until two positions agree, at most 0.5 s."""
-    if "position" not in axis.driver:
-        return
-    end, before = axis.bus.now() + REST_WAIT, None
-    while axis.bus.now() < end:
-        here = await catch(axis.driver.position(axis.device))
-        if not isinstance(here, MotorbusError):
-            if before is not None and abs(here - before) <= STILL:
-                return
-            before = here
-        await Sleep(PERIOD)
 
 
 async def stop_bus(axes: list[Axis]) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
 from threading import Condition
 from typing import Any, Final
 
@@ -75,10 +74,6 @@ class Subscription:
         with self._changed:
             self._changed.wait_for(lambda: bool(self._states), timeout)
             return self._states.popleft() if self._states else None
-
-    def __iter__(self) -> Iterator[RobotState]:
-        while (state := self.get()) is not None:
-            yield state
 
 
 class OpenMachine:

@@ -130,7 +130,7 @@ async def replay(
     if smooth is not None:
         trajectory = trajectory.smoothed(smooth)
     loop = ControlLoop(machine, names, rate=rate, direct=True)
-    async with StopsIfInterrupted(machine, axes):
+    async with StopsIfInterrupted(axes):
         try:
             await loop.enter()
             goals = trajectory.sampled(loop.rate, interpolation, speed)
@@ -196,7 +196,7 @@ async def follow(
     )
     loop = ControlLoop(machine, names, rate=rate, policy=policy)
     held = dict.fromkeys(followers, 0)
-    async with StopsIfInterrupted(machine, machine.chosen(followers)), Running(loop):
+    async with StopsIfInterrupted(machine.chosen(followers)), Running(loop):
         begun = machine.now()
         while not ended(machine.now() - begun, seconds, until):
             state = await loop.cycle()
