@@ -32,7 +32,7 @@ LIFT = {
 }
 
 
-class Heard(PerfectLine):
+class Recorded(PerfectLine):
     """A line without faults that keeps what the host sends; at the frames of these numbers Ctrl-C is pressed."""
 
     def __init__(self, *interrupts: int) -> None:
@@ -52,7 +52,7 @@ class Heard(PerfectLine):
 def listen(sims: Mapping[str, Simulation], *interrupts: int) -> None:
     """From now on `orders` knows what is sent; Ctrl-C is pressed at these frames of the first bus."""
     for number, sim in enumerate(sims.values()):
-        sim.line = Heard(*interrupts if not number else ())
+        sim.line = Recorded(*interrupts if not number else ())
 
 
 def orders(sims: Mapping[str, Simulation]) -> list[Data]:

@@ -58,7 +58,7 @@ def wheel(monkeypatch: pytest.MonkeyPatch) -> Any:
             yield robot, sims
 
 
-def test_a_wheel_turns_only_while_somebody_attends(wheel: Any) -> None:
+def test_a_wheel_turns_only_while_attended(wheel: Any) -> None:
     robot, sims = wheel
     with pytest.raises(Refused) as caught:
         robot.jog("a2", 1.0, 0.5)
@@ -196,7 +196,7 @@ def test_a_self_timed_axis_moves_alone_and_relative_without_a_position(timed: An
     robot, _, plans = timed
     with pytest.raises(NotHomed):
         robot.move({"lift": 0.01})
-    with pytest.raises(NotHomed):  # it has limits, and nobody knows where it is
+    with pytest.raises(NotHomed):  # it has limits, and its position is unknown
         robot.move({"lift": 0.01}, relative=True)
     robot.set_position("lift", 0.1)
     robot.move({"lift": 0.02}, relative=True)
@@ -209,7 +209,7 @@ def test_a_self_timed_axis_moves_alone_and_relative_without_a_position(timed: An
 def test_an_interrupted_self_timed_move_is_stopped_and_loses_its_position(timed: Any) -> None:
     robot, sims, plans = timed
     robot.set_position("lift", 0.0)
-    robot.torque(True, ["a1", "c1"])
+    robot.enable_torque(["a1", "c1"])
     listen(sims, 40)
     with pytest.raises(KeyboardInterrupt):
         robot.move({"a1": 1.0, "lift": 0.04})
@@ -265,5 +265,5 @@ def test_a_key_that_a_device_cannot_follow_is_refused() -> None:
 
 def test_max_torque_is_written_before_torque_comes_on() -> None:
     with rig("1", axes={"a1": {"max_torque": 0.5}}) as (config, sims), Robot(config) as robot:
-        robot.torque(True)
+        robot.enable_torque()
         assert sims["arm"][1].memory["torque_limit"] == 500

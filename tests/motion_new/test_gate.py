@@ -20,7 +20,7 @@ from motorbus.motion_new.lease import Lease
 from motorbus.motion_new.machine import AxisConfig, Position, Step, Velocity
 from motorbus.motion_new.robot import Robot
 from motorbus.motion_new.status import AxisStatus
-from tests.motion_new.rig import Heard, listen, rig
+from tests.motion_new.rig import Recorded, listen, rig
 
 NOW = 100.0
 
@@ -266,7 +266,7 @@ def test_no_goal_outside_the_limits_leaves(seed: int) -> None:
     with rig("1-3", **keys) as (config, sims), Robot(config) as robot:
         listen(sims)
         line = sims["arm"].line
-        assert isinstance(line, Heard)
+        assert isinstance(line, Recorded)
         for _ in range(60):
             before = {node: sims["arm"][node].memory["present_position"] for node in (1, 2, 3)}
             try:
@@ -305,7 +305,7 @@ def random_call(draw: random.Random, robot: Robot, sims: Any) -> None:
             for _ in islice(loop, draw.randint(1, 20)):
                 loop.set_target(name, value)
     elif kind == 6:
-        calls: list[Any] = [robot.stop, lambda: robot.torque(True), lambda: robot.torque(False, name)]
+        calls: list[Any] = [robot.stop, lambda: robot.enable_torque(), lambda: robot.disable_torque(name)]
         draw.choice(calls)()
     elif kind == 7:
         robot.jog(name, draw.choice([1.0, -2.0, 0.3]), 0.3)

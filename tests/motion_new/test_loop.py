@@ -14,7 +14,7 @@ from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, NoReply, 
 from motorbus.link.base import Delivery, Side
 from motorbus.motion_new.program import OnBuses
 from motorbus.motion_new.robot import Robot
-from tests.motion_new.rig import Heard, listen, orders, rig
+from tests.motion_new.rig import Recorded, listen, orders, rig
 
 
 def test_entering_writes_nothing_and_torque_comes_with_the_first_target() -> None:
@@ -101,11 +101,11 @@ def lead(robot: Robot, cycle: int, then: Callable[[], object]) -> None:
 
 
 @pytest.mark.parametrize("how", ["stop", "torque", "device", "estop", "move"])
-def test_whoever_takes_an_axis_ends_the_loop_before_another_goal_leaves(how: str) -> None:
+def test_another_source_ends_the_loop_before_another_goal_leaves(how: str) -> None:
     with rig("1", "1") as (config, sims), Robot(config) as robot:
         takes: dict[str, Any] = {
             "stop": lambda: robot.stop("c1"),
-            "torque": lambda: robot.torque(False, "a1"),
+            "torque": lambda: robot.disable_torque("a1"),
             "device": lambda: robot.buses["can"].run(robot.axes["c1"].driver.stop(robot.axes["c1"].device)),
             "estop": robot.estop,
             "move": lambda: robot.move({"c1": 0.0}),
@@ -123,7 +123,32 @@ def test_whoever_takes_an_axis_ends_the_loop_before_another_goal_leaves(how: str
         assert len(goals) <= 2  # the hold of the stop that ends the block
 
 
-class Lossy(Heard):
+@pytest.mark.parametrize("name", ["a1", "c1"])
+def test_no_goal_leaves_after_a_stop_between_plan_and_write(name: str) -> None:
+    with rig("1", "1") as (config, sims), Robot(config) as robot, robot.loop(50) as loop:
+        for state in loop:
+            loop.set_target(name, 0.5)
+            if state.number > 10:
+                break
+        listen(sims)
+        (group,) = (one for one in loop._loop.groups if name in {axis.name for axis in one.axes.values()})
+        stream: Any = group.stream
+
+        class Stopped:
+            """Another thread stops the axis when the goals have been made."""
+
+            def goals(self, to: Any) -> Any:
+                made = stream.goals(to)
+                robot.axes[name].status.stopped()
+                return made
+
+        group.stream = Stopped()  # type: ignore[assignment]
+        with pytest.raises(Interrupted):
+            next(iter(loop))
+        assert not orders(sims)
+
+
+class Lossy(Recorded):
     """A line that loses all that node 1 says while `loses` is true."""
 
     loses = False

@@ -53,7 +53,7 @@ def test_01_torque_on_moves_by_a_count_at_most(name: str) -> None:
     with rig("1", "1") as (config, sims), Robot(config) as robot:
         sims["arm"][1].memory["goal_position"] = 500  # an old goal, far away
         before = robot.positions()[name]
-        assert robot.torque(True, name) == (name,)
+        assert robot.enable_torque(name) == (name,)
         for _ in range(20):
             wait(robot, 0.05)
             assert abs(robot.positions()[name] - before) < 0.004
@@ -99,7 +99,7 @@ def test_03_one_gate_judges_each_spelling(way: str) -> None:
         rig("1", axes={"a1": {"low": "-60 deg", "high": "60 deg"}}) as (config, sims),
         Robot(config) as robot,
     ):
-        robot.torque(True)
+        robot.enable_torque()
         for wrong in (pi + radians(61), pi - radians(61), nan, inf):
             order = spellings(robot, wrong)[way]
             listen(sims)
@@ -158,13 +158,13 @@ def test_05_nothing_moves_after_the_loss_until_a_reset() -> None:
         with pytest.raises(Refused):
             robot.move({"a1": 0.1})
         lease.reset()
-        robot.torque(True)
+        robot.enable_torque()
         wait(robot, 0.1)
 
 
 def test_06_an_emergency_stop_latches() -> None:
     with rig("1-2", "1") as (config, sims), Robot(config) as robot:
-        robot.torque(True)
+        robot.enable_torque()
         outcome = robot.estop()
         assert outcome["arm"].acknowledged == (1, 2)
         assert outcome["can"].acknowledged == (1,)
@@ -172,15 +172,15 @@ def test_06_an_emergency_stop_latches() -> None:
         with pytest.raises(Interrupted):
             robot.move({"a1": 0.1})
         with pytest.raises(Interrupted):
-            robot.torque(True)
+            robot.enable_torque()
         assert not orders(sims)
         robot.reset()
         robot.move({"a1": 0.1, "c1": 0.1})
 
 
-def test_07_stopped_is_said_of_what_was_seen_at_rest() -> None:
+def test_07_stopped_is_what_was_seen_at_rest() -> None:
     with rig("1", lift=True) as (config, _), Robot(config) as robot:
-        robot.torque(True, "a1")
+        robot.enable_torque("a1")
         result = robot.stop(verify=True)
         assert result.axes["a1"].at_rest is True
         assert result.axes["lift"].at_rest is None
@@ -193,7 +193,7 @@ def test_08_every_axis_is_visited_at_the_end(action: str, dead: int | None) -> N
     with rig("1-3", exit=action) as (config, sims):
         try:
             with Robot(config) as robot:
-                robot.torque(True)
+                robot.enable_torque()
                 robot.axes["a3"].status.moving = True
                 if dead:
                     sims["arm"][dead].unplug()
@@ -210,7 +210,7 @@ def test_08_parking_is_last() -> None:
     axes = {"a1": {"exit": "park"}, "a2": {"exit": "torque_off"}}
     with rig("1-2", axes=axes, extra=extra) as (config, sims):
         with Robot(config) as robot:
-            robot.torque(True)
+            robot.enable_torque()
         assert abs(sims["arm"][1].memory["present_position"] - 2048 - 20 * 4096 / 360) < 10
         assert sims["arm"][1].memory["torque_enable"] == 1
         assert sims["arm"][2].memory["torque_enable"] == 0
@@ -219,7 +219,7 @@ def test_08_parking_is_last() -> None:
 def test_08_the_graceful_stop_parks_and_releases() -> None:
     with rig("1-2", extra={"pose": {"park": {"a1": "20 deg"}}}) as (config, sims):
         with Robot(config) as robot:
-            robot.torque(True)
+            robot.enable_torque()
             robot.shutdown()
             assert not robot.warnings
         assert abs(sims["arm"][1].memory["present_position"] - 2048 - 20 * 4096 / 360) < 10
@@ -280,7 +280,7 @@ def test_14_a_blocked_motor_ends_the_move() -> None:
 @pytest.mark.parametrize("frame", range(3, 60, 7))
 def test_an_interrupted_move_stops(frame: int) -> None:
     with rig("1-2", "1") as (config, sims), Robot(config) as robot:
-        robot.torque(True)
+        robot.enable_torque()
         listen(sims, frame)
         with pytest.raises(KeyboardInterrupt):
             robot.move({"a1": 1.5, "c1": 0.8})
@@ -316,7 +316,7 @@ def test_the_async_robot_moves_and_a_cancelled_move_stops() -> None:
 
 def test_a_silent_axis_ends_a_move_and_stops_the_others() -> None:
     with rig("1-2", "1") as (config, sims), Robot(config) as robot:
-        robot.torque(True)
+        robot.enable_torque()
 
         def unplug(state: Any) -> None:
             if (robot.axes["a1"].status.known_position or 0.0) > 0.3:
@@ -331,7 +331,7 @@ def test_a_silent_axis_ends_a_move_and_stops_the_others() -> None:
 def test_rounding_a_speed_up_never_makes_it_illegal() -> None:
     for velocity in ("1 deg/s", "7.3 deg/s", "33.3 deg/s", "119.9 deg/s", "298.7 deg/s"):
         with rig("1", "1", max_velocity=velocity) as (config, _), Robot(config) as robot:
-            robot.torque(True)
+            robot.enable_torque()
             robot.move({"a1": 0.02, "c1": 0.02})
 
 

@@ -88,7 +88,7 @@ def test_states_show_what_the_devices_report() -> None:
         assert states["a1"].age is not None
         assert states["lift"].position is None
         assert not states["c1"].torque
-        robot.torque(True)
+        robot.enable_torque()
         assert robot.snapshot().axes["a1"].torque
 
 
@@ -198,7 +198,7 @@ def test_asyncio_stops_by_another_task_and_never_blocks() -> None:
                 robot.reset()
                 with pytest.raises(LimitExceeded):
                     await robot.move({"a1": 3.0})
-                await robot.torque(True)
+                await robot.enable_torque()
                 assert subscription.get() is not None
                 async with robot.attended(), robot.loop(50) as loop:
                     async for state in loop:
@@ -225,6 +225,6 @@ def test_a_second_signal_shortens_the_end_and_skips_no_axis(second: int) -> None
 
 def _press_twice(config: MachineConfig, sims: Any, second: int) -> None:
     with Robot(config) as robot:
-        robot.torque(True)
+        robot.enable_torque()
         listen(sims, 25, *([25 + second] if second else []))
         robot.move({"a1": 0.8, "a2": 0.8})

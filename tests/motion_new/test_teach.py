@@ -69,7 +69,7 @@ def test_teach_records_a_limp_arm_and_says_where_it_left_its_limits() -> None:
         rig("1-2", axes={"a1": {"low": "-10 deg", "high": "10 deg"}}) as (config, sims),
         Robot(config) as robot,
     ):
-        robot.torque(True)
+        robot.enable_torque()
         turns = iter(range(1000))
 
         def by_hand() -> bool:
@@ -98,7 +98,7 @@ def test_teach_ends_by_ctrl_c_and_gives_what_was_taught() -> None:
 def test_followers_track_their_leaders_within_their_limits() -> None:
     axes = {"a2": {"low": "-30 deg", "high": "30 deg", "max_velocity": "45 deg/s"}}
     with rig("1-2", axes=axes) as (config, sims), Robot(config) as robot:
-        robot.torque(True)
+        robot.enable_torque()
         turns = iter(range(10_000))
 
         def by_hand() -> bool:

@@ -1,4 +1,4 @@
-"""Blocks of a robot: a control loop, and the time in which somebody attends the machine.
+"""Blocks of a robot: a control loop, and the time in which the machine is attended.
 
 Both are for `with` of a `Robot` and for `async with` of an `AsyncRobot`; `run` runs a program in the way of each.
 """

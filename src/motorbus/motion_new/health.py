@@ -98,7 +98,7 @@ class HealthMonitor:
             self._take(axis, answers[bus], goals.get(axis.name))
 
     async def examine(self, axis: Axis) -> None:
-        """Program: ask an axis at once that does not do what it was told. Raises what is the matter, if that shows."""
+        """Program: ask an axis at once that does not follow its goals. Raises what is the matter, if that shows."""
         await run(axis.bus, self._ask(axis))
 
     async def _ask(self, axis: Axis) -> None:
@@ -118,7 +118,7 @@ class HealthMonitor:
         if self.is_due(axis):
             await catch(self._ask(axis))
 
-    # -- verdicts --------------------------------------------------------------------------------------------------
+    # -- judgements -------------------------------------------------------------------------------------------------
 
     def _take(self, axis: Axis, answer: Health | MotorbusError, goal: float | None) -> None:
         record = self._record(axis)
@@ -132,7 +132,6 @@ class HealthMonitor:
         reason = self._fault_reason(axis, record, answer)
         if reason:
             error = _faulted(axis, answer, reason)
-            record.stops = record.blank = None
             axis.status.set_fault(error.summary.partition(": ")[2])
             raise error
         if axis.config.monitor_load:
@@ -149,7 +148,7 @@ class HealthMonitor:
             return "restart"
         if health.torque is not False:
             return ""
-        return "let go" if PROTECTIVE & set(health.state.alarm) or health.blank is False else "restart"
+        return "torque_lost" if PROTECTIVE & set(health.state.alarm) or health.blank is False else "restart"
 
     def _judge_strain(self, axis: Axis, record: _Record, state: State, goal: float | None) -> None:
         if state.temperature is not None:
@@ -196,7 +195,7 @@ def _figures(state: State) -> str:
 
 def _faulted(axis: Axis, health: Health, reason: str) -> Faulted:
     what, cause = "restarted", "its supply dipped: too weak, a loose cable, or too much load at once"
-    if reason == "let go":
+    if reason == "torque_lost":
         what, cause = "lost its torque", "its own protection, or another program"
     figures = _figures(health.state)
     return Faulted(

@@ -1,4 +1,4 @@
-"""The lease: whoever moves a machine for another renews it by a heartbeat; when it is lost the machine stops."""
+"""The lease: who moves a machine for another renews it by a heartbeat; when it is lost the machine stops."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ CATCH_UP: Final = 3  # periods that a late cycle makes good by one longer step
 MIN_RATE: Final = 4.0  # Hz; goals are one period ahead
 MAX_RATE: Final = 1000.0  # Hz
 USUAL_RATE: Final = 100.0  # Hz
-WIRE_SHARE: Final = 0.7  # of what the wire carries, for a rate that nobody has given
+WIRE_SHARE: Final = 0.7  # of what the wire carries, for a rate that is chosen here
 ENTRY_TRIES: Final = 5  # reads in which each axis must answer once
 
 

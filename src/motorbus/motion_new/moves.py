@@ -64,7 +64,7 @@ async def move(
     All goals are checked before anything is sent. `speed` is a share of the velocity and acceleration of each axis,
     `tolerance` in rad of the device; each axis must be in position within `timeout` s after the end. Raises
     RequestError, LimitExceeded, NotHomed before anything moves; Stalled, NoReply, Faulted, Overloaded, Interrupted when
-    all have been told to stop.
+    a stop was sent to all.
     """
     axes = [machine.axis(name) for name in goals]
     if not (isfinite(speed) and 0 < speed <= 1):

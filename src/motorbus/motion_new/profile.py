@@ -101,7 +101,7 @@ Profile: TypeAlias = Trapezoid | MinimumJerk
 
 
 def trapezoid(move: Move) -> Trapezoid:
-    """The quickest move within the limits."""
+    """The fastest move within the limits."""
     motion = plan(
         0.0, move.start, move.goal, speed=move.limits.velocity, acceleration=move.limits.acceleration
     )
@@ -109,7 +109,7 @@ def trapezoid(move: Move) -> Trapezoid:
 
 
 def minimum_jerk(move: Move) -> MinimumJerk:
-    """The quickest minimum-jerk move within the limits."""
+    """The fastest minimum-jerk move within the limits."""
     distance = abs(move.goal - move.start)
     by_velocity = PEAK * distance / move.limits.velocity
     by_acceleration = sqrt(STEEPEST * distance / move.limits.acceleration)
@@ -143,10 +143,10 @@ def synchronize(
     """
     if kind not in KINDS:
         raise RequestError(f"{kind!r} is not a profile", expected=" or ".join(KINDS))
-    quickest = {name: _quickest(name, move, kind) for name, move in moves.items()}
-    slowest = max(quickest, key=lambda name: quickest[name].duration, default="")
-    least = quickest[slowest].duration if quickest else 0.0
-    limited_by = _reason(slowest, quickest[slowest], moves[slowest].limits) if least else ""
+    fastest = {name: _fastest(name, move, kind) for name, move in moves.items()}
+    slowest = max(fastest, key=lambda name: fastest[name].duration, default="")
+    least = fastest[slowest].duration if fastest else 0.0
+    limited_by = _reason(slowest, fastest[slowest], moves[slowest].limits) if least else ""
     if shortest > least:
         least, limited_by = shortest, "a self-timed axis"
     if duration is not None:
@@ -158,11 +158,11 @@ def synchronize(
             )
         if duration > least:
             least, limited_by = duration, "the given duration"
-    profiles = {name: profile.stretched(least) for name, profile in quickest.items()}
+    profiles = {name: profile.stretched(least) for name, profile in fastest.items()}
     return Synchronized(profiles, least, limited_by)
 
 
-def _quickest(name: str, move: Move, kind: Kind) -> Profile:
+def _fastest(name: str, move: Move, kind: Kind) -> Profile:
     if not (isfinite(move.start) and isfinite(move.goal)):
         raise RequestError(f"{name}: {move.start} to {move.goal} is not a move", expected="finite numbers")
     return trapezoid(move) if kind == "trapezoid" else minimum_jerk(move)

@@ -74,6 +74,9 @@ class RobotMethods(OpenMachine):
     def _is_virtual(self) -> bool:
         return any(bus.link.virtual for bus in self.buses.values())
 
+    def __getitem__(self, name: str) -> Axis:
+        return self.axis(name)
+
     # -- state -----------------------------------------------------------------------------------------------------
 
     def describe(self) -> MachineDescription:
@@ -167,9 +170,13 @@ class RobotMethods(OpenMachine):
         """Decelerate and hold; gives a `StopResult`. `verify`: watch until each rests, at most 1 s."""
         return self.carry_out(moves.stop(self, names, verify=verify))
 
-    def torque(self, on: bool, names: Names = None) -> Any:
-        """Switch torque; on holds the present position. Gives the names of the axes."""
-        return self.carry_out(moves.switch_torque(self, on, names))
+    def enable_torque(self, names: Names = None) -> Any:
+        """Torque on without a jump: hold the present position. Gives the names of the axes."""
+        return self.carry_out(moves.switch_torque(self, True, names))
+
+    def disable_torque(self, names: Names = None) -> Any:
+        """Torque off. Gives the names of the axes."""
+        return self.carry_out(moves.switch_torque(self, False, names))
 
     def teach(self, names: Names = None, **how: Any) -> Any:
         """Record axes that are moved by hand; gives a `Trajectory`. See `teach.teach`."""

@@ -179,8 +179,8 @@ async def follow(
 ) -> LoopResult:
     """Let axes track others, `{leader: follower}`, within the limits of the followers.
 
-    Torque of the leaders is switched off. While a leader is not heard its follower stays at its last target. `held` of
-    the result counts these cycles. Without `seconds` and `until` Ctrl-C ends it.
+    Torque of the leaders is switched off. While a leader does not answer, its follower stays at its last target;
+    `held` of the result counts these cycles. Without `seconds` and `until` Ctrl-C ends it.
     """
     check_seconds(seconds)
     leaders, followers = list(pairs), list(pairs.values())
