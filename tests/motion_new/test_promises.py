@@ -178,6 +178,13 @@ def test_06_an_emergency_stop_latches() -> None:
         robot.move({"a1": 0.1, "c1": 0.1})
 
 
+def test_06_an_emergency_stop_holds_what_the_file_says() -> None:
+    with rig("1-2", axes={"a1": {"estop": "hold"}}) as (config, sims), Robot(config) as robot:
+        robot.enable_torque()
+        robot.estop()
+        assert [sims["arm"][node].memory["torque_enable"] for node in (1, 2)] == [1, 0]
+
+
 def test_07_stopped_is_what_was_seen_at_rest() -> None:
     with rig("1", lift=True) as (config, _), Robot(config) as robot:
         robot.enable_torque("a1")

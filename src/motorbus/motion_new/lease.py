@@ -33,13 +33,11 @@ class Lease:
         self.seconds: Final = seconds
         self._now = now
         self._until = now() + seconds
-        self._lost = False
 
     @property
     def lost(self) -> bool:
         """It was not renewed in time."""
-        self._lost = self._lost or self._now() > self._until
-        return self._lost
+        return self._now() > self._until
 
     def beat(self) -> None:
         """Renew it. Raises Refused if it is lost."""
@@ -49,13 +47,7 @@ class Lease:
 
     def reset(self) -> None:
         """Take it again after a loss. Nothing is sent."""
-        self._lost = False
         self._until = self._now() + self.seconds
-
-    def give_back(self) -> None:
-        """It ends: endless motion is refused from now on."""
-        self._until = -inf
-        self._lost = True
 
 
 def lease_lost(name: str) -> Refused:

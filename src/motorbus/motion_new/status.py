@@ -76,8 +76,6 @@ class AxisStatus:
     def stopped(self) -> None:
         """A stop or torque-off will be sent: its source of goals loses it."""
         self.owner += 1
-        if self.moving:
-            self.estimate = None
         self.moving = self.endless = False
 
     def set_fault(self, why: str) -> None:
