@@ -31,6 +31,9 @@ DOCUMENTED: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "cap_torque": (("device", "fraction"), ()),
     "cap_current": (("device", "ampere"), ()),
     "stream": (("devices",), ("rate",)),
+    "set_velocity": (("device", "velocity"), ()),
+    "max_velocity": (("device",), ()),
+    "plan_move": (("device", "angle"), ("velocity", "acceleration")),
     "keep_time": (("device", "angle", "timing"), ("velocity", "acceleration")),
 }
 """By capability: what it is called with in order, and what by name."""

@@ -152,6 +152,37 @@ class PositionStream(Protocol):
         """
 
 
+class SelfTimedMove(Protocol):
+    """A move that a device makes by a profile of its own, in one order; made by `AxisDriver.plan_move`.
+
+    The device reports no position while it moves: all values are estimates. Nothing is written before `prepare` runs.
+    """
+
+    @property
+    def angle(self) -> float:
+        """The whole signed movement (rad) in the steps of the device."""
+
+    @property
+    def shortest(self) -> float:
+        """The shortest duration (s) within its velocity and acceleration."""
+
+    def fit(self, duration: float) -> float:
+        """The nearest possible duration (s) that is not shorter than `duration`."""
+
+    def prepare(self, duration: float) -> Procedure[None]:
+        """Write what the move needs, for a duration that `fit` gave."""
+
+    @property
+    def start(self) -> Request[Any]:
+        """The request that starts the prepared move. It leaves once, in a slot of the caller."""
+
+    def position(self, elapsed: float) -> float:
+        """The angle (rad) done `elapsed` s after the start."""
+
+    def finish(self) -> Procedure[None]:
+        """Wait for the end, unless it was stopped or not started, and give back what `prepare` borrowed."""
+
+
 class Stop(NamedTuple):
     """Requests that stop the nodes, in order, and what their acknowledgement promises."""
 
@@ -309,6 +340,13 @@ class AxisDriver:
     """Limit of the current (A) until power-off."""
     stream: Callable[..., Runnable[PositionStream]] = unsupported
     """stream(devices, *, rate): for a control loop; rate in bit/s."""
+    set_velocity: Callable[[Any, float], Runnable[Any]] = unsupported
+    """Turn at this velocity (rad/s) until the next order; for a control loop."""
+    max_velocity: Callable[[Any], Runnable[float | None]] = unsupported
+    """The highest velocity (rad/s) of the model or of its settings; None: unknown."""
+    plan_move: Callable[..., Runnable[SelfTimedMove]] = unsupported
+    """plan_move(device, angle, *, velocity, acceleration): a move by `angle` (rad) with its own profile, at most at
+    `velocity` (rad/s) and `acceleration` (rad/s²)."""
     keep_time: Callable[..., Runnable[Any]] = unsupported
     """keep_time(device, angle, timing, *, velocity, acceleration) -> Turned: turn by `angle` (rad) with its own
     profile, begin and end with the other devices of `timing`; at most `velocity` (rad/s) and `acceleration` (rad/s²)

@@ -1,0 +1,224 @@
+"""Teach, replay and follow: clients of the control loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Final
+
+from motorbus.errors import MotorbusError, RequestError
+from motorbus.motion_new.axis import Axis
+from motorbus.motion_new.commands import LoopResult
+from motorbus.motion_new.loop import ControlLoop, Policy
+from motorbus.motion_new.machine import Names
+from motorbus.motion_new.moves import (
+    Course,
+    Running,
+    StopsIfInterrupted,
+    check_reach,
+    check_seconds,
+    ended,
+    lead,
+    loop_result,
+    move,
+    release_torque,
+)
+from motorbus.motion_new.program import raise_first
+from motorbus.motion_new.state import OpenMachine
+from motorbus.motion_new.trajectory import MOST, Interpolation, Trajectory
+
+NEAR: Final = 0.005  # rad of the device that an axis may be off the start of a trajectory
+
+
+async def teach(
+    machine: OpenMachine,
+    names: Names = None,
+    *,
+    seconds: float | None = None,
+    until: Callable[[], bool] | None = None,
+    rate: float = 50.0,
+    keep_torque: bool = False,
+) -> Trajectory:
+    """Record axes that are moved by hand, `rate` times per s, for `seconds` or until `until()` is true.
+
+    Torque is switched off first and stays off, unless `keep_torque`. Without `seconds` and `until` Ctrl-C ends it. A
+    cycle without the position of an axis gives no sample; notes say where an axis was outside its limits. The error
+    that ends a recording has it as `so_far`.
+    """
+    check_seconds(seconds)
+    axes = _taught(machine, names, keep_torque=keep_torque)
+    if not keep_torque:
+        raise_first(await release_torque(axes))
+    loop = ControlLoop(machine, [axis.name for axis in axes], rate=rate)
+    recording = _Recording(axes)
+    try:
+        async with Running(loop):
+            begun = machine.now()
+            while not ended(machine.now() - begun, seconds, until) and len(recording.times) < MOST:
+                state = await loop.cycle()
+                if not state.missing:
+                    recording.add(state.at, state.position)
+    except MotorbusError as error:
+        error.so_far = recording.trajectory() if len(recording.times) > 1 else None
+        raise
+    except KeyboardInterrupt:
+        if seconds is not None or until is not None:
+            raise
+    return recording.trajectory()
+
+
+def _taught(machine: OpenMachine, names: Names, *, keep_torque: bool) -> list[Axis]:
+    axes = machine.chosen(names)
+    able = [
+        axis
+        for axis in axes
+        if "stream" in axis.driver
+        and not axis.config.is_wheel
+        and (keep_torque or "disable_torque" in axis.driver)
+    ]
+    if not able or (names is not None and len(able) < len(axes)):
+        others = ", ".join(axis.name for axis in axes if axis not in able)
+        raise RequestError(f"{others}: cannot be moved by hand and read in a loop", advice="name other axes")
+    return able
+
+
+class _Recording:
+    def __init__(self, axes: list[Axis]) -> None:
+        self.times: list[float] = []
+        self._places: dict[str, list[float]] = {axis.name: [] for axis in axes}
+        self._axes = axes
+        self._outside: dict[str, str] = {}
+
+    def add(self, at: float, positions: Mapping[str, float]) -> None:
+        """Add a sample."""
+        self.times.append(at)
+        for axis in self._axes:
+            place = positions[axis.name]
+            self._places[axis.name].append(place)
+            if not axis.config.allows(place) and axis.name not in self._outside:
+                note = f"{axis.name} is outside its limits at {at - self.times[0]:.2f} s: {axis.config.show(place)}"
+                self._outside[axis.name] = note
+
+    def trajectory(self) -> Trajectory:
+        """What was recorded. Raises RequestError for fewer than two samples."""
+        times = [at - self.times[0] for at in self.times]
+        return Trajectory(times, self._places, tuple(self._outside.values()))
+
+
+async def replay(
+    machine: OpenMachine,
+    trajectory: Trajectory,
+    *,
+    speed: float = 1.0,
+    smooth: float | None = None,
+    repeat: int = 1,
+    interpolation: Interpolation = "spline",
+    rate: float | None = None,
+) -> LoopResult:
+    """Play a trajectory `repeat` times, `speed` times as fast; first move to its start.
+
+    The goals that will be sent are checked against all limits before anything moves: LimitExceeded says when the first
+    one is violated. `smooth` (Hz) removes what is quicker.
+    """
+    if not 0 < speed <= 10 or not 1 <= repeat <= 100_000:
+        raise RequestError(
+            f"speed {speed}, {repeat} times", expected="speed above 0, at most 10; at least once"
+        )
+    names = tuple(trajectory.axes)
+    axes = machine.chosen(names)
+    if smooth is not None:
+        trajectory = trajectory.smoothed(smooth)
+    loop = ControlLoop(machine, names, rate=rate, direct=True)
+    async with StopsIfInterrupted(axes):
+        try:
+            await loop.enter()
+            goals = trajectory.sampled(loop.rate, interpolation, speed)
+            goals.check({axis.name: axis.config for axis in axes})
+            for axis in axes:
+                for place in (min(goals.axes[axis.name]), max(goals.axes[axis.name])):
+                    check_reach(axis, place)
+            begun = machine.now()
+            for _ in range(repeat):
+                await _play(machine, loop, goals)
+        finally:
+            loop.close()
+    return loop_result(loop, machine.now() - begun, notes=trajectory.notes)
+
+
+async def _play(machine: OpenMachine, loop: ControlLoop, goals: Trajectory) -> None:
+    start = goals.positions(0.0)
+    far = {
+        name: place
+        for name, place in start.items()
+        if abs(place - loop.axes[name].position) * abs(machine.axes[name].config.ratio) > NEAR
+    }
+    if far:
+        await move(machine, far)
+        await loop.read()
+        for axis in loop.axes.values():
+            axis.release()
+    peaks = {
+        name: max(
+            abs(end - here) / (later - at)
+            for (here, end), (at, later) in zip(pairwise(places), pairwise(goals.times), strict=True)
+        )
+        for name, places in goals.axes.items()
+    }
+    await lead(loop, Course(goals.duration, goals.positions, peaks, goals.positions(goals.duration)), {})
+
+
+async def follow(
+    machine: OpenMachine,
+    pairs: Mapping[str, str],
+    *,
+    seconds: float | None = None,
+    until: Callable[[], bool] | None = None,
+    rate: float = 100.0,
+    policy: Policy = "clamp",
+) -> LoopResult:
+    """Let axes track others, `{leader: follower}`, within the limits of the followers.
+
+    Torque of the leaders is switched off. While a leader does not answer, its follower stays at its last target;
+    `held` of the result counts these cycles. Without `seconds` and `until` Ctrl-C ends it.
+    """
+    check_seconds(seconds)
+    leaders, followers = list(pairs), list(pairs.values())
+    names = [*leaders, *followers]
+    if not pairs or len(set(names)) < len(names):
+        raise RequestError("each axis is in one pair", expected="{leader: follower}")
+    for leader, follower in pairs.items():
+        first, second = (machine.axis(name).config for name in (leader, follower))
+        if bool(first.travel) != bool(second.travel) or first.is_wheel or second.is_wheel:
+            raise RequestError(f"{follower} cannot follow {leader}: they measure different things")
+    raise_first(
+        await release_torque([one for one in machine.chosen(leaders) if "disable_torque" in one.driver])
+    )
+    loop = ControlLoop(machine, names, rate=rate, policy=policy)
+    held = dict.fromkeys(followers, 0)
+    async with StopsIfInterrupted(machine.chosen(followers)), Running(loop):
+        begun = machine.now()
+        while not ended(machine.now() - begun, seconds, until):
+            state = await loop.cycle()
+            for leader, follower in pairs.items():
+                if leader in state.missing:
+                    held[follower] += 1
+                else:
+                    loop.set_target(follower, state.position[leader])
+    return loop_result(loop, machine.now() - begun, {name: count for name, count in held.items() if count})
+
+
+async def replay_file(
+    machine: OpenMachine, file: str, *, skip_others: bool = False, **options: Any
+) -> LoopResult:
+    """Play a trajectory file. Options and errors as for `Trajectory.load` and `replay`."""
+    trajectory = Trajectory.load(file, machine.config.axes, skip_others=skip_others)
+    return await replay(machine, trajectory, **options)
+
+
+async def teach_file(machine: OpenMachine, file: str, **options: Any) -> LoopResult:
+    """Record into a new file. Options and errors as for `teach`."""
+    with Path(file).open("x") as opened:  # refused before anything is recorded
+        made = await teach(machine, **options)
+        opened.write(made.text(machine.config.axes))
+    return LoopResult(made.duration, len(made.times), made.positions(made.duration), notes=made.notes)
