@@ -209,3 +209,10 @@ def test_common_commands_work_on_a_controller(line: Simulation, run: Run) -> Non
     assert run("stop", line.url).code == 0
     document = run("write", line.url, "step_1_delay=1s", "--dry-run", "--json").document
     assert [one["data"][6:11] for one in document["withheld"]] == ["6E 01", "03 07", "2E 01"]
+
+
+def test_a_backup_that_is_not_to_be_saved_is_refused(line: Simulation, run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "backup.toml"
+    path.write_text(run("stepper", "read", line.url, "--all").out, encoding="utf-8")
+    ran = run("stepper", "write", str(path), line.url, "--no-save", "--yes")
+    assert (ran.code, "a backup is always saved" in ran.err) == (2, True)

@@ -230,3 +230,38 @@ class TestStep:
             with traffic(bus) as sent, pytest.raises(LimitExceeded):
                 servo.step(by)
             assert writes(sent) == []
+
+
+@pytest.mark.parametrize("seconds", [nan, -1.0, "2"])
+def test_a_jog_without_an_end_is_refused_before_it_turns(seconds: Any) -> None:
+    with world("sts") as (bus, servo, _):
+        put_mode(servo, Mode.VELOCITY)
+        servo.enable_torque()
+        with traffic(bus) as sent, pytest.raises(RequestError, match="cannot turn for"):
+            servo.jog(1.0, seconds)
+        assert writes(sent) == []
+
+
+def test_a_mode_that_another_object_has_set_is_known_before_a_move() -> None:
+    with world("sts") as (bus, servo, simulation):
+        servo.enable_torque()
+        put_mode(Servo(bus, 1), Mode.VELOCITY)
+        Servo(bus, 1).enable_torque()
+        servo.position()
+        stood = shaft(simulation, bus)
+        with pytest.raises(RequestError, match="operating mode velocity"):
+            servo.move(2.0, velocity=2.0)
+        later(bus, 1.0)
+        assert shaft(simulation, bus) == pytest.approx(stood, abs=1)
+
+
+def test_a_current_bound_gives_force_back_without_a_jump() -> None:
+    with world("hls") as (bus, servo, simulation):
+        servo.move(3.0)
+        simulation[1].memory["goal_torque"] = 0
+        simulation[1].move()
+        simulation[1].push_shaft(0.8)
+        later(bus, 2.0)
+        servo.cap_current(0.5)
+        later(bus, 1.0)
+        assert servo.position() == pytest.approx(3.8, abs=0.01)

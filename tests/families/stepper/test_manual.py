@@ -435,3 +435,15 @@ def test_others_learn_of_an_error_before_project_1_is_given_back(one: Bench) -> 
     with pytest.raises(RequestError, match="not saved"):
         one.run(manual.keep_time(one.device, 3.0, others, velocity=tau))
     assert seen
+
+
+def test_a_power_off_between_two_commands_is_no_reason_to_move_farther_than_said(one: Bench) -> None:
+    one.device.write(step_1_speed=600 * tau / 60)
+    one.device.write(step_1_speed=60 * tau / 60, save=False)
+    one.device.jog_forward(0.1)
+    one.simulated.power_off()
+    one.simulated.power_on()
+    started = one.simulated.position
+    moved = one.device.jog_forward(1.0)
+    turned = (one.simulated.position - started) / 1600 * tau
+    assert moved.angle == pytest.approx(turned, rel=0.1)

@@ -112,6 +112,8 @@ def write(
     """Write a program into a project, or a backup into all of its projects, verified."""
     source = read_text(file)
     backup = Backup.parse(source) if read_toml(source).get("kind") == KIND else None
+    if backup and not save:
+        raise RequestError("a backup is always saved", advice="leave --no-save out; nothing was sent")
     if backup:
         chosen = backup.projects if project is None else (project,)
         programs = [Program(project=replace(backup.project(number), number=number)) for number in chosen]
@@ -221,7 +223,11 @@ def run(
         )
         procedure = Controller.run.function(one, project, timeout=seconds, watch=ports, **common)
         with run.output.progress(f"project {project}") as bar:
-            ran: Ran = bus.run(procedure, report=partial(_report, run.output, bar))
+            try:
+                ran: Ran = bus.run(procedure, report=partial(_report, run.output, bar))
+            except (KeyboardInterrupt, SystemExit):
+                run.output.note(f"project {project} may still run: `motorbus stop {run.bus}` ends it")
+                raise
     took = "" if ran.seconds is None else f" in {ran.seconds:.3f} s"
     facts = {"project": project, "outcome": ran.outcome.value, "seconds": ran.seconds, "why": ran.why}
     run.show(facts, f"project {project} {ran.outcome.value}{took}: {ran.why}\nestimate: {ran.predicted}")

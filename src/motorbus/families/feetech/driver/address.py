@@ -190,6 +190,7 @@ async def _plan_and_move(node: Node, change: AddressChange) -> None:
             raise
     finally:
         node.forget_settings(written=True)
+        node.facts.changes[change.new.id] += 1
 
 
 class _Move(Guard):
@@ -236,6 +237,7 @@ async def recover(node: Node, change: str, facts: Mapping[str, Any]) -> str:
         return await Exclusive(work())
     finally:
         node.forget_settings(written=True)
+        node.facts.changes[move.new.id] += 1
 
 
 async def settle(change: AddressChange) -> str:

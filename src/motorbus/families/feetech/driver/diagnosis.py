@@ -81,7 +81,7 @@ def _rules(node: Node, raw: Raw) -> list[tuple[bool, str]]:
         (raw("torque_enable") != 1, "its torque is off: enable_torque()"),
         (
             bool(traits.limit) and raw(traits.limit or "lock") == 0,
-            "torque_limit is 0: write(torque_limit=1.0)",
+            "torque_limit is 0: cap_torque(1.0)",
         ),
         (raw("max_torque") == 0, "max_torque is 0, which bounds its torque: write(max_torque=1.0)"),
     ]

@@ -81,8 +81,12 @@ def identify(node: Node) -> Request[Identity]:
 
 
 async def known(node: Node) -> RegisterMap:
-    """Its register map; it is read unless its settings are known and it has answered in the last second."""
-    if node.table is None or node.settings is None or await Sleep(0) - node.at > SILENCE:
+    """Its register map; it is read unless its settings are known and it has answered in the last second.
+
+    It is read as well where another object has written settings at its id.
+    """
+    silent = await Sleep(0) - node.at > SILENCE
+    if node.table is None or node.settings is None or node.is_outdated or silent:
         await identify(node)
     assert node.table is not None
     return node.table

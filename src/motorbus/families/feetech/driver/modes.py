@@ -183,6 +183,8 @@ async def set_current(node: Node, current: float) -> None:
 
 async def jog(node: Node, velocity: float, seconds: float) -> None:
     """Turn at `velocity` rad/s for so many seconds, then decelerate. In velocity mode."""
+    if not (is_number(seconds) and seconds >= 0):
+        raise node.refusal(f"cannot turn for {shown(seconds)} s", expected="a number of seconds, 0 or more")
 
     async def turn() -> None:
         await set_velocity(node, velocity)

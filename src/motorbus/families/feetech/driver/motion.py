@@ -469,6 +469,7 @@ async def _calm(node: Node) -> None:
 async def cap_current(node: Node, current: float) -> None:
     """Bound the current (A, above 0) of an HLS until power-off or an order with another bound.
 
+    Where it has no force its goal becomes its present position first.
     Raises RequestError for another servo, or in a mode where the register is no bound.
     """
     await read_settings(node)
@@ -476,6 +477,10 @@ async def cap_current(node: Node, current: float) -> None:
     if node.known_mode not in (Mode.POSITION, Mode.VELOCITY):
         what = f"is in operating mode {goals.shown_mode(node)}, where its goal torque bounds nothing"
         raise node.refusal(what, "set_mode('position')")
+    node.bound = None
+    await read_bound(node)
+    if node.bound == 0:
+        await _calm(node)
     row = node.row(node.traits.current)
     value, most = float(node.value(row, row.decode(data))), float(node.value(row, row.high))
     await ordered(node, Block(row.address, data, row.effect, (Setpoint(node.node, "cap", value, 0.0, most),)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from math import degrees, inf
 from typing import Any, Final, NamedTuple
@@ -77,11 +78,15 @@ class Pending(NamedTuple):
 
 
 class BusFacts:
-    """What is known of the servos of one bus, by id: `arcs` are settings (degrees), `maps` the maps that were met."""
+    """What is known of the servos of one bus, by id.
+
+    `arcs` are settings (degrees), `maps` the maps that were met, `changes` counts own writes of EEPROM settings.
+    """
 
     def __init__(self, arcs: Mapping[int, float] | None = None) -> None:
         self.arcs: Final = arcs or {}
         self.maps: Final[dict[int, str]] = {}
+        self.changes: Final[Counter[int]] = Counter()
 
 
 class Node:
@@ -104,6 +109,7 @@ class Node:
         self.kept: Final[dict[str, tuple[Settings, Request[Any]]]] = {}  # requests, with their settings
         self._last: Settings | None = None
         self._is_written = False  # since `_last` was read
+        self._changes = 0  # of the facts, when `_last` was read
 
     @property
     def limits(self) -> tuple[float, float] | None:
@@ -144,12 +150,20 @@ class Node:
             self.epoch += 1
         self.settings = self._last = settings
         self._is_written = False
+        self._changes = self.facts.changes[self.node]
 
     def forget_settings(self, *, written: bool = False) -> None:
         """Its settings may have changed, or were `written`: they are read before they are used again."""
         self.settings = None
         self.bound = None
-        self._is_written |= written
+        if written:
+            self._is_written = True
+            self.facts.changes[self.node] += 1
+
+    @property
+    def is_outdated(self) -> bool:
+        """Settings at its id were written through another object since its own were read."""
+        return self._changes != self.facts.changes[self.node]
 
     def row(self, name: str) -> Register:
         """A register of an identified servo, as its present mode codes it."""

@@ -105,9 +105,12 @@ async def read_image(node: Node, number: int) -> Project:
 async def cached(node: Node, number: int) -> Project:
     """A project as it was read last, else by two dumps.
 
-    An input is read first: after a missing reply or a reconnect the bus then probes, which forgets the projects.
+    An input is read first: after a missing reply or a reconnect the bus then probes, which forgets the projects. With
+    edits that are not saved the dumps are read: a power-off between two commands loses them without a missing reply.
     """
-    if number in node.state.projects:
+    if node.state.unsaved is not None:
+        node.state.projects.pop(number, None)
+    elif number in node.state.projects:
         await read_input(node, 1)
     return node.state.projects.get(number) or await read_image(node, number)
 
