@@ -93,7 +93,8 @@ def _advise(error: MotorbusError, bus: str) -> None:
         ends = f", or SIGTERM to process {error.owner}," if error.owner is not None else ""
         error.advice += (
             f". If it is a motorbus command, Ctrl-C there{ends} ends it: its axes stop, and those whose `exit` is "
-            f"hold keep their torque; `motorbus estop {name_of(bus)}` stops the bus at once, and cuts the torque"
+            f"hold keep their torque; a stepper program runs on; `motorbus estop {name_of(bus)}` stops the bus at "
+            "once, and cuts the torque of servos"
         )
 
 

@@ -60,7 +60,7 @@ Examples:
     motorbus simulate feetech --link /tmp/arm --broadcast-ping in_turn
     motorbus simulate kst --ids 0x25,0x26 --profile kst-ext --link /tmp/can
     motorbus simulate feetech --link /tmp/arm --faults "seed 1; 1%: delay 0.1"
-    motorbus simulate stepper --link /tmp/stepper --pace --reply-fault lost""",
+    motorbus simulate stepper --link /tmp/stepper --pace --select relabel""",
 )
 
 Flag = Annotated[bool, Parameter(negative="")]
