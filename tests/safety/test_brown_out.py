@@ -33,7 +33,7 @@ class Served(NamedTuple):
         with socket.socket(socket.AF_UNIX) as client:
             client.connect(str(self.control))
             client.sendall(f"power-cycle {node}\n".encode())
-            assert client.makefile().readline() == "ok\n"
+            assert client.makefile().readline() == '{"ok": true}\n'
 
 
 @pytest.fixture(params=["sts3215", "sm85blhv"])

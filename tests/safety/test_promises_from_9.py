@@ -33,7 +33,7 @@ def test_09_a_change_of_settings_is_all_or_nothing_and_the_lock_is_closed_again(
 
 
 def test_09_a_device_whose_change_nobody_has_ended_is_not_moved() -> None:
-    with motorbus.simulate("feetech", ids="3") as sim, motorbus.open(sim.url) as bus:
+    with motorbus.simulate("feetech", ids="3") as sim, motorbus.open(sim.url, interlock=Gate()) as bus:
         assert isinstance(bus.interlock, Gate)
         bus.interlock.faults[3] = "a change of it is unfinished"
         servo = motorbus.feetech.Servo(bus, 3)

@@ -23,7 +23,7 @@ from motorbus.motion_new.program import OnBuses, raise_first
 from motorbus.motion_new.state import OpenMachine
 from motorbus.motion_new.status import AxisStatus
 from motorbus.session.address import parse_address
-from motorbus.session.keeping import unfinished
+from motorbus.session.journals import unfinished
 
 USUAL_VELOCITY: Final = tau / 4  # rad/s of an axis that an address gives
 UNTRUSTED: Final = "unfinished change: "
