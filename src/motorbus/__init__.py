@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from motorbus import recorder
     from motorbus.families import feetech, kst, stepper
     from motorbus.session import open, open_async, simulate
-    from motorbus.session.robot import AsyncRobot, Robot
+    from motorbus.motion.robot import AsyncRobot, Robot
 
 __version__ = "0.1.0"
 
@@ -87,8 +87,8 @@ __all__ = [
 ]
 
 _LAZY = {
-    "AsyncRobot": "motorbus.session.robot",
-    "Robot": "motorbus.session.robot",
+    "AsyncRobot": "motorbus.motion.robot",
+    "Robot": "motorbus.motion.robot",
     "open": "motorbus.session",
     "open_async": "motorbus.session",
     "simulate": "motorbus.session",

@@ -1,1 +1,1 @@
-"""Motion in SI units, blind to families. So far: the gate that every motion command passes."""
+"""Motion: the machine file, the safety gate, the control loop, moves, and the robot that every face uses."""

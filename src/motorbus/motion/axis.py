@@ -1,42 +1,94 @@
-"""The verbs of an axis, in one list: `Axis` and `AsyncAxis` are two-line classes over it.
-
-Each is a driver function of an axis, and is there on an axis whose device has the capability that it needs.
-"""
+"""One axis of an open machine, and programs that visit axes on all buses at the same time."""
 
 from __future__ import annotations
 
-from motorbus.core.device import AsyncDevice, BlockingDevice
-from motorbus.motion import capabilities as axis
-from motorbus.motion import reckoning
-from motorbus.motion.capabilities import AxisVerbs, ability
-from motorbus.motion.moving import jogging
-from motorbus.motion.moving import verbs as moving
-from motorbus.motion.safety import standstill
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from motorbus.bus.base import BaseBus
+from motorbus.core.family import AxisDriver
+from motorbus.core.steps import Runnable, catch, gather
+from motorbus.errors import RequestError
+from motorbus.motion.machine import AxisConfig
+from motorbus.motion.program import OnBuses
+from motorbus.motion.status import AxisStatus
 
 
-class _Verbs(AxisVerbs):
-    state = ability("state", axis.state)
-    position = ability("position", axis.position)
-    velocity = ability("velocity", axis.velocity)
-    load = ability("load", axis.load)
-    current = ability("current", axis.current)
-    voltage = ability("voltage", axis.voltage)
-    temperature = ability("temperature", axis.temperature)
-    enable_torque = ability("enable_torque", axis.enable_torque)
-    disable_torque = ability("disable_torque", axis.disable_torque)
-    stop = ability("stop", axis.stop)
-    stopped = ability("stop", standstill.stopped)
-    hold = ability(("enable_torque", "stop"), axis.hold)
-    move = ability(("stream", "keep_time"), moving.move_axis)
-    move_by = ability(("stream", "move_by"), moving.move_by)
-    jog = ability(("stream", "jog"), jogging.jog)
-    home = ability("home", reckoning.home)
-    run = ability("run", reckoning.run)
+@dataclass(slots=True, eq=False)
+class Axis:
+    """One axis: its configuration, its device and what that can do, what is known of it.
+
+    `limits` are those of the device (rad); `top_velocity` is what its model can do (rad/s of the device), None if
+    unknown.
+    """
+
+    name: str
+    config: AxisConfig
+    bus: BaseBus
+    device: Any
+    driver: AxisDriver
+    status: AxisStatus
+    model: str = ""
+    limits: tuple[float, float] | None = None
+    top_velocity: float | None = None
+
+    def require(self, *capabilities: str) -> None:
+        """Raise RequestError if its device lacks one of these functions."""
+        for capability in capabilities:
+            if capability not in self.driver:
+                raise RequestError(
+                    f"{self.name}: {self.config.device} has no {capability.replace('_', ' ')}",
+                    node=self.config.node,
+                )
+
+    @property
+    def follows_setpoints(self) -> bool:
+        """A control loop can lead it."""
+        return ("set_velocity" if self.config.is_wheel else "stream") in self.driver
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Lowest and highest position (rad, m), by file and device."""
+        low, high = self.status.low, self.status.high
+        if self.limits is not None:
+            low, high = max(low, self.limits[0]), min(high, self.limits[1])
+        ends = self.config.from_device(low), self.config.from_device(high)
+        return min(ends), max(ends)
 
 
-class Axis(_Verbs, BlockingDevice):
-    """An axis of a `Robot`."""
+def by_bus(axes: Sequence[Axis]) -> dict[BaseBus, list[Axis]]:
+    """Axes by their bus."""
+    found: dict[BaseBus, list[Axis]] = {}
+    for axis in axes:
+        found.setdefault(axis.bus, []).append(axis)
+    return found
 
 
-class AsyncAxis(_Verbs, AsyncDevice):
-    """An axis of an `AsyncRobot`: every verb is awaited."""
+async def on_axes(axes: Sequence[Axis], visit: Callable[[Axis], Runnable[Any]]) -> dict[str, Any]:
+    """Program: run `visit(axis)` for each axis, all at the same time; gives the value or error of each by name."""
+
+    async def visit_all(members: list[Axis]) -> tuple[Any, ...]:
+        results: tuple[Any, ...] = await gather(*[catch(visit(axis)) for axis in members])
+        return results
+
+    groups = by_bus(axes)
+    values = await OnBuses({bus: visit_all(members) for bus, members in groups.items()}) if axes else {}
+    found: dict[str, Any] = {}
+    for bus, members in groups.items():
+        results = values[bus] if isinstance(values[bus], tuple) else [values[bus]] * len(members)
+        found |= {axis.name: result for axis, result in zip(members, results, strict=True)}
+    return found
+
+
+async def read_state(axis: Axis) -> None:
+    """Procedure: read all that the device reports into its status."""
+    status = axis.status
+    if "state" in axis.driver:
+        state = await axis.driver.state(axis.device)
+        status.state = state
+        if state.position is None or status.take(state.position, state.at):
+            return
+    for _ in range(2 if "position" in axis.driver else 0):  # a suspect position is read again
+        if status.take(await axis.driver.position(axis.device), axis.bus.now()):
+            return

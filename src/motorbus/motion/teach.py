@@ -1,125 +1,224 @@
-"""Show a machine by hand what to do: its axes are let go and guided, and where they are is written down on a grid."""
+"""Teach, replay and follow: clients of the control loop."""
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Final
 
-from motorbus.core.family import Quality
-from motorbus.errors import MotionError, MotorbusError, RequestError
-from motorbus.motion import group
-from motorbus.motion.body import Body
-from motorbus.motion.follow import Ending, check_able, check_seconds
-from motorbus.motion.loop.cycle import divided
-from motorbus.motion.loop.faces import Errand, LoopFace
-from motorbus.motion.loop.readings import LoopState
-from motorbus.motion.profile.shapes import NOTHING
-from motorbus.motion.trajectory import Trajectory
-from motorbus.motion.trajectory.samples import MOST
+from motorbus.errors import MotorbusError, RequestError
+from motorbus.motion.axis import Axis
+from motorbus.motion.commands import LoopResult
+from motorbus.motion.loop import ControlLoop, Policy
+from motorbus.motion.machine import Names
+from motorbus.motion.moves import (
+    Course,
+    Running,
+    StopsIfInterrupted,
+    check_reach,
+    check_seconds,
+    ended,
+    lead,
+    loop_result,
+    move,
+    release_torque,
+)
+from motorbus.motion.program import raise_first
+from motorbus.motion.state import OpenMachine
+from motorbus.motion.trajectory import MOST, Interpolation, Trajectory
 
-LOG = logging.getLogger("motorbus.motion")
+NEAR: Final = 0.005  # rad of the device that an axis may be off the start of a trajectory
 
 
-def teach(
-    body: Body,
-    names: str | Iterable[str] | None = None,
+async def teach(
+    machine: OpenMachine,
+    names: Names = None,
     *,
     seconds: float | None = None,
-    rate: float = 50.0,
     until: Callable[[], bool] | None = None,
-    limp: bool = True,
-) -> Errand[Trajectory]:
-    """Let these axes go and write down where they are guided, `rate` times a second (Hz); None: all that can be taught.
+    rate: float = 50.0,
+    keep_torque: bool = False,
+) -> Trajectory:
+    """Record axes that are moved by hand, `rate` times per s, for `seconds` or until `until()` is true.
 
-    The trajectory has the times of the readings, from 0 on: those of a loop that was held up are late, and stand where
-    they were taken. A cycle in which an axis was not heard, or cannot be believed, has no sample; nothing is
-    smoothed, see `Trajectory.smoothed`. With `limp=False` torque is left as it is, for axes that something else
-    moves.
-
-    It ends after `seconds`, or when `until`, which is asked in each cycle, gives True. Without either, Ctrl-C ends it
-    and what was taught is given. With as many samples as a trajectory can have (`MOST`) it ends too, and the log says
-    so. The axes stay limp. Raises RequestError for an axis that cannot be taught by hand, or
-    whose device cannot be asked in a loop; MotionError for less than two samples; and what a `Loop` raises, as when an
-    axis falls silent or a port is gone: the trajectory until then is `so_far` of that error.
+    Torque is switched off first and stays off, unless `keep_torque`. Without `seconds` and `until` Ctrl-C ends it. A
+    cycle without the position of an axis gives no sample; notes say where an axis was outside its limits. The error
+    that ends a recording has it as `so_far`.
     """
     check_seconds(seconds)
-    axes = taught(body, names, limp=limp)
-    teaching = _Teaching(rate, seconds, until)
-    return Errand(
-        teaching,
-        rate,
-        axes,
-        before=(lambda: group.disable_torque(body, axes)) if limp else None,
-        endless=seconds is None and until is None,
-        failed=teaching.failed,
+    axes = _taught(machine, names, keep_torque=keep_torque)
+    if not keep_torque:
+        raise_first(await release_torque(axes))
+    loop = ControlLoop(machine, [axis.name for axis in axes], rate=rate)
+    recording = _Recording(axes)
+    try:
+        async with Running(loop):
+            begun = machine.now()
+            while not ended(machine.now() - begun, seconds, until) and len(recording.times) < MOST:
+                state = await loop.cycle()
+                if not state.missing:
+                    recording.add(state.at, state.position)
+    except MotorbusError as error:
+        error.so_far = recording.trajectory() if len(recording.times) > 1 else None
+        raise
+    except KeyboardInterrupt:
+        if seconds is not None or until is not None:
+            raise
+    return recording.trajectory()
+
+
+def _taught(machine: OpenMachine, names: Names, *, keep_torque: bool) -> list[Axis]:
+    axes = machine.chosen(names)
+    able = [
+        axis
+        for axis in axes
+        if "stream" in axis.driver
+        and not axis.config.is_wheel
+        and (keep_torque or "disable_torque" in axis.driver)
+    ]
+    if not able or (names is not None and len(able) < len(axes)):
+        others = ", ".join(axis.name for axis in axes if axis not in able)
+        raise RequestError(f"{others}: cannot be moved by hand and read in a loop", advice="name other axes")
+    return able
+
+
+class _Recording:
+    def __init__(self, axes: list[Axis]) -> None:
+        self.times: list[float] = []
+        self._places: dict[str, list[float]] = {axis.name: [] for axis in axes}
+        self._axes = axes
+        self._outside: dict[str, str] = {}
+
+    def add(self, at: float, positions: Mapping[str, float]) -> None:
+        """Add a sample."""
+        self.times.append(at)
+        for axis in self._axes:
+            place = positions[axis.name]
+            self._places[axis.name].append(place)
+            if not axis.config.allows(place) and axis.name not in self._outside:
+                note = f"{axis.name} is outside its limits at {at - self.times[0]:.2f} s: {axis.config.show(place)}"
+                self._outside[axis.name] = note
+
+    def trajectory(self) -> Trajectory:
+        """What was recorded. Raises RequestError for fewer than two samples."""
+        times = [at - self.times[0] for at in self.times]
+        return Trajectory(times, self._places, tuple(self._outside.values()))
+
+
+async def replay(
+    machine: OpenMachine,
+    trajectory: Trajectory,
+    *,
+    speed: float = 1.0,
+    smooth: float | None = None,
+    repeat: int = 1,
+    interpolation: Interpolation = "spline",
+    rate: float | None = None,
+) -> LoopResult:
+    """Play a trajectory `repeat` times, `speed` times as fast; first move to its start.
+
+    The goals that will be sent are checked against all limits before anything moves: LimitExceeded says when the first
+    one is violated. `smooth` (Hz) removes what is quicker.
+    """
+    if not 0 < speed <= 10 or not 1 <= repeat <= 100_000:
+        raise RequestError(
+            f"speed {speed}, {repeat} times", expected="speed above 0, at most 10; at least once"
+        )
+    names = tuple(trajectory.axes)
+    axes = machine.chosen(names)
+    if smooth is not None:
+        trajectory = trajectory.smoothed(smooth)
+    loop = ControlLoop(machine, names, rate=rate, direct=True)
+    async with StopsIfInterrupted(axes):
+        try:
+            await loop.enter()
+            goals = trajectory.sampled(loop.rate, interpolation, speed)
+            goals.check({axis.name: axis.config for axis in axes})
+            for axis in axes:
+                for place in (min(goals.axes[axis.name]), max(goals.axes[axis.name])):
+                    check_reach(axis, place)
+            begun = machine.now()
+            for _ in range(repeat):
+                await _play(machine, loop, goals)
+        finally:
+            loop.close()
+    return loop_result(loop, machine.now() - begun, notes=trajectory.notes)
+
+
+async def _play(machine: OpenMachine, loop: ControlLoop, goals: Trajectory) -> None:
+    start = goals.positions(0.0)
+    far = {
+        name: place
+        for name, place in start.items()
+        if abs(place - loop.axes[name].position) * abs(machine.axes[name].config.ratio) > NEAR
+    }
+    if far:
+        await move(machine, far)
+        await loop.read()
+        for axis in loop.axes.values():
+            axis.release()
+    peaks = {
+        name: max(
+            abs(end - here) / (later - at)
+            for (here, end), (at, later) in zip(pairwise(places), pairwise(goals.times), strict=True)
+        )
+        for name, places in goals.axes.items()
+    }
+    await lead(loop, Course(goals.duration, goals.positions, peaks, goals.positions(goals.duration)), {})
+
+
+async def follow(
+    machine: OpenMachine,
+    pairs: Mapping[str, str],
+    *,
+    seconds: float | None = None,
+    until: Callable[[], bool] | None = None,
+    rate: float = 100.0,
+    policy: Policy = "clamp",
+) -> LoopResult:
+    """Let axes track others, `{leader: follower}`, within the limits of the followers.
+
+    Torque of the leaders is switched off. While a leader does not answer, its follower stays at its last target;
+    `held` of the result counts these cycles. Without `seconds` and `until` Ctrl-C ends it.
+    """
+    check_seconds(seconds)
+    leaders, followers = list(pairs), list(pairs.values())
+    names = [*leaders, *followers]
+    if not pairs or len(set(names)) < len(names):
+        raise RequestError("each axis is in one pair", expected="{leader: follower}")
+    for leader, follower in pairs.items():
+        first, second = (machine.axis(name).config for name in (leader, follower))
+        if bool(first.travel) != bool(second.travel) or first.is_wheel or second.is_wheel:
+            raise RequestError(f"{follower} cannot follow {leader}: they measure different things")
+    raise_first(
+        await release_torque([one for one in machine.chosen(leaders) if "disable_torque" in one.driver])
     )
+    loop = ControlLoop(machine, names, rate=rate, policy=policy)
+    held = dict.fromkeys(followers, 0)
+    async with StopsIfInterrupted(machine.chosen(followers)), Running(loop):
+        begun = machine.now()
+        while not ended(machine.now() - begun, seconds, until):
+            state = await loop.cycle()
+            for leader, follower in pairs.items():
+                if leader in state.missing:
+                    held[follower] += 1
+                else:
+                    loop.set_target(follower, state.position[leader])
+    return loop_result(loop, machine.now() - begun, {name: count for name, count in held.items() if count})
 
 
-def taught(body: Body, names: str | Iterable[str] | None, *, limp: bool) -> tuple[str, ...]:
-    """The axes that are taught of these; of all (None) those who can be. Raises RequestError for one that cannot be
-    taught, or when none can be. Nothing is sent."""
-    chosen = body.chosen(names)
-    if names is not None:
-        check_able(body, chosen, "stream", "taught: nothing tells where it is in a loop")
-        if limp:
-            check_able(body, chosen, "disable_torque", "taught by hand")
-        return tuple(chosen)
-    led, without = divided(chosen)
-    if not led:
-        raise RequestError(
-            "none of these axes can be taught",
-            expected="an axis that tells where it is in a loop",
-            cause=f"{', '.join(without)}: nobody can ask such a device in a loop",
-            advice=f"add such an axis to the machine; {NOTHING}",
-        )
-    found = tuple(name for name, axis in led.items() if not limp or "disable_torque" in axis.able)
-    if not found:
-        raise RequestError(
-            "none of these axes can be taught by hand",
-            expected="an axis that tells where it is and can be let go",
-            advice=f"limp=False writes down what something else moves; {NOTHING}",
-        )
-    return found
+async def replay_file(
+    machine: OpenMachine, file: str, *, skip_others: bool = False, **options: Any
+) -> LoopResult:
+    """Play a trajectory file. Options and errors as for `Trajectory.load` and `replay`."""
+    trajectory = Trajectory.load(file, machine.config.axes, skip_others=skip_others)
+    return await replay(machine, trajectory, **options)
 
 
-class _Teaching:
-    def __init__(self, rate: float, seconds: float | None, until: Callable[[], bool] | None) -> None:
-        self._over = Ending(rate, seconds, until)
-        self._axes: tuple[str, ...] = ()
-        self._times: list[float] = []
-        self._rows: list[tuple[float, ...]] = []
-
-    def step(self, loop: LoopFace, state: LoopState) -> bool:
-        """See `loop.Course`."""
-        if not (state.missing or Quality.SUSPECT in state.doubts.values()):
-            self._axes = loop.axes
-            self._times.append(state.at)
-            self._rows.append(tuple(state.position.values()))
-        if self._over(state.number):
-            return False
-        if len(self._rows) < MOST:
-            return True
-        LOG.warning(
-            "teaching ended after %.6g s: a trajectory has %d samples at most", self._over.seconds, MOST
-        )
-        return False
-
-    def result(self, loop: LoopFace) -> Trajectory:
-        """See `loop.Course`."""
-        if len(self._rows) < 2:
-            raise MotionError(
-                f"{len(self._rows)} samples in {self._over.seconds:.3g} s are no trajectory",
-                expected="two cycles or more in which every axis was heard",
-                advice="teach longer, at a higher rate, or see why an axis is silent; the axes stay as they are",
-            )
-        return self._seen()
-
-    def failed(self, error: MotorbusError) -> None:
-        """See `loop.Errand`: what was taught goes along with what ended it."""
-        if len(self._rows) >= 2:
-            error.so_far = self._seen()
-
-    def _seen(self) -> Trajectory:
-        times = [at - self._times[0] for at in self._times]
-        columns = zip(*self._rows, strict=True)
-        return Trajectory(times, dict(zip(self._axes, columns, strict=True)))
+async def teach_file(machine: OpenMachine, file: str, **options: Any) -> LoopResult:
+    """Record into a new file. Options and errors as for `teach`."""
+    with Path(file).open("x") as opened:  # refused before anything is recorded
+        made = await teach(machine, **options)
+        opened.write(made.text(machine.config.axes))
+    return LoopResult(made.duration, len(made.times), made.positions(made.duration), notes=made.notes)

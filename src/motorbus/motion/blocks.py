@@ -1,0 +1,111 @@
+"""Blocks of a robot: a control loop, and the time in which the machine is attended.
+
+Both are for `with` of a `Robot` and for `async with` of an `AsyncRobot`; `run` runs a program in the way of each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from typing import Any, Self
+
+from motorbus.bus.base import BaseBus
+from motorbus.errors import RequestError
+from motorbus.motion.lease import Lease, LeaseWatch, lease_lost
+from motorbus.motion.loop import ControlLoop, LoopState
+from motorbus.motion.moves import StopsIfInterrupted, stop_axes
+from motorbus.motion.program import Program, raise_first
+from motorbus.motion.shutdown import stop_bus
+from motorbus.motion.state import OpenMachine
+
+
+class Loop:
+    """A control loop of a robot, for `with`, or `async with` of an `AsyncRobot`; iterate to run its cycles.
+
+    It brakes at the end of the block; after an error it stops its axes. See `ControlLoop`.
+    """
+
+    def __init__(self, loop: ControlLoop, run: Callable[[Program[Any]], Any]) -> None:
+        self._loop = loop
+        self._run = run
+        self.set_target = loop.set_target
+        self.statistics = loop.statistics
+
+    def read(self) -> Any:
+        """Read all positions (rad, m) now, by name."""
+        return self._run(self._loop.read())
+
+    def write(self, targets: Mapping[str, float], elapsed: float) -> Any:
+        """Send targets now, `elapsed` s after the last ones; gives what was sent, by name."""
+        return self._run(self._loop.write(targets, elapsed))
+
+    def __iter__(self) -> Iterator[LoopState]:
+        while True:
+            yield self._run(self._loop.cycle())
+
+    async def __aiter__(self) -> AsyncIterator[LoopState]:
+        while True:
+            yield await self._run(self._loop.cycle())
+
+    def __enter__(self) -> Self:
+        self._run(self._loop.enter())
+        return self
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        self._run(self._finish(error))
+
+    async def __aenter__(self) -> Self:
+        await self._run(self._loop.enter())
+        return self
+
+    async def __aexit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        await self._run(self._finish(error))
+
+    async def _finish(self, error: BaseException | None) -> None:
+        loop = self._loop
+        guard = StopsIfInterrupted(loop.members)
+        if error is not None:
+            loop.close()
+            await guard.leave(error)
+            return
+        async with guard:
+            await loop.leave()
+
+
+class Attendance:
+    """Attends a machine inside a block, see `robot.attended`."""
+
+    def __init__(self, machine: OpenMachine, seconds: float, run: Callable[[Program[Any]], Any]) -> None:
+        self._machine = machine
+        self._run = run
+        self._seconds = seconds
+
+    def __enter__(self) -> Lease:
+        machine = self._machine
+        if machine.lease is not None and not machine.lease.lost:
+            raise RequestError("the machine has a lease already", advice="use one `attended()` at a time")
+        self._lease = machine.lease = Lease(machine.now, self._seconds)
+        self._watch = LeaseWatch(self._lease, machine.buses.values(), self._stop)
+        self._watch.start()
+        return self._lease
+
+    def _stop(self, bus: BaseBus) -> Program[bool]:
+        return stop_bus([axis for axis in self._machine.axes.values() if axis.bus is bus])
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        self._run(self._end(error))
+
+    async def __aenter__(self) -> Lease:
+        return self.__enter__()
+
+    async def __aexit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        await self._run(self._end(error))
+
+    async def _end(self, error: BaseException | None) -> None:
+        lost = self._lease.lost
+        self._watch.end()
+        self._machine.lease = None
+        results = await stop_axes([axis for axis in self._machine.axes.values() if axis.status.endless])
+        if error is None and lost:
+            raise lease_lost("the machine")
+        if error is None:
+            raise_first(results)

@@ -1,0 +1,529 @@
+"""The control loop: goals out and positions in on all buses, in the slots of one clock. The only cyclic engine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import inf, isfinite
+from typing import Any, Final, Literal, TypeAlias
+
+from msgspec import Struct
+
+from motorbus.bus.base import BaseBus
+from motorbus.core.family import Positions, PositionStream
+from motorbus.core.request import Precondition, Request, SetpointGroup, SetpointWrite, Stops
+from motorbus.core.steps import catch, discard, gather
+from motorbus.core.stream import read_positions
+from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, NoReply, RequestError
+from motorbus.motion.axis import Axis, by_bus
+from motorbus.motion.gate import check_owned
+from motorbus.motion.health import HealthMonitor
+from motorbus.motion.machine import SLACK, Names
+from motorbus.motion.profile import Limits, SetpointGenerator
+from motorbus.motion.program import LOST, Exchange, OnBuses, raise_first
+from motorbus.motion.state import OpenMachine
+
+Policy: TypeAlias = Literal["reject", "clamp"]
+MAX_MISSED: Final = 2  # cycles without a position after which an axis gets no goal
+SILENCE: Final = 0.3  # s without a position after which the loop ends
+STALL: Final = 0.5  # s that the host may be late
+CATCH_UP: Final = 3  # periods that a late cycle makes good by one longer step
+MIN_RATE: Final = 4.0  # Hz; goals are one period ahead
+MAX_RATE: Final = 1000.0  # Hz
+USUAL_RATE: Final = 100.0  # Hz
+WIRE_SHARE: Final = 0.7  # of what the wire carries, for a rate that is chosen here
+ENTRY_TRIES: Final = 5  # reads in which each axis must answer once
+
+
+class LoopStatistics(Struct):
+    """`overruns`: cycles that began late; `skipped`: slots without a cycle; the rest by name of the axis.
+
+    `lost` and `suspect` count readings, `clamped` targets; delays are in s.
+    """
+
+    rate: float
+    cycles: int = 0
+    overruns: int = 0
+    skipped: int = 0
+    worst_delay: float = 0.0
+    lost: dict[str, int] = {}
+    suspect: dict[str, int] = {}
+    clamped: dict[str, int] = {}
+
+
+@dataclass(frozen=True, slots=True)
+class LoopState:
+    """One cycle: its slot, its end (s), the last positions (rad, m), the axes that did not answer."""
+
+    number: int
+    at: float
+    position: Mapping[str, float]
+    missing: frozenset[str] = frozenset()
+
+
+class LoopAxis:
+    """An axis in a loop. `owner` is its number while it has torque from this loop, else None.
+
+    The target, and what was `sent` last, are positions (rad, m), of a wheel velocities (rad/s).
+    """
+
+    __slots__ = (
+        "axis", "claimed", "config", "generator", "high", "low", "missed", "name", "owner", "position", "sent",
+        "silent_since", "status", "target",
+    )  # fmt: skip
+
+    def __init__(self, axis: Axis) -> None:
+        config = axis.config
+        self.axis: Final = axis
+        self.config: Final = config
+        self.status: Final = axis.status
+        self.name: Final = axis.name
+        self.low, self.high = (
+            (-config.max_velocity, float(config.max_velocity)) if config.is_wheel else axis.range
+        )
+        self.generator = SetpointGenerator(0.0, Limits(config.max_velocity, config.acceleration))
+        self.target: float | None = None
+        self.owner: int | None = None
+        self.claimed = 0
+        self.position = self.sent = 0.0
+        self.missed = 0
+        self.silent_since = 0.0
+
+    def allows(self, target: float) -> bool:
+        """Whether a target is inside the limits, or leads back towards them; never NaN."""
+        low, high, here = self.low, self.high, self.position
+        return low - SLACK <= target <= high + SLACK or here <= target <= low or high <= target <= here
+
+    def release(self) -> None:
+        """It gets no goals until its next target."""
+        self.target = self.owner = None
+
+    def show(self, value: float) -> str:
+        """A target with its unit."""
+        return f"{value:.4g} rad/s" if self.config.is_wheel else self.config.show(value)
+
+    def restart(self) -> None:
+        """Go on from the measured position, at rest."""
+        if not self.config.is_wheel:
+            self.sent = self.position
+            self.generator.reset(self.position)
+
+
+@dataclass(slots=True, eq=False)
+class BusGroup:
+    """The axes of one bus in a loop. `reads` bring their positions; `group` is the last group of goal requests."""
+
+    bus: BaseBus
+    axes: dict[int, LoopAxis]
+    stream: PositionStream | None
+    reads: tuple[Request[Positions], ...]
+    group: tuple[SetpointGroup, SetpointGroup] | None = field(default=None)
+
+    def requests(self, goals: Mapping[int, float]) -> Sequence[Request[Any]]:
+        """The batch of a cycle: goals (rad of the device) that leave only while the loop owns the axes, then reads."""
+        if not goals or self.stream is None:
+            return self.reads
+        return (*map(self._owned, self.stream.goals(goals)), *self.reads)
+
+    def _owned(self, request: Request[Any]) -> Request[Any]:
+        if not isinstance(request, SetpointWrite):
+            return replace(request, precondition=self._check(request.precondition))
+        group = request.group
+        if self.group is None or self.group[0] is not group:
+            owned = SetpointGroup(group.nodes, group.to_setpoints, self._check(group.precondition))
+            self.group = group, owned
+        return request.with_group(self.group[1])
+
+    def _check(self, own: Precondition | None) -> Precondition:
+        def check(stops: Stops) -> MotorbusError | None:
+            if own is not None and (error := own(stops)) is not None:
+                return error
+            return self.lost(None)
+
+        return check
+
+    def lost(self, lease: Any) -> MotorbusError | None:
+        """The error if the loop does not own one of its axes any more."""
+        return check_owned(
+            [(one.status, one.owner) for one in self.axes.values() if one.owner is not None], lease
+        )
+
+
+class ControlLoop:
+    """Targets are followed within the limits of each axis; with `direct` they are sent as they are.
+
+    Entering reads and writes nothing. An axis gets torque, without a jump, in the cycle after its first target. A
+    target outside the limits raises LimitExceeded, or is clamped and counted with the policy "clamp". A loop raises
+    Interrupted after a stop, NoReply for an axis that is silent for 0.3 s, Faulted, Overloaded, Refused for a lost
+    lease. `rate` in Hz; None: 100, or what the slowest bus carries.
+    """
+
+    def __init__(
+        self,
+        machine: OpenMachine,
+        names: Names = None,
+        *,
+        rate: float | None = None,
+        policy: Policy = "reject",
+        direct: bool = False,
+    ) -> None:
+        chosen = machine.chosen(names)
+        able = [axis for axis in chosen if axis.follows_setpoints]
+        if (names is not None and len(able) < len(chosen)) or not able:
+            others = ", ".join(axis.name for axis in chosen if axis not in able) or "the machine"
+            raise RequestError(
+                f"{others}: no setpoints can be followed", advice="robot.move() uses its own profile"
+            )
+        if rate is not None and not MIN_RATE <= rate <= MAX_RATE:
+            raise RequestError(f"a loop of {rate} Hz", expected=f"{MIN_RATE:g} to {MAX_RATE:g} Hz")
+        if policy not in ("reject", "clamp"):
+            raise RequestError(f"policy {policy!r}", expected="reject or clamp")
+        self.machine: Final = machine
+        self.members: Final = able
+        self.names: Final = tuple(axis.name for axis in able)
+        self.policy: Final = policy
+        self.direct: Final = direct
+        self.axes: dict[str, LoopAxis] = {}
+        self.groups: list[BusGroup] = []
+        self.once: dict[BaseBus, list[Request[Any]]] = {}
+        """Requests that leave at the beginning of the next slot, as the start of a self-timed move."""
+        self.rate = rate or 0.0
+        self.statistics = LoopStatistics(self.rate)
+        self.slot = -1
+        self._next = 0.0
+
+    # -- targets ---------------------------------------------------------------------------------------------------
+
+    def set_target(self, name: str, target: float) -> None:
+        """The target of an axis from the next cycle on: rad or m, of a wheel rad/s."""
+        axis = self.axes.get(name)
+        if axis is None:
+            raise RequestError(f"{name!r} is not in this loop", expected=f"one of {', '.join(self.names)}")
+        if not axis.allows(target):
+            if self.policy == "reject" or target != target:
+                raise LimitExceeded(
+                    f"{name}: {axis.show(target) if isfinite(target) else target} is outside {axis.show(axis.low)} "
+                    f"to {axis.show(axis.high)}",
+                    node=axis.config.node,
+                )
+            self.statistics.clamped[name] = self.statistics.clamped.get(name, 0) + 1
+            target = min(max(target, axis.low), axis.high)
+        if axis.target is None:
+            axis.claimed = axis.status.owner  # a stop before the torque-on withdraws the target
+        axis.target = target
+        self.machine.targets[name] = target
+
+    # -- programs --------------------------------------------------------------------------------------------------
+
+    async def enter(self) -> None:
+        """Open the streams, settle the rate, read all positions."""
+        groups = by_bus(self.members)
+        opened = await OnBuses({bus: _open(bus, axes) for bus, axes in groups.items()})
+        raise_first(opened)
+        for bus, axes in groups.items():
+            members = [LoopAxis(axis) for axis in axes]
+            stream, reads = opened[bus]
+            self.groups.append(BusGroup(bus, {one.config.node: one for one in members}, stream, reads))
+            self.axes |= {one.name: one for one in members}
+        self._settle_rate()
+        for _ in range(ENTRY_TRIES):
+            missing = self._absorb(await self._read())
+            if not missing:
+                break
+        else:
+            first = self.axes[min(missing)]
+            raise NoReply(f"{', '.join(sorted(missing))}: no reply", node=first.axis.config.node)
+        for axis in self.axes.values():
+            axis.restart()
+        self.machine.loops += 1
+
+    def _settle_rate(self) -> None:
+        cycle = max(self._air_time(group) for group in self.groups)
+        most = WIRE_SHARE / cycle if cycle else inf
+        self.rate = self.rate or max(MIN_RATE, min(USUAL_RATE, most))
+        if cycle * self.rate > 1:
+            raise RequestError(
+                f"{self.rate:g} Hz are too fast: a cycle needs {cycle * 1000:.3g} ms on the wire",
+                expected=f"at most {most:.0f} Hz",
+            )
+        self.statistics.rate = self.rate
+
+    def _air_time(self, group: BusGroup) -> float:
+        """s on the wire of the positions of a cycle; goals of the same axes need about as much."""
+        return sum(group.bus.driver.air_time(request, group.bus.rate) for request in group.reads)
+
+    async def _read(self) -> Mapping[BaseBus, Any]:
+        batches = {group.bus: group.reads for group in self.groups if group.reads}
+        return await Exchange(batches) if batches else {}
+
+    async def cycle(self) -> LoopState:
+        """Send the next goals in the next slot of the grid, read all positions, publish the state."""
+        if any(axis.target is not None and axis.owner is None for axis in self.axes.values()):
+            await self._begin()
+        self._check_owned()
+        periods = self._schedule(self.machine.now())
+        await self._turn_wheels(periods)
+        batches: dict[BaseBus, Sequence[Request[Any]]] = {
+            group.bus: group.requests(self._goals(group, periods)) for group in self.groups
+        }
+        once, self.once = self.once, {}
+        for bus, requests in once.items():
+            batches[bus] = [*requests, *batches.get(bus, ())]
+        values = await Exchange(
+            {bus: batch for bus, batch in batches.items() if batch} or batches, self._next
+        )
+        missing = self._absorb(values)
+        self.statistics.cycles += 1
+        state = LoopState(
+            self.slot, self.machine.now(), {n: a.position for n, a in self.axes.items()}, missing
+        )
+        self.machine.publish()
+        self._check(values, state)
+        for bus, requests in once.items():
+            raise_first(dict(enumerate(values[bus][: len(requests)])))
+        await self._look()
+        return state
+
+    async def read(self) -> Mapping[str, float]:
+        """Read all positions (rad, m) now, without the clock of the loop."""
+        values = await self._read()
+        missing = self._absorb(values)
+        self.machine.publish()
+        self._check(values, LoopState(0, self.machine.now(), {}, missing))
+        return {name: axis.position for name, axis in self.axes.items()}
+
+    async def write(self, targets: Mapping[str, float], elapsed: float) -> Mapping[str, float]:
+        """Send targets now, `elapsed` s after the last ones; gives what was sent, within the limits."""
+        for name, target in targets.items():
+            self.set_target(name, target)
+        if any(axis.target is not None and axis.owner is None for axis in self.axes.values()):
+            await self._begin()
+        periods = max(1, round(elapsed * self.rate))
+        await self._turn_wheels(periods)
+        batches = {}
+        for group in self.groups:
+            goals = self._goals(group, periods)
+            batches[group.bus] = group.requests(goals)[: -len(group.reads) or None] if goals else ()
+        values = await Exchange({bus: batch for bus, batch in batches.items() if batch} or batches)
+        self._check(values, LoopState(0, self.machine.now(), {}))
+        await self._look()
+        return {name: axis.sent for name, axis in self.axes.items()}
+
+    async def leave(self) -> None:
+        """Brake the axes that are still moving, within their limits; then the loop sends nothing more."""
+        owned = [axis for axis in self.axes.values() if axis.owner is not None]
+        try:
+            if not self.direct:
+                for axis in owned:
+                    axis.target = 0.0 if axis.config.is_wheel else axis.generator.brake()
+                while any(axis.owner is not None and not self._rests(axis) for axis in owned):
+                    await self.cycle()
+            self.settle()
+        finally:
+            self.close()
+
+    def settle(self) -> None:
+        """The axes that the loop owns have come to rest."""
+        for axis in self.axes.values():
+            if axis.owner is not None and axis.owner == axis.status.owner:
+                axis.status.moving = axis.status.endless = False
+
+    def close(self) -> None:
+        """Send nothing more."""
+        for axis in self.axes.values():
+            axis.release()
+            self.machine.targets.pop(axis.name, None)
+        self.machine.loops -= bool(self.groups)
+        self.groups = []
+
+    def _rests(self, axis: LoopAxis) -> bool:
+        return not axis.sent if axis.config.is_wheel else axis.generator.arrived
+
+    # -- parts of a cycle ------------------------------------------------------------------------------------------
+
+    def _schedule(self, now: float) -> int:
+        """Take the next slot; a slot that has begun is an overrun, whole slots that are gone are skipped."""
+        period = 1 / self.rate
+        if self.slot < 0:
+            self.slot, self._next = 0, now
+            return 1
+        self.slot += 1
+        self._next += period
+        late = now - self._next
+        if late <= 1e-6:
+            return 1
+        statistics = self.statistics
+        gone = int(late / period)
+        statistics.overruns += 1
+        statistics.skipped += gone
+        statistics.worst_delay = max(statistics.worst_delay, late)
+        self.slot += gone
+        self._next += gone * period
+        if late > STALL and any(axis.owner is not None for axis in self.axes.values()):
+            raise Interrupted(
+                f"the program was held up for {late:.2f} s while it led axes", advice="move again"
+            )
+        return 1 + gone
+
+    def _goals(self, group: BusGroup, periods: int) -> dict[int, float]:
+        goals = {}
+        for node, axis in group.axes.items():
+            if axis.owner is None or axis.target is None or axis.missed > MAX_MISSED or axis.config.is_wheel:
+                continue
+            if self.direct:
+                axis.sent = axis.target
+            else:
+                if periods > CATCH_UP:
+                    axis.generator.reset(axis.sent)
+                axis.sent = axis.generator.step(min(periods, CATCH_UP) / self.rate, axis.target)
+            goals[node] = axis.config.to_device(axis.sent)
+        return goals
+
+    async def _turn_wheels(self, periods: int) -> None:
+        """Bring the velocity of each wheel nearer to its target, within its acceleration."""
+        changed: dict[BaseBus, list[LoopAxis]] = {}
+        for axis in self.axes.values():
+            config = axis.config
+            if not config.is_wheel or axis.owner is None or axis.target is None:
+                continue
+            most = config.acceleration * min(periods, CATCH_UP) / self.rate
+            step = axis.target - axis.sent if self.direct else min(max(axis.target - axis.sent, -most), most)
+            if step:
+                axis.sent += step
+                changed.setdefault(axis.axis.bus, []).append(axis)
+        if changed:
+            raise_first(await OnBuses({bus: _set_velocities(axes) for bus, axes in changed.items()}))
+
+    def _absorb(self, values: Mapping[BaseBus, Any]) -> frozenset[str]:
+        """Take the positions of a cycle; the names of the axes without one."""
+        missing = []
+        for group in self.groups:
+            if not group.reads:
+                continue
+            found: dict[int, float] = {}
+            at = 0.0
+            replies = values.get(group.bus)
+            for reply in replies if isinstance(replies, list) else ():
+                if isinstance(reply, Positions):
+                    found |= reply.values
+                    at = reply.at
+            for node, axis in group.axes.items():
+                angle = found.get(node)
+                if angle is not None and axis.status.take(angle, at):
+                    axis.position = axis.config.from_device(angle)
+                    if axis.missed > MAX_MISSED and axis.owner is not None:
+                        axis.restart()
+                    axis.missed = 0
+                    continue
+                counts = self.statistics.lost if angle is None else self.statistics.suspect
+                counts[axis.name] = counts.get(axis.name, 0) + 1
+                axis.silent_since = axis.silent_since if axis.missed else self.machine.now()
+                axis.missed += 1
+                missing.append(axis.name)
+        return frozenset(missing)
+
+    async def _begin(self) -> None:
+        """Torque on, without a jump, for axes with a first target."""
+        fresh = [axis for axis in self.axes.values() if axis.target is not None and axis.owner is None]
+        stopped = [axis for axis in fresh if axis.status.owner != axis.claimed]
+        for axis in stopped:
+            axis.release()
+        if stopped:
+            raise Interrupted(f"{', '.join(axis.name for axis in stopped)}: stopped before the first goal")
+        groups = by_bus([axis.axis for axis in fresh])
+        raise_first(
+            await OnBuses({bus: start_axes(bus, axes, self.machine.health) for bus, axes in groups.items()})
+        )
+        for axis in fresh:
+            if not axis.config.is_wheel:
+                assert axis.status.position is not None
+                axis.position = axis.config.from_device(axis.status.position)
+            axis.restart()
+            axis.owner = axis.status.claim()
+        self.slot = -1
+
+    async def _look(self) -> None:
+        owned = [axis for axis in self.axes.values() if axis.owner is not None]
+        if owned:
+            goals = {a.name: a.config.to_device(a.sent) for a in owned if not a.config.is_wheel}
+            await self.machine.health.look([axis.axis for axis in owned], goals)
+
+    def _check_owned(self) -> None:
+        """Raise the error if a stop or another command has taken an axis; it gets no more goals."""
+        lost = [error for group in self.groups if (error := group.lost(self.machine.lease)) is not None]
+        if lost:
+            for axis in self.axes.values():
+                if axis.owner != axis.status.owner:
+                    axis.release()
+            raise lost[0]
+
+    def _check(self, values: Mapping[BaseBus, Any], state: LoopState) -> None:
+        """Raise what is wrong: a silent axis first, then a lost owner, a lost bus, a refused goal."""
+        for name in state.missing:
+            axis = self.axes[name]
+            silence = self.machine.now() - axis.silent_since
+            if axis.owner is not None and silence > SILENCE:
+                raise NoReply(
+                    f"{name} ({axis.config.device}) has not answered for {silence:.2f} s while it was led",
+                    cause="its cable or supply, or a device in between",
+                    node=axis.config.node,
+                )
+        self._check_owned()
+        raise_first(values)
+        for value in values.values():
+            raise_first({i: one for i, one in enumerate(value) if not isinstance(one, LOST)})
+
+
+async def _open(
+    bus: BaseBus, axes: list[Axis]
+) -> tuple[PositionStream | None, tuple[Request[Positions], ...]]:
+    """Procedure: the stream of the position axes of a bus, and the requests that read all positions."""
+    led = [axis for axis in axes if not axis.config.is_wheel]
+    stream = await led[0].driver.stream([axis.device for axis in led], rate=bus.rate) if led else None
+    reads = list(stream.positions) if stream is not None else []
+    for axis in axes:
+        if axis.config.is_wheel and "position" in axis.driver:
+            await axis.driver.position(axis.device)  # from then on it is one request
+            request = axis.driver.position(axis.device)
+            if isinstance(request, Request):
+                reads.append(read_positions(axis.config.node, request))
+            discard(request)
+    return stream, tuple(reads)
+
+
+async def _set_velocities(axes: list[LoopAxis]) -> None:
+    """Procedure: send the velocity of these wheels, unless a stop has taken them."""
+    for one in axes:
+        if one.owner == one.status.owner:
+            await one.axis.driver.set_velocity(one.axis.device, one.sent * one.config.ratio)
+
+
+async def start_axes(bus: BaseBus, axes: list[Axis], health: HealthMonitor) -> None:
+    """Procedure: torque on, without a jump, for axes of one bus that are to follow setpoints."""
+    led = [axis for axis in axes if not axis.config.is_wheel]
+    await gather(*[health.check_kept(axis) for axis in axes])
+    before = {axis.name: bus.stop_count(axis.config.node) for axis in axes}
+    for axis in axes:
+        await limit_torque(axis)
+    if led:
+        stream = await led[0].driver.stream([axis.device for axis in led], rate=bus.rate)
+        await stream.start(
+            {axis.config.node: abs(axis.config.max_velocity * axis.config.ratio) for axis in led}
+        )
+        for request in stream.positions:
+            found = await catch(request)
+            for axis in led:
+                if isinstance(found, Positions) and axis.config.node in found.values:
+                    axis.status.take(found.values[axis.config.node], found.at)
+    for axis in axes:
+        if axis.config.is_wheel and "enable_torque" in axis.driver:
+            await axis.driver.enable_torque(axis.device)
+        axis.status.engaged = True
+        await health.arm(axis, before[axis.name])
+
+
+async def limit_torque(axis: Axis) -> None:
+    """Procedure: bound its torque as the machine file says."""
+    if axis.config.max_torque is not None:
+        axis.require("cap_torque")
+        await axis.driver.cap_torque(axis.device, axis.config.max_torque)

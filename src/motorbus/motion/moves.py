@@ -1,0 +1,510 @@
+"""Programs that move axes of a robot: move, jog, home, stop, torque."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import inf, isfinite
+from typing import Any, Final, NamedTuple
+
+from motorbus.bus.base import BaseBus
+from motorbus.core.family import SelfTimedMove
+from motorbus.core.request import Request
+from motorbus.core.steps import Guard, Sleep, catch
+from motorbus.errors import LimitExceeded, MotionError, MotorbusError, NotHomed, RequestError, Stalled
+from motorbus.motion.axis import Axis, by_bus, on_axes
+from motorbus.motion.commands import AxisResult, LoopResult, MoveResult, StopResult, StopState
+from motorbus.motion.loop import ControlLoop, LoopState, start_axes
+from motorbus.motion.machine import Names
+from motorbus.motion.profile import Kind, Limits, Move, Synchronized, synchronize
+from motorbus.motion.program import Exchange, OnBuses, raise_first
+from motorbus.motion.state import OpenMachine
+
+TOLERANCE: Final = 0.05  # rad of the device; a servo under load stays 30 counts off its goal (user reports)
+SETTLE_TIME: Final = 1.0  # s after the end of the profile within which an axis must be in position
+LAG_TIME: Final = 0.3  # s that an axis may lag at the highest speed of its profile
+LAG: Final = 0.1  # rad of the device that an axis may lag in any case
+STILL: Final = 0.006  # rad; the coarsest position has counts of 0.005 rad
+REST_TIME: Final = 0.1  # s for which readings must agree
+REST_READS: Final = 3
+REST_PERIOD: Final = 0.02  # s
+WATCH_TIME: Final = 1.0  # s
+
+
+class StopsIfInterrupted(Guard):
+    """An error or interrupt inside the block stops these axes; notes of the error say what became of each."""
+
+    def __init__(self, axes: list[Axis]) -> None:
+        self._axes = axes
+
+    async def leave(self, error: BaseException | None) -> None:
+        if error is None:
+            return
+        moving = [axis for axis in self._axes if axis.status.moving and not axis.status.fault]
+        for name, result in (await stop_axes(moving)).items():
+            text = f"not stopped: {result.summary}" if isinstance(result, MotorbusError) else result.promise
+            error.add_note(f"{name}: {text}")
+
+
+# -- move ------------------------------------------------------------------------------------------------------
+
+
+async def move(
+    machine: OpenMachine,
+    goals: Mapping[str, float],
+    *,
+    duration: float | None = None,
+    speed: float = 1.0,
+    kind: Kind = "trapezoid",
+    relative: bool = False,
+    tolerance: float = TOLERANCE,
+    timeout: float = SETTLE_TIME,
+) -> MoveResult:
+    """Move axes to these goals (rad, m), or by these distances; all start and end together.
+
+    All goals are checked before anything is sent. `speed` is a share of the velocity and acceleration of each axis,
+    `tolerance` in rad of the device; each axis must be in position within `timeout` s after the end. Raises
+    RequestError, LimitExceeded, NotHomed before anything moves; Stalled, NoReply, Faulted, Overloaded, Interrupted when
+    a stop was sent to all.
+    """
+    axes = [machine.axis(name) for name in goals]
+    if not (isfinite(speed) and 0 < speed <= 1):
+        raise RequestError(f"speed {speed}", expected="above 0, at most 1")
+    for axis in axes:
+        _check_goal(axis, goals[axis.name], relative=relative)
+    led = [axis for axis in axes if axis.follows_setpoints]
+    timed = [axis for axis in axes if axis not in led]
+    loop = ControlLoop(machine, [axis.name for axis in led], direct=True) if led else None
+    async with StopsIfInterrupted(axes):
+        try:
+            if loop is not None:
+                await loop.enter()
+            return await _Mover(machine, loop, timed, goals, relative).run(
+                duration, speed, kind, tolerance, timeout
+            )
+        finally:
+            if loop is not None:
+                loop.close()
+
+
+async def pose(machine: OpenMachine, name: str, **options: Any) -> MoveResult:
+    """Move to a pose of the machine file. Options and errors as for `move`."""
+    poses = machine.config.poses
+    if name not in poses:
+        raise RequestError(f"no pose {name!r}", expected=f"one of {', '.join(poses) or 'none'}")
+    return await move(machine, poses[name], **options)
+
+
+def _check_goal(axis: Axis, goal: float, *, relative: bool) -> None:
+    config = axis.config
+    if config.is_wheel:
+        raise RequestError(f"{axis.name}: a wheel has no position", advice="jog it", node=config.node)
+    if not axis.follows_setpoints:
+        axis.require("plan_move")
+        if axis.status.estimate is None and not (relative and axis.range == (-inf, inf)):
+            raise NotHomed(f"{axis.name}: its position is not known", advice=f'robot.home("{axis.name}")')
+    if not isfinite(goal):
+        raise LimitExceeded(f"{axis.name}: {goal} is not finite", node=config.node)
+    if not relative:
+        check_reach(axis, goal)
+
+
+def check_reach(axis: Axis, goal: float) -> None:
+    """Raise LimitExceeded for a goal (rad, m) outside the limits of an axis and its device."""
+    low, high = axis.range
+    if not low - 1e-9 <= goal <= high + 1e-9:
+        show = axis.config.show
+        raise LimitExceeded(
+            f"{axis.name}: goal {show(goal)} is outside {show(low)} to {show(high)}", node=axis.config.node
+        )
+
+
+class _Mover:
+    """One move: axes of a loop, and self-timed axes that start in a slot of that loop."""
+
+    def __init__(
+        self,
+        machine: OpenMachine,
+        loop: ControlLoop | None,
+        timed: list[Axis],
+        goals: Mapping[str, float],
+        relative: bool,
+    ) -> None:
+        self._machine, self._loop, self._timed = machine, loop, timed
+        self._goals = dict(goals)
+        self._relative = relative
+        self._plans: dict[str, SelfTimedMove] = {}
+        self._starts = {axis.name: axis.status.estimate for axis in timed}
+
+    async def run(
+        self, duration: float | None, speed: float, kind: Kind, tolerance: float, timeout: float
+    ) -> MoveResult:
+        machine = self._machine
+        begun = machine.now()
+        profile = await self._plan(duration, speed, kind)
+        async with _Finishes(self._timed, self._plans):
+            raise_first(
+                await on_axes(self._timed, lambda axis: self._plans[axis.name].prepare(profile.duration))
+            )
+            starts = {axis.bus: [self._plans[axis.name].start] for axis in self._timed}
+            if self._loop is None:
+                begun = machine.now()
+                for values in (await Exchange(starts)).values():
+                    raise_first(dict(enumerate(values)) if isinstance(values, list) else {0: values})
+            else:
+                peaks = {name: one.peak for name, one in profile.profiles.items()}
+                course = Course(profile.duration, profile.positions, peaks, self._goals)
+                begun = await lead(self._loop, course, starts, tolerance, timeout)
+        for axis in self._timed:
+            start = self._starts[axis.name]
+            axis.status.estimate = None if start is None else start + self._plans[axis.name].angle
+            axis.status.moving = False
+        axes = {name: self._result(name, goal) for name, goal in self._goals.items()}
+        return MoveResult(axes, profile.duration, machine.now() - begun, profile.limited_by)
+
+    def _result(self, name: str, goal: float) -> AxisResult:
+        position = self._machine.axes[name].status.known_position
+        return AxisResult(goal, position, estimated=name in self._plans)
+
+    async def _plan(self, duration: float | None, speed: float, kind: Kind) -> Synchronized:
+        moves = {}
+        for axis in self._loop.members if self._loop is not None else ():
+            assert self._loop is not None
+            here = self._loop.axes[axis.name].position
+            goal = self._goals[axis.name] + (here if self._relative else 0.0)
+            check_reach(axis, goal)
+            self._goals[axis.name] = goal
+            limits = Limits(axis.config.max_velocity * speed, axis.config.acceleration * speed**2)
+            moves[axis.name] = Move(here, goal, limits)
+
+        def plan(axis: Axis) -> Any:
+            ratio, start = axis.config.ratio, axis.status.estimate
+            if self._relative:
+                angle = self._goals[axis.name] * ratio
+                if start is not None:
+                    check_reach(axis, axis.config.from_device(start + angle))
+            else:
+                assert start is not None
+                angle = axis.config.to_device(self._goals[axis.name]) - start
+            velocity, acceleration = axis.config.max_velocity * speed, axis.config.acceleration * speed**2
+            return axis.driver.plan_move(
+                axis.device, angle, velocity=abs(velocity * ratio), acceleration=abs(acceleration * ratio)
+            )
+
+        self._plans = await on_axes(self._timed, plan)
+        raise_first(self._plans)
+        shortest = max((one.shortest for one in self._plans.values()), default=0.0)
+        profile = synchronize(moves, kind=kind, duration=duration, shortest=shortest)
+        longest = max((one.fit(profile.duration) for one in self._plans.values()), default=profile.duration)
+        if longest > profile.duration:
+            profile = synchronize(moves, kind=kind, duration=longest, shortest=shortest)
+        return profile
+
+
+class _Finishes(Guard):
+    """Self-timed moves are waited for; each gives back what it borrowed, also after an error."""
+
+    def __init__(self, axes: list[Axis], plans: Mapping[str, SelfTimedMove]) -> None:
+        self._axes, self._plans = axes, plans
+
+    async def leave(self, error: BaseException | None) -> None:
+        if error is not None:
+            await stop_axes([axis for axis in self._axes if axis.status.moving])
+        results = await on_axes(self._axes, lambda axis: self._plans[axis.name].finish())
+        if error is None:
+            raise_first(results)
+
+
+class Course(NamedTuple):
+    """A movement of the axes of a loop: its duration (s), positions (rad, m) over time, peak speeds, goals."""
+
+    duration: float
+    positions: Callable[[float], Mapping[str, float]]
+    peaks: Mapping[str, float]
+    goals: Mapping[str, float]
+
+
+async def lead(
+    loop: ControlLoop,
+    course: Course,
+    starts: Mapping[BaseBus, list[Request[Any]]],
+    tolerance: float = TOLERANCE,
+    timeout: float = SETTLE_TIME,
+) -> float:
+    """Program: lead the axes of a direct loop along a course until they are in position; gives the start (s).
+
+    `starts` leave with the first goals. Raises Stalled for an axis that does not follow, or is not in position within
+    `timeout` s after the end.
+    """
+    for name in course.peaks:
+        loop.set_target(name, loop.axes[name].position)
+    await loop.cycle()  # torque on
+    loop.once = dict(starts)
+    first: LoopState | None = None
+    while True:
+        elapsed = 0.0 if first is None else (loop.slot + 1 - first.number) / loop.rate
+        positions = course.positions(elapsed + 1 / loop.rate)
+        for name in course.peaks:
+            loop.set_target(name, positions[name])
+        state = await loop.cycle()
+        if first is None:
+            first = state
+            continue
+        await _check_lag(loop, course, (state.number - first.number) / loop.rate)
+        over = state.at - first.at - course.duration
+        late = [name for name in course.peaks if _error(loop, name, course.goals[name]) > tolerance]
+        if over >= 0 and not late:
+            loop.settle()
+            return first.at
+        if over > timeout:
+            goal = loop.axes[late[0]].show(course.goals[late[0]])
+            raise await _stalled(loop, late[0], f"is not in position: its goal is {goal}")
+
+
+async def _check_lag(loop: ControlLoop, course: Course, elapsed: float) -> None:
+    wanted = course.positions(elapsed)
+    for name, peak in course.peaks.items():
+        axis = loop.axes[name]
+        most = max(LAG, LAG_TIME * peak * abs(axis.config.ratio))
+        if not axis.missed and _error(loop, name, wanted[name]) > most:
+            raise await _stalled(loop, name, f"does not follow: it should be at {axis.show(wanted[name])}")
+
+
+async def _stalled(loop: ControlLoop, name: str, what: str) -> MotionError:
+    axis = loop.axes[name].axis
+    await loop.machine.health.examine(axis)
+    return Stalled(
+        f"{name} {what}, it is at {axis.config.show(loop.axes[name].position)}",
+        cause="something blocks it, the load is too heavy, or it is slower than max_velocity",
+        advice="clear the way, or move slower",
+        node=axis.config.node,
+    )
+
+
+def _error(loop: ControlLoop, name: str, goal: float) -> float:
+    axis = loop.axes[name]
+    return abs((axis.position - goal) * axis.config.ratio)
+
+
+# -- jog, home, run --------------------------------------------------------------------------------------------
+
+
+async def jog(
+    machine: OpenMachine,
+    name: str,
+    velocity: float,
+    seconds: float | None = None,
+    until: Callable[[], bool] | None = None,
+) -> LoopResult:
+    """Move an axis at `velocity` (rad/s, m/s), for `seconds`, or until `until()` is true; then brake and hold.
+
+    A position axis stops at its limits. A wheel needs a lease, for its motion has no end of its own.
+    """
+    axis = machine.axis(name)
+    config = axis.config
+    if not 0 < abs(velocity) <= config.max_velocity:
+        raise LimitExceeded(
+            f"{name}: {velocity} is not a velocity", expected=f"at most {config.max_velocity:g}"
+        )
+    check_seconds(seconds)
+    if not axis.follows_setpoints:
+        return await _jog_self_timed(machine, axis, velocity, seconds)
+    loop = ControlLoop(machine, [name], policy="clamp")
+    async with StopsIfInterrupted([axis]), Running(loop):
+        led = loop.axes[name]
+        end = led.high if velocity > 0 else led.low
+        if not config.is_wheel:
+            led.generator.limits = Limits(abs(velocity), config.acceleration)
+        begun = machine.now()
+        while not ended(machine.now() - begun, seconds, until):
+            if config.is_wheel:
+                loop.set_target(name, velocity)
+            elif isfinite(end):
+                loop.set_target(name, end)
+            else:
+                loop.set_target(name, led.position + velocity * 2.0 + led.generator.velocity)
+            await loop.cycle()
+    return loop_result(loop, machine.now() - begun)
+
+
+async def _jog_self_timed(
+    machine: OpenMachine, axis: Axis, velocity: float, seconds: float | None
+) -> LoopResult:
+    axis.require("jog")
+    if seconds is None:
+        raise RequestError(f"{axis.name}: a jog of this device needs a time", expected="seconds")
+    start, begun = axis.status.estimate, machine.now()
+    if start is not None:
+        check_reach(axis, axis.config.from_device(start) + velocity * seconds)
+    async with StopsIfInterrupted([axis]):
+        moved = (
+            await on_axes(
+                [axis], lambda one: one.driver.jog(one.device, velocity * one.config.ratio, seconds)
+            )
+        )[axis.name]
+        raise_first({axis.name: moved})
+    _moved(axis, start, getattr(moved, "angle", None))
+    position = axis.status.known_position
+    return LoopResult(machine.now() - begun, 0, {} if position is None else {axis.name: position})
+
+
+def _moved(axis: Axis, start: float | None, angle: float | None) -> None:
+    """An axis without position has turned by this angle (rad, estimated; None: unknown)."""
+    axis.status.estimate = None if start is None or angle is None else start + angle
+    axis.status.moving = axis.status.endless = False
+
+
+async def home(machine: OpenMachine, names: Names = None, timeout: float = 30.0) -> dict[str, float]:
+    """Move to the reference switches, all buses at the same time, at most `timeout` s; gives the positions."""
+    axes = machine.chosen(names)
+    if names is None:
+        axes = [axis for axis in axes if "home" in axis.driver]
+    if not axes:
+        raise RequestError("no axis has a reference switch")
+    for axis in axes:
+        axis.require("home")
+    async with StopsIfInterrupted(axes):
+        results = await on_axes(axes, lambda axis: axis.driver.home(axis.device, deadline=timeout))
+        for axis in axes:
+            if not isinstance(results[axis.name], MotorbusError):
+                _moved(axis, 0.0, 0.0)
+        raise_first(results)
+    return {axis.name: axis.config.from_device(0.0) for axis in axes}
+
+
+async def run_stored(machine: OpenMachine, name: str, number: int, timeout: float | None = None) -> str:
+    """Run a stored program of the device of an axis; its position is unknown then."""
+    axis = machine.axis(name)
+    axis.require("run")
+    axis.status.claim()
+    axis.status.estimate = None
+    extra = {} if timeout is None else {"timeout": timeout}
+    async with StopsIfInterrupted([axis]):
+        results = await on_axes([axis], lambda one: one.driver.run(one.device, number, **extra))
+        raise_first(results)
+    axis.status.moving = axis.status.endless = False
+    return str(results[name])
+
+
+# -- stop, torque ----------------------------------------------------------------------------------------------
+
+
+async def stop(machine: OpenMachine, names: Names = None, *, verify: bool = False) -> StopResult:
+    """Stop these axes and hold; every axis is visited. `verify`: watch for 1 s at most until each rests.
+
+    Raises the error of the first axis that did not accept it, with a note for each other.
+    """
+    axes = machine.chosen(names)
+    results = await stop_axes(axes)
+    raise_first(results)
+    if verify:
+        seen = await on_axes(axes, watch_rest)
+        raise_first(seen)
+        for axis in axes:
+            position = axis.status.known_position
+            results[axis.name] = StopState(results[axis.name].promise, seen[axis.name], position)
+    machine.publish()
+    return StopResult(results)
+
+
+async def stop_axes(axes: list[Axis]) -> dict[str, Any]:
+    """Program: stop these axes, all at the same time; gives the StopState or the error of each."""
+    for axis in axes:
+        axis.status.stopped()
+    return await on_axes(axes, _stop)
+
+
+async def _stop(axis: Axis) -> StopState:
+    if axis.bus.latched:
+        return StopState("the emergency stop is in force")
+    axis.require("stop")
+    promise = await axis.driver.stop(axis.device)
+    return StopState(getattr(promise, "value", str(promise)))
+
+
+async def watch_rest(axis: Axis, seconds: float = WATCH_TIME) -> bool | None:
+    """Procedure: whether an axis is seen at rest within `seconds`; None where its device reports no position."""
+    if "position" not in axis.driver:
+        return None
+    seen: list[tuple[float, float]] = []
+    end = axis.bus.now() + seconds
+    while axis.bus.now() < end:
+        angle = await catch(axis.driver.position(axis.device))
+        if isinstance(angle, MotorbusError):
+            seen = []
+        else:
+            now = axis.bus.now()
+            axis.status.take(angle, now)
+            seen = [one for one in seen if abs(one[1] - angle) <= STILL]
+            seen.append((now, angle))
+            if len(seen) >= REST_READS and now - seen[0][0] >= REST_TIME:
+                return True
+        await Sleep(REST_PERIOD)
+    return False
+
+
+async def switch_torque(machine: OpenMachine, on: bool, names: Names = None) -> tuple[str, ...]:
+    """Torque on without a jump, or off, for these axes; None means all that can. Gives their names."""
+    axes = machine.chosen(names)
+    able = [axis for axis in axes if (axis.follows_setpoints if on else "disable_torque" in axis.driver)]
+    if names is not None and len(able) < len(axes):
+        others = ", ".join(axis.name for axis in axes if axis not in able)
+        raise RequestError(f"{others}: torque cannot be switched {'on' if on else 'off'}")
+    groups = by_bus(able)
+    if on:
+        raise_first(
+            await OnBuses({bus: start_axes(bus, members, machine.health) for bus, members in groups.items()})
+        )
+    else:
+        raise_first(await release_torque(able))
+    machine.publish()
+    return tuple(axis.name for axis in able)
+
+
+async def release_torque(axes: list[Axis]) -> dict[str, Any]:
+    """Program: torque off; gives None or the error of each axis."""
+
+    async def release(axis: Axis) -> None:
+        axis.status.stopped()
+        await axis.driver.disable_torque(axis.device)
+        axis.status.engaged = False
+
+    return await on_axes(axes, release)
+
+
+# -- shared by the clients of the loop -------------------------------------------------------------------------
+
+
+class Running(Guard):
+    """A control loop for `async with`: it brakes at the end; after an error it is closed at once."""
+
+    def __init__(self, loop: ControlLoop) -> None:
+        self._loop = loop
+
+    async def enter(self) -> None:
+        await self._loop.enter()
+
+    async def leave(self, error: BaseException | None) -> None:
+        if error is None:
+            await self._loop.leave()
+        else:
+            self._loop.close()
+
+
+def check_seconds(seconds: float | None) -> None:
+    """Raise RequestError for a time that is not finite and above 0."""
+    if seconds is not None and not (isfinite(seconds) and seconds > 0):
+        raise RequestError(f"{seconds} s", expected="a finite number above 0")
+
+
+def ended(elapsed: float, seconds: float | None, until: Callable[[], bool] | None) -> bool:
+    """Whether a run of the loop is over."""
+    return (seconds is not None and elapsed >= seconds - 1e-9) or (until is not None and until())
+
+
+def loop_result(
+    loop: ControlLoop, duration: float, held: Mapping[str, int] | None = None, notes: tuple[str, ...] = ()
+) -> LoopResult:
+    """What became of a run of the loop."""
+    positions = {axis.name: axis.position for axis in loop.axes.values()}
+    statistics = loop.statistics
+    return LoopResult(duration, statistics.cycles, positions, statistics.overruns, dict(held or {}), notes)

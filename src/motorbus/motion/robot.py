@@ -1,0 +1,414 @@
+"""The robot: an open machine, and the service that shell, dashboard and plugins use.
+
+    with Robot.load("motorbus.toml") as robot:
+        robot.move({"shoulder": 0.5})
+
+    async with AsyncRobot.at("feetech:/dev/ttyACM0#1-6") as robot:
+        await robot.move({"#1": 3.0})
+
+Opening reads and writes nothing to a device. At the end, however it comes, each axis with torque or motion from here
+does what `exit` of the machine file says.
+"""
+
+from __future__ import annotations
+
+import logging
+from abc import abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AsyncExitStack, ExitStack, suppress
+from math import inf
+from os import PathLike
+from threading import Event, Thread
+from typing import Any, Final, Self
+
+from msgspec import structs
+
+from motorbus.bus.interrupts import Interrupts, interrupts
+from motorbus.errors import Refused, RequestError
+from motorbus.motion import commands, moves, teach
+from motorbus.motion.axis import Axis
+from motorbus.motion.blocks import Attendance, Loop
+from motorbus.motion.commands import EStopResult, RobotCommand
+from motorbus.motion.describe import MachineDescription, describe
+from motorbus.motion.loop import ControlLoop, Policy
+from motorbus.motion.machine import MachineConfig, Names
+from motorbus.motion.opening import UNTRUSTED, bus_options, identify, machine_at, select
+from motorbus.motion.program import Program, drive, drive_async, raise_first, run
+from motorbus.motion.shutdown import Shutdown
+from motorbus.motion.state import OpenMachine, Subscription, poll, read_axes
+from motorbus.motion.trajectory import Trajectory
+from motorbus.session import open as open_bus
+from motorbus.session import open_async
+
+LOG = logging.getLogger("motorbus.motion")
+POLL_PERIOD: Final = 0.1  # s between two states for subscribers while no loop runs
+
+
+class RobotMethods(OpenMachine):
+    """What a robot can do; in `AsyncRobot` each method that does I/O is awaited.
+
+    `names` are names of axes, groups and buses; None means all axes.
+    """
+
+    def __init__(self, config: MachineConfig, axes: Names = None) -> None:
+        super().__init__()
+        self.config = select(config, axes)
+        self._whole = config
+        self._closed = Event()
+
+    @classmethod
+    def load(cls, path: str | PathLike[str] = "motorbus.toml", axes: Names = None) -> Self:
+        """The machine of a file, or only these axes of it. Raises RequestError that names file and key."""
+        return cls(MachineConfig.load(path), axes)
+
+    @classmethod
+    def at(cls, address: str) -> Self:
+        """The devices of an address, `FAMILY:PORT#1-6`, as axes `#1` … with the limits of the devices."""
+        return cls(machine_at(address))
+
+    @abstractmethod
+    def carry_out(self, program: Program[Any]) -> Any:
+        """Run a program; gives its value, or what is awaited for it."""
+
+    @property
+    def _is_virtual(self) -> bool:
+        return any(bus.link.virtual for bus in self.buses.values())
+
+    def __getitem__(self, name: str) -> Axis:
+        return self.axis(name)
+
+    # -- state -----------------------------------------------------------------------------------------------------
+
+    def describe(self) -> MachineDescription:
+        """What the machine is; sends nothing."""
+        return describe(self)
+
+    def states(self, names: Names = None) -> Any:
+        """Read these axes; gives their `AxisState` by name."""
+        return self.carry_out(read_axes(self, names))
+
+    def positions(self, names: Names = None) -> Any:
+        """Read the positions (rad, m) of these axes, by name; None where a device reports none."""
+        return self.carry_out(self._read_positions(names))
+
+    async def _read_positions(self, names: Names) -> dict[str, float | None]:
+        states = await read_axes(self, names)
+        return {name: state.position for name, state in states.items()}
+
+    @property
+    def faults(self) -> dict[str, str]:
+        """The reason of each axis that is at fault, by name."""
+        return {name: axis.status.fault for name, axis in self.axes.items() if axis.status.fault}
+
+    def clear_fault(self, names: Names = None) -> None:
+        """Let axes at fault move again. Sends nothing. Raises Refused while a guarded change of one is unfinished."""
+        axes = self.chosen(names)
+        for axis in axes:
+            if axis.status.fault.startswith(UNTRUSTED):
+                raise Refused(f"{axis.name} is at fault: {axis.status.fault}", reason="fault")
+        for axis in axes:
+            axis.status.fault = ""
+
+    def set_position(self, name: str, position: float) -> None:
+        """Declare the position (rad, m) of an axis whose device reports none. Sends nothing."""
+        axis = self.axis(name)
+        if "position" in axis.driver:
+            raise RequestError(
+                f"{name}: its device reports its position", advice="calibrate its zero instead"
+            )
+        moves.check_reach(axis, position)
+        axis.status.estimate = axis.config.to_device(position)
+
+    def subscribe(self, *, rate: float | None = None, depth: int = 64) -> Subscription:
+        """All states from now on, at most `rate` per s: of loops, else of a poll ten times a second.
+
+        In virtual time nothing is polled.
+        """
+        if not self.subscriptions and not self._is_virtual:
+            Thread(target=self._poll, name="motorbus poller", daemon=True).start()
+        return super().subscribe(rate=rate, depth=depth)
+
+    def _poll(self) -> None:
+        while not self._closed.wait(POLL_PERIOD) and self.subscriptions:
+            if not self.loops:
+                with suppress(Exception):  # a bus that is gone, or closed meanwhile
+                    drive(poll(self))
+
+    # -- commands --------------------------------------------------------------------------------------------------
+
+    def program(self, command: RobotCommand) -> Program[Any]:
+        """The program that carries out a command."""
+        return PROGRAMS[type(command)](self, **structs.asdict(command))
+
+    def move(self, goals: Mapping[str, float], **options: Any) -> Any:
+        """Move axes together; gives a `MoveResult`. See `moves.move`."""
+        return self.carry_out(moves.move(self, goals, **options))
+
+    def pose(self, name: str, **options: Any) -> Any:
+        """Move to a pose of the machine file; gives a `MoveResult`."""
+        return self.carry_out(moves.pose(self, name, **options))
+
+    def jog(
+        self,
+        name: str,
+        velocity: float,
+        seconds: float | None = None,
+        until: Callable[[], bool] | None = None,
+    ) -> Any:
+        """Move an axis at a velocity (rad/s, m/s), then brake; gives a `LoopResult`. See `moves.jog`."""
+        return self.carry_out(moves.jog(self, name, velocity, seconds, until))
+
+    def home(self, names: Names = None, *, timeout: float = 30.0) -> Any:
+        """Move to the reference switches; gives the positions by name. Needs `attended()`."""
+        return self.carry_out(moves.home(self, names, timeout))
+
+    def run(self, name: str, number: int, *, timeout: float | None = None) -> Any:
+        """Run a stored program of the device of an axis; gives its result as text."""
+        return self.carry_out(moves.run_stored(self, name, number, timeout))
+
+    def stop(self, names: Names = None, *, verify: bool = False) -> Any:
+        """Decelerate and hold; gives a `StopResult`. `verify`: watch until each rests, at most 1 s."""
+        return self.carry_out(moves.stop(self, names, verify=verify))
+
+    def enable_torque(self, names: Names = None) -> Any:
+        """Torque on without a jump: hold the present position. Gives the names of the axes."""
+        return self.carry_out(moves.switch_torque(self, True, names))
+
+    def disable_torque(self, names: Names = None) -> Any:
+        """Torque off. Gives the names of the axes."""
+        return self.carry_out(moves.switch_torque(self, False, names))
+
+    def teach(self, names: Names = None, **how: Any) -> Any:
+        """Record axes that are moved by hand; gives a `Trajectory`. See `teach.teach`."""
+        return self.carry_out(teach.teach(self, names, **how))
+
+    def replay(self, trajectory: Trajectory, **how: Any) -> Any:
+        """Play a trajectory; gives a `LoopResult`. See `teach.replay`."""
+        return self.carry_out(teach.replay(self, trajectory, **how))
+
+    def follow(self, pairs: Mapping[str, str], **how: Any) -> Any:
+        """Let axes track others, `{leader: follower}`; gives a `LoopResult`. See `teach.follow`."""
+        return self.carry_out(teach.follow(self, pairs, **how))
+
+    # -- emergency stop --------------------------------------------------------------------------------------------
+
+    def estop(self) -> dict[str, EStopResult]:
+        """Emergency stop of all buses at the same time, latched until `reset`. From any thread; never awaited."""
+        found: dict[str, EStopResult] = {}
+
+        def stop(name: str) -> None:
+            try:
+                outcome = self.buses[name].estop()
+            except Exception as error:  # its port is gone: the others are stopped all the same
+                nodes = tuple(axis.config.node for axis in self.axes.values() if axis.config.bus == name)
+                found[name] = EStopResult((), nodes, f"nothing: {error}")
+            else:
+                found[name] = EStopResult(outcome.acknowledged, outcome.silent, outcome.promise)
+
+        threads = {name: Thread(target=stop, args=(name,), daemon=True) for name in self.buses}
+        for thread in threads.values():
+            with suppress(RuntimeError):  # the system has no more threads
+                if not self._is_virtual:
+                    thread.start()
+        for name, thread in threads.items():
+            if thread.ident is None:
+                stop(name)
+            else:
+                thread.join()
+        return {name: found[name] for name in self.buses}
+
+    def trigger_estop(self) -> None:
+        """Ask the stop threads of all buses for an emergency stop; for signal handlers."""
+        for bus in self.buses.values():
+            bus.trigger_estop()
+
+    def reset(self) -> None:
+        """Take the latch of the emergency stop off. Nothing is sent."""
+        for bus in self.buses.values():
+            bus.reset()
+
+    # -- loop, lease -----------------------------------------------------------------------------------------------
+
+    def loop(
+        self,
+        rate: float | None = None,
+        names: Names = None,
+        *,
+        policy: Policy = "reject",
+        direct: bool = False,
+    ) -> Loop:
+        """A control loop of these axes, at `rate` Hz. See `ControlLoop`."""
+        loop = ControlLoop(self, names, rate=rate, policy=policy, direct=direct)
+        return Loop(loop, self.carry_out)
+
+    def attended(self, seconds: float = inf) -> Attendance:
+        """Attend the machine in a block: motion without an end of its own is allowed, and stopped at the end.
+
+        The block gets a `Lease`. With `seconds` it must be renewed by `beat()` within that time, or all that moves is
+        stopped, and the end of the block raises Refused.
+        """
+        return Attendance(self, seconds, self.carry_out)
+
+    # -- the end ---------------------------------------------------------------------------------------------------
+
+    def shutdown(self) -> Any:
+        """Graceful stop: decelerate, hold, go to the pose `park` if there is one, torque off.
+
+        A second Ctrl-C, or a cancellation, releases at once. What failed is in `warnings`.
+        """
+        return self.carry_out(self._leave(None, graceful=True))
+
+    async def _leave(self, error: BaseException | None, *, graceful: bool = False) -> None:
+        """Program: the end. What it did not achieve is a note of `error`, which ends the program, else is raised."""
+        ending = Shutdown(self, graceful=graceful)
+        try:
+            await ending.run()
+        except BaseException as interrupt:
+            error = error or interrupt
+            raise
+        finally:
+            self.warnings += ending.notes
+            for note in ending.notes:
+                LOG.warning("%s", note)
+                if error is not None:
+                    error.add_note(note)
+        if error is None:
+            raise_first(ending.errors)
+
+
+async def call_device(robot: OpenMachine, name: str, function: str, arguments: Mapping[str, Any]) -> Any:
+    """Program: a driver function of the device of an axis."""
+    return await _call(robot.axis(name), function, (), arguments)
+
+
+async def read_registers(robot: OpenMachine, name: str, registers: Sequence[str]) -> Any:
+    """Program: registers of the device of an axis, by name."""
+    return await _call(robot.axis(name), "read", registers, {})
+
+
+async def write_registers(robot: OpenMachine, name: str, values: Mapping[str, float]) -> Any:
+    """Program: write registers of the device of an axis."""
+    return await _call(robot.axis(name), "write", (), values)
+
+
+async def _call(axis: Axis, function: str, given: Sequence[Any], named: Mapping[str, Any]) -> Any:
+    method: Any = getattr(type(axis.device), function, None)
+    if not hasattr(method, "function"):
+        raise RequestError(f"{axis.name}: {axis.config.device} has no command {function!r}")
+    return await run(axis.bus, method.function(axis.device, *given, **named))
+
+
+def _at_once(method: Callable[..., Any]) -> Callable[..., Program[Any]]:
+    async def program(robot: RobotMethods, **fields: Any) -> Any:
+        return method(robot, **fields)
+
+    return program
+
+
+PROGRAMS: Final[Mapping[type, Callable[..., Program[Any]]]] = {
+    commands.Move: moves.move,
+    commands.Pose: moves.pose,
+    commands.Jog: moves.jog,
+    commands.Home: moves.home,
+    commands.RunProgram: moves.run_stored,
+    commands.Replay: teach.replay_file,
+    commands.Teach: teach.teach_file,
+    commands.Follow: teach.follow,
+    commands.Torque: moves.switch_torque,
+    commands.Stop: moves.stop,
+    commands.EStop: _at_once(RobotMethods.estop),
+    commands.Reset: _at_once(RobotMethods.reset),
+    commands.SetPosition: _at_once(RobotMethods.set_position),
+    commands.ClearFault: _at_once(RobotMethods.clear_fault),
+    commands.ReadRegisters: read_registers,
+    commands.WriteRegisters: write_registers,
+    commands.DeviceCommand: call_device,
+}
+
+
+# -- blocking --------------------------------------------------------------------------------------------------
+
+
+class Robot(RobotMethods):
+    """An open machine, blocking; use it in a `with`. Raises NoReply for a device that does not answer."""
+
+    def __init__(self, config: MachineConfig, axes: Names = None) -> None:
+        super().__init__(config, axes)
+        self._stack = ExitStack()
+        self._signals: Interrupts | None = None
+        with ExitStack() as stack:
+            for name, bus in self.config.buses.items():
+                self.buses[name] = stack.enter_context(
+                    open_bus(bus.address, **bus_options(self._whole, name))
+                )
+            drive(identify(self, "blocking"))
+            self._stack = stack.pop_all()
+
+    def carry_out(self, program: Program[Any]) -> Any:
+        return drive(program)
+
+    def execute(self, command: RobotCommand) -> Any:
+        """Carry out a command and give its result."""
+        return drive(self.program(command))
+
+    def close(self) -> None:
+        """Leave each axis as the machine file says, and give the ports back."""
+        self._end(None)
+
+    def __enter__(self) -> Self:
+        self._signals = interrupts()
+        self._signals.cleanups += 1
+        return self
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        self._end(error)
+
+    def _end(self, error: BaseException | None) -> None:
+        if self._closed.is_set():
+            return
+        with interrupts():
+            try:
+                drive(self._leave(error))
+            finally:
+                self._closed.set()
+                self._stack.close()
+                if self._signals is not None:
+                    self._signals.cleanups -= 1
+
+
+# -- asyncio ---------------------------------------------------------------------------------------------------
+
+
+class AsyncRobot(RobotMethods):
+    """An open machine on asyncio; it is opened when its `async with` is entered."""
+
+    async def carry_out(self, program: Program[Any]) -> Any:
+        return await drive_async(program)
+
+    async def execute(self, command: RobotCommand) -> Any:
+        """Carry out a command and give its result."""
+        if isinstance(command, commands.EStop) and not self._is_virtual:
+            from asyncio import to_thread
+
+            return await to_thread(self.estop)
+        return await drive_async(self.program(command))
+
+    async def __aenter__(self) -> Self:
+        from motorbus.bus.aio import TaskSignals
+
+        async with AsyncExitStack() as stack:
+            for name, bus in self.config.buses.items():
+                opened = open_async(bus.address, **bus_options(self._whole, name))
+                self.buses[name] = await stack.enter_async_context(opened)
+            await drive_async(identify(self, "awaiting"))
+            self._stack = stack.pop_all()
+        self._signals = TaskSignals()
+        return self
+
+    async def __aexit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        try:
+            await self.carry_out(self._leave(error))
+        finally:
+            self._closed.set()
+            await self._stack.aclose()
+            self._signals.end()

@@ -1,0 +1,182 @@
+"""An open machine: its axes, the last known state of each, and the faces that subscribe to it."""
+
+from __future__ import annotations
+
+from collections import deque
+from threading import Condition
+from typing import Any, Final
+
+from msgspec import Struct
+
+from motorbus.bus.base import BaseBus
+from motorbus.core.family import State
+from motorbus.errors import RequestError
+from motorbus.motion.axis import Axis, on_axes, read_state
+from motorbus.motion.gate import SafetyGate
+from motorbus.motion.health import HealthMonitor
+from motorbus.motion.lease import Lease
+from motorbus.motion.machine import MachineConfig, Names, nearest
+from motorbus.motion.program import raise_first
+
+
+class AxisState(Struct, frozen=True):
+    """One axis in rad (m), rad/s (m/s), fraction, A, V, °C; None for what its device does not report.
+
+    `age` is that of the position (s). `estimated`: the device reports no position. `torque`: given from here.
+    """
+
+    position: float | None = None
+    target: float | None = None
+    velocity: float | None = None
+    load: float | None = None
+    current: float | None = None
+    voltage: float | None = None
+    temperature: float | None = None
+    age: float | None = None
+    torque: bool = False
+    moving: bool = False
+    estimated: bool = False
+    suspect: bool = False
+    alarm: tuple[str, ...] = ()
+    fault: str = ""
+
+
+class RobotState(Struct, frozen=True):
+    """The last known state of all axes: its number, its time (s, link clock), the axes by name."""
+
+    number: int
+    at: float
+    axes: dict[str, AxisState]
+
+
+class Subscription:
+    """States as they come, at most `rate` per s; the oldest of `depth` is dropped and counted. From any thread."""
+
+    def __init__(self, rate: float | None, depth: int) -> None:
+        self.dropped = 0
+        self._period: Final = 1 / rate if rate else 0.0
+        self._next = 0.0
+        self._states: deque[RobotState] = deque(maxlen=depth)
+        self._changed = Condition()
+
+    def put(self, state: RobotState) -> None:
+        """Add a state, unless the last one is too young."""
+        if state.at < self._next:
+            return
+        self._next = state.at + self._period * 0.999
+        with self._changed:
+            self.dropped += len(self._states) == self._states.maxlen
+            self._states.append(state)
+            self._changed.notify_all()
+
+    def get(self, timeout: float = 0.0) -> RobotState | None:
+        """The oldest state; None if there is none within `timeout` s."""
+        with self._changed:
+            self._changed.wait_for(lambda: bool(self._states), timeout)
+            return self._states.popleft() if self._states else None
+
+
+class OpenMachine:
+    """What programs and faces need of an open machine. `targets` are the last goals (rad, m), by name."""
+
+    config: MachineConfig
+
+    def __init__(self) -> None:
+        self.buses: dict[str, Any] = {}
+        self.axes: dict[str, Axis] = {}
+        self.gates: dict[BaseBus, SafetyGate] = {}
+        self.health = HealthMonitor()
+        self.targets: dict[str, float] = {}
+        self.warnings: list[str] = []
+        self.loops = 0  # control loops that publish states at present
+        self.subscriptions: list[Subscription] = []
+        self._number = 0
+
+    def now(self) -> float:
+        """s on the link clock."""
+        bus: BaseBus = next(iter(self.buses.values()))
+        return bus.now()
+
+    @property
+    def lease(self) -> Lease | None:
+        """The lease that motion needs, None if it needs none."""
+        return next((gate.lease for gate in self.gates.values()), None)
+
+    @lease.setter
+    def lease(self, lease: Lease | None) -> None:
+        for gate in self.gates.values():
+            gate.lease = lease
+
+    def chosen(self, names: Names = None) -> list[Axis]:
+        """The axes of these names of axes, groups and buses; None means all. Raises RequestError."""
+        if not self.axes:
+            raise RequestError("the machine is not open", advice="use `with Robot.load(…)`")
+        return [self.axes[name] for name in self.config.axes_of(names)]
+
+    def axis(self, name: str) -> Axis:
+        """The axis of this name. Raises RequestError."""
+        if name not in self.axes:
+            raise RequestError(f"no axis {name!r}", advice=nearest(name, self.axes))
+        return self.axes[name]
+
+    def publish(self) -> None:
+        """Give the state of this moment to all subscribers."""
+        if self.subscriptions:
+            state = self.snapshot()
+            for subscription in tuple(self.subscriptions):
+                subscription.put(state)
+
+    def snapshot(self) -> RobotState:
+        """The last known state; sends nothing."""
+        self._number += 1
+        now = self.now()
+        return RobotState(
+            self._number, now, {name: self._state_of(axis, now) for name, axis in self.axes.items()}
+        )
+
+    def _state_of(self, axis: Axis, now: float) -> AxisState:
+        status, config = axis.status, axis.config
+        self.gates[axis.bus].update(status)
+        sample = status.state or State(now)
+        return AxisState(
+            position=status.known_position,
+            target=self.targets.get(axis.name),
+            velocity=None if sample.velocity is None else sample.velocity / config.ratio,
+            load=sample.load,
+            current=sample.current,
+            voltage=sample.voltage,
+            temperature=sample.temperature,
+            age=None if status.position is None else now - status.at,
+            torque=status.engaged,
+            moving=status.moving,
+            estimated=status.position is None and status.estimate is not None,
+            suspect=status.suspect is not None,
+            alarm=sample.alarm,
+            fault=status.fault,
+        )
+
+    def subscribe(self, *, rate: float | None = None, depth: int = 64) -> Subscription:
+        """All states from now on, at most `rate` per s."""
+        subscription = Subscription(rate, depth)
+        self.subscriptions.append(subscription)
+        return subscription
+
+    def unsubscribe(self, subscription: Subscription) -> None:
+        """End what `subscribe` began."""
+        self.subscriptions.remove(subscription)
+
+
+async def read_axes(machine: OpenMachine, names: Names = None) -> dict[str, AxisState]:
+    """Program: read these axes; gives their state. Raises the first error of one, after all were visited."""
+    axes = machine.chosen(names)
+    await on_axes([axis for axis in axes if machine.health.is_due(axis)], machine.health.note)
+    raise_first(await on_axes(axes, read_state))
+    machine.publish()
+    state = machine.snapshot()
+    return {axis.name: state.axes[axis.name] for axis in axes}
+
+
+async def poll(machine: OpenMachine) -> None:
+    """Program: read all axes for the subscribers; errors show as age."""
+    await on_axes(machine.chosen(), read_state)
+    machine.publish()

@@ -1,1 +1,0 @@
-"""Motion: the machine file, the safety gate, the control loop, moves, and the robot that every face uses."""

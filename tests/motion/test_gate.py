@@ -1,0 +1,316 @@
+"""The gate: each check as rows of a table; then random calls, of which no goal outside the limits leaves."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+from itertools import islice
+from math import inf, nan, pi
+from typing import Any
+
+import pytest
+
+from motorbus.core.family import IdChanged
+from motorbus.core.request import EVERY_LANE, Effect, Priority, Request
+from motorbus.core.setpoint import Deferred, Setpoint, Stays
+from motorbus.errors import LimitExceeded, MotorbusError, NotHomed, Refused
+from motorbus.families.feetech import Servo
+from motorbus.motion.gate import SafetyGate, check_owned
+from motorbus.motion.lease import Lease
+from motorbus.motion.machine import AxisConfig, Position, Step, Velocity
+from motorbus.motion.robot import Robot
+from motorbus.motion.status import AxisStatus
+from tests.motion.rig import Recorded, listen, rig
+
+NOW = 100.0
+
+
+class Bus:
+    """What a gate needs of a bus."""
+
+    def __init__(self) -> None:
+        self.interlock: Any = None
+        self.on_id_change: Any = None
+        self.positions: dict[int, Any] = {}
+        self.stops = 0
+
+    def now(self) -> float:
+        return NOW
+
+    def stop_count(self, node: int | None = None) -> int:
+        return self.stops
+
+    def on_reconnect(self, function: Any) -> None:
+        self.reconnect = function
+
+
+def make(**keys: Any) -> tuple[SafetyGate, AxisStatus]:
+    """A gate of one axis, node 1, from -1 to 1 rad, 1 rad/s, at 0.5 rad."""
+    usual = {"low": Position(-1, "position"), "high": Position(1, "position")}
+    config = AxisConfig(device="b#1", max_velocity=Velocity(1.0, "velocity"), **{**usual, **keys})
+    axis = AxisStatus("a", config)
+    axis.position, axis.at, axis.read = 0.5, NOW, lambda: replace(goal(0.0))
+    return SafetyGate(Bus(), [axis]), axis  # type: ignore[arg-type]
+
+
+def goal(value: float, quantity: str = "position", stays: Stays | None = None, **other: Any) -> Request[Any]:
+    """A request with a setpoint for node 1, and a speed."""
+    low, high = other.pop("ends", (None, None))
+    setpoints: tuple[Setpoint, ...] = (Setpoint(other.pop("node", 1), quantity, value, low, high, stays),)
+    if "speed" in other:
+        setpoints += (Setpoint(1, "speed", other.pop("speed")),)
+    return Request(b"x", effect=other.pop("effect", Effect.MOTION), setpoints=setpoints, **other)
+
+
+def no_limits() -> dict[str, Any]:
+    """An axis without limits."""
+    return {"low": None, "high": None}
+
+
+def at(gate: SafetyGate, axis: AxisStatus, **values: Any) -> None:
+    """Change what is known of an axis."""
+    for name, value in values.items():
+        setattr(axis, name, value)
+
+
+STEP = {"max_step": Step(0.2, "position")}
+TABLE: list[tuple[dict[str, Any], dict[str, Any], Request[Any], str]] = [
+    # keys of the axis, what is known of it, request, reason ("" passes)
+    ({}, {}, goal(0.9), ""),
+    ({}, {}, goal(1.0026), ""),  # the next count of the device
+    ({}, {}, goal(1.01), "limits"),
+    ({}, {}, goal(-1.01, speed=1.0), "limits"),
+    ({}, {}, goal(nan), "limits"),
+    ({}, {}, goal(inf), "limits"),
+    ({}, {}, goal(0.7, ends=(0.0, 0.6)), "limits"),
+    ({}, {"position": 2.0}, goal(1.8), ""),  # back towards the limits
+    ({}, {"position": 2.0}, goal(2.1), "limits"),
+    ({}, {"position": -2.0}, goal(-1.9), ""),
+    ({}, {"position": -2.0}, goal(1.9, speed=1.0), "limits"),
+    ({}, {}, goal(-0.41), "step"),
+    ({}, {}, goal(-0.39), ""),
+    ({}, {}, goal(-0.9, speed=1.0), ""),
+    (STEP, {}, goal(0.71, speed=1.0), "step"),
+    (STEP, {}, goal(0.69, speed=1.0), ""),
+    ({}, {}, goal(0.6, speed=1.0), ""),
+    ({}, {}, goal(0.6, speed=1.08), ""),  # one unit of the device above it
+    ({}, {}, goal(0.6, speed=1.2), "velocity"),
+    ({}, {}, goal(0.6, speed=nan), "limits"),
+    ({}, {"at": NOW - 0.6}, goal(0.6), "stale"),
+    ({}, {"at": NOW - 0.4}, goal(0.6), ""),
+    ({}, {"suspect": 0.9}, goal(0.6), "suspect"),
+    ({}, {"fault": "restart"}, goal(0.6), "fault"),
+    ({}, {"fault": "restart"}, goal(1.0, "torque", Stays.ON, effect=Effect.TORQUE), "fault"),
+    ({}, {"fault": "restart"}, goal(0.0, "torque", Stays.STILL, effect=Effect.TORQUE), ""),
+    ({}, {"fault": "restart", "at": -inf}, goal(9.0, stays=Stays.STILL), ""),
+    ({}, {"fault": "restart"}, goal(9.0, priority=Priority.STOP), ""),
+    ({}, {"at": -inf}, goal(1.0, "torque", Stays.ON, effect=Effect.TORQUE), ""),
+    ({}, {}, goal(0.5, "velocity"), "unattended"),
+    ({}, {}, goal(0.0, "velocity"), ""),
+    ({}, {}, goal(0.5, "load"), "unattended"),
+    ({}, {}, goal(0.5, "current"), "unattended"),
+    ({}, {}, goal(0.4, "relative"), ""),
+    ({}, {}, goal(0.6, "relative"), "limits"),
+    ({}, {"position": None, "read": None}, goal(0.1, "relative"), "homed"),
+    (no_limits(), {"position": None, "read": None}, goal(9.0, "relative"), ""),
+    ({}, {"position": None, "read": None, "estimate": 0.9}, goal(0.2, "relative"), "limits"),
+    ({}, {"position": None, "read": None, "estimate": 0.9}, goal(-0.2, "relative"), ""),
+    ({}, {}, goal(0.0, lane=EVERY_LANE), "limits"),
+    ({}, {}, goal(0.0, lane=EVERY_LANE, stays=Stays.STILL), ""),
+    ({}, {}, goal(3.0, node=2, ends=(0.0, 4.0)), ""),
+    ({}, {}, goal(5.0, node=2, ends=(0.0, 4.0)), "limits"),
+    ({}, {}, goal(3.0, node=2), "limits"),
+    ({}, {}, Request(b"x", effect=Effect.MOTION), "limits"),
+    ({}, {}, Request(b"x", effect=Effect.PERSISTENT), ""),
+    ({}, {}, goal(0.6, deferred=Deferred(None, begins=True)), "stale"),
+]
+
+
+@pytest.mark.parametrize("row", range(len(TABLE)))
+def test_checks(row: int) -> None:
+    keys, known, request, reason = TABLE[row]
+    gate, axis = make(**keys)
+    at(gate, axis, **known)
+    if not reason:
+        gate.check(request, NOW)
+        return
+    with pytest.raises(MotorbusError) as caught:
+        gate.check(request, NOW)
+    assert getattr(caught.value, "reason", "homed") == reason
+    assert not axis.moving
+
+
+def test_all_setpoints_are_judged_before_one_counts() -> None:
+    gate, axis = make()
+    request = replace(
+        goal(0.6), setpoints=(Setpoint(1, "position", 0.6), Setpoint(2, "position", 9.0, 0.0, 4.0))
+    )
+    with pytest.raises(LimitExceeded):
+        gate.check(request, NOW)
+    assert not axis.moving
+    assert not axis.engaged
+
+
+def test_a_lease_must_hold_and_lets_endless_motion_pass() -> None:
+    gate, axis = make()
+    now = [NOW]
+    gate.lease = Lease(lambda: now[0], 0.5)
+    gate.check(goal(0.5, "velocity"), NOW)
+    assert axis.endless
+    now[0] += 0.6
+    for request in (goal(0.6), goal(0.5, "velocity")):
+        with pytest.raises(Refused) as caught:
+            gate.check(request, NOW)
+        assert caught.value.reason == "lease"
+    gate.check(goal(0.0, "torque", Stays.STILL, effect=Effect.TORQUE), NOW)
+    with pytest.raises(Refused):
+        gate.lease.beat()
+    gate.lease.reset()
+    gate.check(goal(0.6), NOW)
+
+
+@pytest.mark.parametrize("nodes", [(), (1,), (2,)])
+def test_a_stop_takes_the_axis_from_its_source(nodes: tuple[int, ...]) -> None:
+    gate, axis = make()
+    owner = axis.claim()
+    gate.check(goal(0.6), NOW)
+    assert axis.moving
+    gate.stopped(nodes)
+    assert (check_owned([(axis, owner)], None) is None) == (nodes == (2,))
+    assert axis.moving == (nodes == (2,))
+
+
+def test_a_deferred_write_begins_once_and_not_after_a_stop() -> None:
+    begin: Request[Any] = Request(b"x", effect=Effect.MOTION, deferred=Deferred(None, begins=True))
+    for node, ends in ((1, (None, None)), (2, (0.0, 4.0))):
+        gate, _ = make()
+        write = goal(0.6, node=node, ends=ends, deferred=Deferred(node))
+        with pytest.raises(LimitExceeded):
+            gate.check(goal(9.0, node=node, ends=ends, deferred=Deferred(node)), NOW)
+        gate.check(write, NOW)
+        gate.check(begin, NOW)
+        with pytest.raises(Refused):
+            gate.check(begin, NOW)
+        gate.check(write, NOW)
+        gate.stopped(())
+        gate._bus.stops += 1  # type: ignore[attr-defined]
+        with pytest.raises(Refused):
+            gate.check(begin, NOW)
+
+
+def test_a_device_with_a_new_id_keeps_its_limits() -> None:
+    gate, _ = make()
+    gate._bus.on_id_change(IdChanged(1, 7))  # type: ignore[misc]
+    with pytest.raises(LimitExceeded):
+        gate.check(goal(1.5, node=7), NOW)
+
+
+def test_after_a_reconnect_nothing_is_known() -> None:
+    gate, axis = make()
+    owner = axis.claim()
+    gate._bus.reconnect()  # type: ignore[attr-defined]
+    assert axis.position is None
+    assert check_owned([(axis, owner)], None) is not None
+    assert len(gate.required_reads(goal(0.6))) == 1
+
+
+def test_positions_that_no_motor_can_reach_are_suspect_until_a_second_one_agrees() -> None:
+    _, axis = make()
+    assert axis.take(0.6, NOW + 0.01)
+    assert not axis.take(3.0, NOW + 0.02)
+    assert axis.position == 0.6
+    assert axis.take(3.01, NOW + 0.03)
+    assert (axis.position, axis.suspect) == (3.01, None)
+    assert not axis.take(-3.0, NOW + 0.04)
+    assert axis.take(3.02, NOW + 0.05)
+
+
+def test_a_stop_in_motion_loses_an_estimate() -> None:
+    gate, axis = make()
+    axis.position, axis.read, axis.estimate = None, None, 0.2
+    gate.stopped(())
+    assert axis.estimate == 0.2
+    gate.check(goal(0.1, "relative"), NOW)
+    assert axis.estimate is None
+    with pytest.raises(NotHomed):
+        gate.check(goal(0.1, "relative"), NOW)
+
+
+# -- random calls ----------------------------------------------------------------------------------------------
+
+
+def goals_in(data: bytes) -> list[tuple[int, int]]:
+    """Node and raw goal position of each WRITE, REG WRITE or SYNC WRITE of registers that hold it."""
+    found = []
+    while len(data) > 6 and data[:2] == b"\xff\xff":
+        frame, data = data[: data[3] + 4], data[data[3] + 4 :]
+        start, offset = frame[5], 42 - frame[5]
+        if frame[4] in (3, 4) and start <= 42 < start + frame[3] - 3:
+            found.append((frame[2], frame[6 + offset] | frame[7 + offset] << 8))
+        if frame[4] == 0x83 and start <= 42 < start + frame[6]:
+            starts = range(7, len(frame) - 1, frame[6] + 1)
+            found += [(frame[at], frame[at + 1 + offset] | frame[at + 2 + offset] << 8) for at in starts]
+    return found
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_goal_outside_the_limits_leaves(seed: int) -> None:
+    draw = random.Random(seed)
+    keys: dict[str, Any] = {
+        "low": "-60 deg",
+        "high": "60 deg",
+        "max_velocity": "120 deg/s",
+        "max_step": "200 deg",
+    }
+    sent = accepted = 0
+    with rig("1-3", **keys) as (config, sims), Robot(config) as robot:
+        listen(sims)
+        line = sims["arm"].line
+        assert isinstance(line, Recorded)
+        for _ in range(60):
+            before = {node: sims["arm"][node].memory["present_position"] for node in (1, 2, 3)}
+            try:
+                random_call(draw, robot, sims)
+                accepted += 1
+            except (MotorbusError, ValueError):
+                pass
+            for data in line.sent:
+                for node, raw in goals_in(data) if isinstance(data, bytes) else ():
+                    sent += 1
+                    inside = abs(raw * 360 / 4096 - 180) <= 60.2
+                    assert inside or abs(raw - before[node]) <= 2, (node, raw)
+            line.sent.clear()
+    assert sent > 300
+    assert accepted > 15
+
+
+def random_call(draw: random.Random, robot: Robot, sims: Any) -> None:
+    """One call with a value that may be anything."""
+    node = draw.randint(1, 3)
+    name = f"a{node}"
+    odd = [draw.uniform(-1.2, 1.2), draw.uniform(-5, 5), nan, inf, 1e9, -0.0]
+    value = draw.choice([draw.uniform(-1.0, 1.0)] * 8 + odd)
+    servo = Servo(robot.buses["arm"], node)
+    kind = draw.randrange(9)
+    if kind < 3:
+        goals = {name: value, f"a{node % 3 + 1}": draw.uniform(-1, 1)}
+        robot.move(goals, speed=draw.choice([1, 0.3, 2]), relative=draw.random() < 0.3)
+    elif kind == 3:
+        servo.move(value + pi, velocity=draw.choice([0.5, 1.5, 9]), wait=False)
+    elif kind == 4:
+        servo.write(goal_position=value + pi)
+    elif kind == 5:
+        policy: Any = draw.choice(["clamp", "reject"])
+        with robot.loop(100, name, policy=policy, direct=draw.random() < 0.3) as loop:
+            for _ in islice(loop, draw.randint(1, 20)):
+                loop.set_target(name, value)
+    elif kind == 6:
+        calls: list[Any] = [robot.stop, lambda: robot.enable_torque(), lambda: robot.disable_torque(name)]
+        draw.choice(calls)()
+    elif kind == 7:
+        robot.jog(name, draw.choice([1.0, -2.0, 0.3]), 0.3)
+    elif draw.random() < 0.2:
+        sims["arm"][node].power_cycle()
+        robot.clear_fault()
+    else:
+        robot.states()
