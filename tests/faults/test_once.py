@@ -21,7 +21,7 @@ from motorbus.families.feetech.driver.requests import Block, acknowledged, write
 from motorbus.families.kst.driver.requests import write_row
 from motorbus.families.stepper import protocol as stepper
 from motorbus.link.base import Delivery, PerfectLine, Side
-from motorbus.motion.safety import Gate
+from motorbus.bus.interlock import DeviceLimits
 from tests.families.stepper.rig import Rig as StepperRig
 from tests.faults.test_stepper_single_faults import COMMANDS, ask
 from tests.support.catalogue.kst import NODE, KstRig
@@ -107,7 +107,7 @@ def test_l18_a_change_of_id_or_baud_is_written_once(what: str, register: int) ->
 
     rig.put(line := DeafTo(is_it))
     servo = Servo(
-        Bus(rig.link, FAMILY.open(), interlock=Gate(), report=lambda event: None), 1
+        Bus(rig.link, FAMILY.open(), interlock=DeviceLimits(), report=lambda event: None), 1
     )  # it keeps a journal
     told: list[type[MotorbusError]] = []
     try:

@@ -26,7 +26,7 @@ from motorbus.core.steps import Exclusive, Gather, Runnable, Shielded, catch, di
 from motorbus.errors import RequestError
 from motorbus.link.base import Line, Link
 from motorbus.link.memory import MemoryLink
-from motorbus.motion.safety import Gate
+from motorbus.bus.interlock import DeviceLimits
 from tests.support.subjects import possible, tables_of, vectors
 
 __all__ = ["AsyncBus", "Bus", "StopOutcome", "Subscription", "TraceRecord"]
@@ -46,14 +46,14 @@ def make_bus(
     journal: Notify | None = None,
 ) -> Bus:
     """A blocking bus around a link that the test has made, with a gate that admits motion unless `gate` is off."""
-    return Bus(link, driver, interlock=Gate() if gate else None, report=report, journal=journal)
+    return Bus(link, driver, interlock=DeviceLimits() if gate else None, report=report, journal=journal)
 
 
 def make_async_bus(
     link: Link, driver: BusDriver, *, report: Notify | None = None, journal: Notify | None = None
 ) -> AsyncBus:
     """An async bus around a link that the test has made."""
-    return AsyncBus(link, driver, interlock=Gate(), report=report, journal=journal)
+    return AsyncBus(link, driver, interlock=DeviceLimits(), report=report, journal=journal)
 
 
 def is_listening(bus: BaseBus) -> bool:

@@ -15,7 +15,7 @@ from motorbus.families.stepper.simulator import Controller as SimulatedControlle
 from motorbus.journal import BusJournal
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.link.memory import MemoryLink
-from motorbus.motion.safety import Gate
+from motorbus.bus.interlock import DeviceLimits
 
 T = TypeVar("T")
 
@@ -70,7 +70,7 @@ class Bench:
         self.journal = BusJournal("stepper:/dev/ttyUSB7")
         self.react: Callable[[object], None] = lambda event: None
         driver = FAMILY.open(motor=options.get("motor", 3), dump_order=options.get("dump_order", "little"))
-        self.bus = Bus(self.link, driver, interlock=Gate(), report=self._report, journal=self.journal)
+        self.bus = Bus(self.link, driver, interlock=DeviceLimits(), report=self._report, journal=self.journal)
         self.device = Controller(self.bus)
         self._trace = self.bus.trace.subscribe(limit=1_000_000)
 
