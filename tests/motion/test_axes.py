@@ -19,7 +19,7 @@ from motorbus.families import feetech
 from motorbus.motion.commands import SetPosition
 from motorbus.motion.machine import MachineConfig
 from motorbus.motion.robot import Robot
-from tests.support.machines import listen, orders, machine
+from tests.support.machines import listen, machine, orders
 
 WHEEL = {"kind": "wheel", "zero": None, "low": None, "high": None}
 

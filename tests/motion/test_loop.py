@@ -14,7 +14,7 @@ from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, NoReply, 
 from motorbus.link.base import Delivery, Side
 from motorbus.motion.program import OnBuses
 from motorbus.motion.robot import Robot
-from tests.support.machines import Recorded, listen, orders, machine
+from tests.support.machines import Recorded, listen, machine, orders
 
 
 def test_entering_writes_nothing_and_torque_comes_with_the_first_target() -> None:
@@ -67,7 +67,10 @@ def test_a_target_outside_the_limits_is_refused_or_clamped_and_counted() -> None
 
 
 def test_an_axis_outside_its_limits_may_come_back() -> None:
-    with machine("1", axes={"a1": {"low": "20 deg", "high": "90 deg"}}) as (config, _), Robot(config) as robot:
+    with (
+        machine("1", axes={"a1": {"low": "20 deg", "high": "90 deg"}}) as (config, _),
+        Robot(config) as robot,
+    ):
         with pytest.raises(LimitExceeded):
             robot.move({"a1": 0.1})
         robot.move({"a1": 0.5})
@@ -241,7 +244,10 @@ def test_axes_that_follow_no_setpoints_are_left_out_or_refused_by_name() -> None
 
 
 def test_jog_stops_at_the_limit_and_refuses_what_is_too_fast() -> None:
-    with machine("1", axes={"a1": {"low": "-20 deg", "high": "20 deg"}}) as (config, _), Robot(config) as robot:
+    with (
+        machine("1", axes={"a1": {"low": "-20 deg", "high": "20 deg"}}) as (config, _),
+        Robot(config) as robot,
+    ):
         result = robot.jog("a1", 0.5, 3.0)
         assert result.positions["a1"] == pytest.approx(20 * 3.14159 / 180, abs=0.01)
         for wrong in (0.0, 5.0, float("nan")):

@@ -114,7 +114,10 @@ def test_04_a_goal_is_one_cycle_ahead() -> None:
 
 
 def test_04_endless_motion_needs_a_lease() -> None:
-    with machine(lift=True, axes={"lift": {"low": None, "high": None}}) as (config, _), Robot(config) as robot:
+    with (
+        machine(lift=True, axes={"lift": {"low": None, "high": None}}) as (config, _),
+        Robot(config) as robot,
+    ):
         with pytest.raises(Refused) as caught:
             robot.home(timeout=1.0)
         assert caught.value.reason == "unattended"

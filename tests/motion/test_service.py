@@ -17,7 +17,7 @@ from motorbus.motion import commands
 from motorbus.motion.commands import RobotCommand
 from motorbus.motion.machine import MachineConfig
 from motorbus.motion.robot import PROGRAMS, AsyncRobot, Robot
-from tests.support.machines import listen, orders, machine
+from tests.support.machines import listen, machine, orders
 
 JSON = {
     '{"type":"move","goals":{"a1":0.2}}': "moved",

@@ -12,7 +12,7 @@ from motorbus.errors import LimitExceeded, RequestError, Stalled
 from motorbus.motion.commands import Follow, Replay, Teach
 from motorbus.motion.robot import Robot
 from motorbus.motion.trajectory import Trajectory
-from tests.support.machines import listen, orders, machine
+from tests.support.machines import listen, machine, orders
 
 TIMES = [index * pi / 60 for index in range(121)]
 WAVE = Trajectory(
