@@ -396,6 +396,8 @@ class AsyncRobot(RobotMethods):
     async def __aenter__(self) -> Self:
         from motorbus.bus.aio import TaskSignals
 
+        if self._closed.is_set():
+            raise RequestError("this robot is closed", advice="make another one")
         async with AsyncExitStack() as stack:
             stack.callback(TaskSignals().end)
             for name, bus in self.config.buses.items():
