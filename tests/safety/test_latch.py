@@ -20,7 +20,7 @@ from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Data, Effect, Request
 from motorbus.core.setpoint import Setpoint
 from motorbus.errors import MotorbusError, RequestError
-from motorbus.motion.commands import Torque, WriteRegisters
+from motorbus.motion.commands import Move, Torque, WriteRegisters
 from tests.support.machines import asks, listen, machine, sent
 
 ROOT = Path(__file__).parents[2]
@@ -134,9 +134,9 @@ def test_06_an_async_robot_stays_latched_until_reset() -> None:
                 await robot.enable_torque()
                 robot.estop()
                 listen(sims)
-                for act in (robot.enable_torque, lambda: robot.move({"c1": 0.1})):
+                for command in (Torque(on=True), Move({"c1": 0.1})):
                     with pytest.raises(Interrupted):
-                        await act()
+                        await robot.execute(command)
                 assert [data for data in sent(sims) if not asks(data)] == []
                 robot.reset()
                 await robot.enable_torque()
