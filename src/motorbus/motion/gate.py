@@ -119,7 +119,7 @@ def within_velocity(
     return LimitExceeded(
         f"{axis.name}: {abs(setpoint.value):.4g} rad/s of the device is above {most:.4g} rad/s",
         reason="velocity",
-        advice="name a velocity; the default of a device is its own maximum",
+        advice="give velocity=…; the default of a device is its own maximum",
     )
 
 
