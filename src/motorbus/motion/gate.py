@@ -28,13 +28,8 @@ Check = Callable[["SafetyGate", AxisStatus, Setpoint, float], "MotorbusError | N
 
 def not_faulted(gate: SafetyGate, axis: AxisStatus, setpoint: Setpoint, now: float) -> MotorbusError | None:
     """An axis at fault gets no motion and no torque."""
-    if not axis.fault:
-        return None
-    return Refused(
-        f"{axis.name} is at fault: {axis.fault}",
-        reason="fault",
-        advice=f'find the cause, then robot.clear_fault("{axis.name}")',
-    )
+    axis.check_fault()
+    return None
 
 
 def lease_held(gate: SafetyGate, axis: AxisStatus, setpoint: Setpoint, now: float) -> MotorbusError | None:

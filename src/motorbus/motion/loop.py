@@ -435,6 +435,8 @@ class ControlLoop:
             axis.release()
         if stopped:
             raise Interrupted(f"{', '.join(axis.name for axis in stopped)}: stopped before the first goal")
+        for axis in fresh:
+            axis.status.check_fault()
         groups = by_bus([axis.axis for axis in fresh])
         raise_first(
             await OnBuses({bus: start_axes(bus, axes, self.machine.health) for bus, axes in groups.items()})

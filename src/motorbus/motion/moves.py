@@ -96,6 +96,7 @@ async def pose(machine: OpenMachine, name: str, **options: Any) -> MoveResult:
 
 def _check_goal(axis: Axis, goal: float, *, relative: bool) -> None:
     config = axis.config
+    axis.status.check_fault()
     if config.is_wheel:
         raise RequestError(f"{axis.name}: a wheel has no position", advice="jog it", node=config.node)
     if not axis.follows_setpoints:
@@ -451,6 +452,8 @@ async def switch_torque(machine: OpenMachine, on: bool, names: Names = None) -> 
         raise RequestError(f"{others}: torque cannot be switched {'on' if on else 'off'}")
     groups = by_bus(able)
     if on:
+        for axis in able:
+            axis.status.check_fault()
         raise_first(
             await OnBuses({bus: start_axes(bus, members, machine.health) for bus, members in groups.items()})
         )
