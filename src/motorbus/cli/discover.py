@@ -179,8 +179,8 @@ def info(
             emit(result, common)
     if failures and shown:
         raise Partial("; ".join(f"{name}: {error.summary}" for name, error in failures.items()))
-    for error in failures.values():
-        raise error
+    if failures:
+        raise next(iter(failures.values()))
 
 
 def _info(target: Target, common: Common, *, registers: bool) -> Info:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Sequence
 from contextlib import ExitStack
+from functools import partial
 from math import inf
 from typing import Annotated, Any, Final
 
@@ -42,7 +43,7 @@ def map_of(target: Target) -> RegisterMap:
             f"{target.name}: {identity.model}, firmware {identity.firmware}: its registers are not known",
             node=target.node,
         )
-    return table  # type: ignore[no-any-return]
+    return table
 
 
 def read(
@@ -103,34 +104,52 @@ def write(
     """
     if not values:
         raise RequestError("no register to write", expected="REGISTER=VALUE, as torque_limit=50%")
-    pairs = [_pair(text) for text in values]
+    pairs = assignments(values)
     with open_devices(common, (target,)) as devices:
         orders = [(one, _parse_values(one, pairs)) for one in devices]
-        question = _question(devices, [map_of(devices[0])[name] for name, _ in pairs])
-        for number, (one, wanted) in enumerate(orders):
-            carry_out(
-                writing if number == 0 else Writing(yes=True, dry_run=writing.dry_run),
-                one,
-                lambda device, wanted=wanted: device.write(**wanted),
-                question,
-            )
+        rows = [map_of(devices[0])[name] for name, _ in pairs]
+        question = _question(devices, rows)
+        together = devices[0].family.sync_write
+        if together is not None and _may_sync(devices, rows):
+            by_node = {one.node: wanted for one, wanted in orders}
+            carry_out(writing, devices[0].bus, lambda bus: bus.run(together(by_node)), question)
+        else:
+            for number, (one, wanted) in enumerate(orders):
+                how = writing if number == 0 else Writing(yes=True, dry_run=writing.dry_run)
+                carry_out(how, one, partial(_write_one, wanted), question)
         if not writing.dry_run:
             emit([value for one, wanted in orders for value in _read_back(one, wanted)], common)
 
 
-def _pair(text: str) -> tuple[str, str]:
-    name, equals, value = text.partition("=")
-    if not (name and equals and value.strip()):
-        raise RequestError(f"{text!r} is not an assignment", expected="REGISTER=VALUE, as torque_limit=50%")
-    return name, value.strip()
+def _write_one(values: dict[str, float | int], device: Any) -> None:
+    device.write(**values)
+
+
+def _may_sync(devices: Sequence[Target], rows: Sequence[Register]) -> bool:
+    """One request may write these rows of all devices."""
+    is_one_bus = len({id(one.bus) for one in devices}) == 1
+    return len(devices) > 1 and is_one_bus and all(row.storage is Storage.RAM for row in rows)
+
+
+def assignments(texts: Sequence[str]) -> list[tuple[str, str]]:
+    """REGISTER=VALUE texts, parsed. Raises RequestError."""
+    found = []
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not (name and equals and value.strip()):
+            raise RequestError(
+                f"{text!r} is not an assignment", expected="REGISTER=VALUE, as torque_limit=50%"
+            )
+        found.append((name, value.strip()))
+    return found
 
 
 def _parse_values(target: Target, pairs: Sequence[tuple[str, str]]) -> dict[str, float | int]:
     table = map_of(target)
-    return {name: _parse_value(target, table[name], text) for name, text in pairs}
+    return {name: parse_value(target, table[name], text) for name, text in pairs}
 
 
-def _parse_value(target: Target, row: Register, text: str) -> float | int:
+def parse_value(target: Target, row: Register, text: str) -> float | int:
     """`65°C`, `2048raw`, `1` of a row without unit -> the value in the unit of the row."""
     number = text.removesuffix("raw").strip()
     if number == text and row.unit in units.QUANTITIES:
@@ -145,7 +164,7 @@ def _parse_value(target: Target, row: Register, text: str) -> float | int:
     if number == text:
         return raw
     of_device = getattr(target.device, "value", None)
-    return of_device(row, raw) if of_device is not None else row.to_value(int(raw))  # type: ignore[no-any-return]
+    return of_device(row, raw) if of_device is not None else row.to_value(int(raw))
 
 
 def _question(devices: Sequence[Target], rows: Sequence[Register]) -> str:
