@@ -204,7 +204,7 @@ def _info(target: Target, common: Common, *, registers: bool) -> Info:
         _axis_limits(config),
         "" if config is None else config.exit_action,
         (config.estop if config is not None and config.estop else "") or (stops[0] if stops else "stop"),
-        {name: str(value) for name, value in identity.details.items()},
+        {name: str(value) for name, value in identity.details.items() if name not in Info.__struct_fields__},
         read_values(target, (), all=True) if registers else [],
     )
 

@@ -183,6 +183,9 @@ def exit_code(error: BaseException) -> Exit | None:
 
 
 def _dispatch(words: list[str]) -> int:
+    from motorbus.cli import output
+
+    output.begin()
     app = build()
     words = [_protect(word) for word in _common_last(words)]
     if "--help" in words or "-h" in words:

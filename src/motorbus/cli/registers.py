@@ -15,7 +15,16 @@ from msgspec import Struct
 from motorbus.cli.dryrun import carry_out
 from motorbus.cli.main import Partial
 from motorbus.cli.output import emit, escape, redraw, table_lines
-from motorbus.cli.target import Common, Target, Writing, load_machine, open_bus, open_devices, parse_quantity
+from motorbus.cli.target import (
+    Common,
+    Target,
+    Writing,
+    bus_address,
+    load_machine,
+    open_bus,
+    open_devices,
+    parse_quantity,
+)
 from motorbus.core import units
 from motorbus.core.family import AxisDriver, Identity
 from motorbus.core.register import Register, RegisterMap, Storage
@@ -198,6 +207,7 @@ class Sample(Struct, frozen=True):
     voltage: float | None = None
     temperature: float | None = None
     alarm: tuple[str, ...] = ()
+    note: str = ""
     error: str = ""
 
 
@@ -281,7 +291,7 @@ def _sample(target: Target, axes: Any, drivers: dict[str, AxisDriver]) -> Sample
         if key not in drivers:
             drivers[key] = target.bus.driver.axis(target.device.identify())
         if "state" not in drivers[key]:
-            return Sample(target.name, error="reports no state")
+            return Sample(target.name, note="reports no state")
         state = target.bus.run(drivers[key].state(target.device))
     except LinkLost as error:
         if not target.bus.reconnects:
@@ -316,7 +326,7 @@ def _show_samples(result: Samples, axes: Any, common: Common) -> None:
             "" if value is None else f"{value * scale:.{places}f}"
             for value, (_, _, scale, places) in zip(values, used, strict=True)
         ]
-        alarm = ", ".join(one.alarm) or escape(one.error)
+        alarm = ", ".join(one.alarm) or escape(one.error or one.note)
         rows.append([one.device, _place(one, axes), *cells, alarm])
     redraw(table_lines(rows))
 
@@ -348,8 +358,10 @@ class Frame(Struct, frozen=True, tag="frame"):
 
 def _listen(word: str, seconds: float, common: Common) -> None:
     """Show what is received on a bus, and send nothing."""
-    common.option.append("listen_only=yes")
-    with open_bus(common, word) as bus:
+    address = bus_address(word, common)
+    if "listen_only=" not in address:
+        address += ",listen_only=yes"
+    with open_bus(common, address) as bus:
         records = bus.trace.subscribe(10_000)
         end = bus.now() + seconds
         try:
