@@ -91,7 +91,8 @@ def _unknown(word: str, common: Common) -> RequestError:
     )
 
 
-def _options(common: Common) -> dict[str, str]:
+def key_values(common: Common) -> dict[str, str]:
+    """The options of -o. Raises RequestError."""
     found = {}
     for text in common.option:
         name, equals, value = text.partition("=")
@@ -103,7 +104,7 @@ def _options(common: Common) -> dict[str, str]:
 
 def _with_options(address: str, common: Common) -> str:
     bus, hash_, ids = address.partition("#")
-    return bus + "".join(f",{name}={value}" for name, value in _options(common).items()) + hash_ + ids
+    return bus + "".join(f",{name}={value}" for name, value in key_values(common).items()) + hash_ + ids
 
 
 def bus_address(word: str, common: Common) -> str:
