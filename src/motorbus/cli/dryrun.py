@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
-from math import degrees, pi
+from math import pi
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from msgspec import Meta, Struct
@@ -18,6 +18,8 @@ from motorbus.errors import MotorbusError
 if TYPE_CHECKING:
     from motorbus.bus.blocking import Bus
     from motorbus.cli.target import Target, Writing
+    from motorbus.core.family import Explanation
+    from motorbus.motion.profile import Kind
     from motorbus.motion.robot import Robot
 
 FAR: Final = pi  # rad; a longer move needs consent
@@ -136,7 +138,7 @@ def carry_out(
     """Run `action(device or bus)`, after the question if there is one; gives its result.
 
     --dry-run prints the frames and gives None. Before a question, the action runs without its writes, so that what
-    would be refused is refused first.
+    would be refused is refused first; an action that writes nothing needs no question.
     """
     real = getattr(target, "device", target)
     if writing.dry_run or (question and not writing.yes):
@@ -153,7 +155,8 @@ def carry_out(
         if writing.dry_run:
             print_frames(overlay)
             return None
-        confirm(question, writing)
+        if overlay.withheld:
+            confirm(question, writing)
     return action(real)
 
 
@@ -163,8 +166,19 @@ def print_frames(overlay: Overlay) -> None:
         print("nothing would be written")
     for frame in overlay.withheld:
         for one in overlay.driver.decode(frame):
-            parts = [f"{part.name} {part.meaning}" for part in one.parts if part.name not in FRAMING]
-            print(f"would send {one.data.hex(' ').upper()}\n    {one.title}: {'; '.join(parts)}")
+            print(f"would send {one.data.hex(' ').upper()}\n    {_meaning(one)}")
+
+
+def _meaning(one: Explanation) -> str:
+    """What a frame of the host says, without its framing and without what it could be from a device."""
+    names = [part.name for part in one.parts]
+    start = names.index("instruction") + 1 if "instruction" in names else 0
+    parts = [
+        f"{part.name} {part.meaning}"
+        for part in one.parts[start:]
+        if part.name not in FRAMING and not part.name.startswith("as an")
+    ]
+    return "; ".join([one.title.partition(" (or ")[0], *parts])
 
 
 # -- robot ---------------------------------------------------------------------------------------------------------
@@ -230,11 +244,6 @@ def _plan(robot: Robot, command: Any, goals: dict[str, float], places: dict[str,
             moves[name] = Move(place, goal, limits)
     if not moves:
         return Plan(shown)
-    kind = getattr(command, "kind", "trapezoid")
+    kind: Kind = getattr(command, "kind", "trapezoid")
     profile = synchronize(moves, kind=kind, duration=command.duration)
     return Plan(shown, profile.duration, profile.limited_by)
-
-
-def shown_degrees(angle: float) -> str:
-    """`90.0 deg`."""
-    return f"{degrees(angle):.1f} deg"
