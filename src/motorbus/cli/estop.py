@@ -50,9 +50,9 @@ def estop(
 
     Examples:
 
-    motorbus estop
-    motorbus estop feetech:/dev/ttyACM0#1-6
-    motorbus estop arm --all
+      motorbus estop
+      motorbus estop feetech:/dev/ttyACM0#1-6
+      motorbus estop arm --all
     """
     from motorbus.link.lock import holders, is_simulated, real_name
 
@@ -163,7 +163,7 @@ def _judge(stops: list[StoppedBus], errors: list[MotorbusError]) -> None:
         nothing = RequestError(
             "no bus is open on a real port, and none was named", expected="BUS, as feetech:/dev/ttyACM0"
         )
-        raise with_others([*errors, nothing])
+        raise with_others([*errors] or [nothing])
     heard = [one for one in stops if one.acknowledged]
     silent = [
         f"{one.bus}: no acknowledgement from {_list(one)}"

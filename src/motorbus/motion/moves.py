@@ -71,9 +71,9 @@ async def move(
     """Move axes to these goals (rad, m), or by these distances; all start and end together.
 
     All goals are checked before anything is sent. `speed` is a share of the velocity and acceleration of each axis,
-    `velocity` (rad/s, m/s) the highest of each, `tolerance` in rad of the device; each axis must be in position within `timeout` s after the end. Raises
-    RequestError, LimitExceeded, NotHomed before anything moves; Stalled, NoReply, Faulted, Overloaded, Interrupted when
-    a stop was sent to all.
+    `velocity` (rad/s, m/s) the highest of each, `tolerance` in rad of the device; each axis must be in position within
+    `timeout` s after the end. Raises RequestError, LimitExceeded, NotHomed before anything moves; Stalled, NoReply,
+    Faulted, Overloaded, Interrupted when a stop was sent to all.
     """
     axes = [machine.axis(name) for name in goals]
     if not (isfinite(speed) and 0 < speed <= 1):
@@ -323,7 +323,8 @@ async def jog(
     config = axis.config
     if not 0 < abs(velocity) <= config.max_velocity:
         raise LimitExceeded(
-            f"{name}: {velocity} is not a velocity", expected=f"at most {config.max_velocity:g}"
+            f"{name}: velocity {config.show(velocity)}/s",
+            expected=f"at most {config.show(config.max_velocity)}/s",
         )
     check_seconds(seconds)
     if not axis.follows_setpoints:
