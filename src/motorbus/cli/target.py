@@ -213,8 +213,10 @@ def _scan(bus: Bus) -> tuple[int, ...]:
 
 
 @contextmanager
-def open_robot(common: Common, words: Sequence[str] = ()) -> Iterator[Robot]:
+def open_robot(common: Common, words: Sequence[str] = (), velocity: str = "") -> Iterator[Robot]:
     """Open the axes of these words: names of the machine file, or addresses; () means all axes, else those of --bus.
+
+    `velocity` is the highest of the axes of an address; "": that of `Robot.at`.
 
     After success each axis stays as the command left it; after an error it ends as its `exit` says.
     """
@@ -224,7 +226,8 @@ def open_robot(common: Common, words: Sequence[str] = ()) -> Iterator[Robot]:
     words = tuple(words) or ((common.bus,) if common.bus and load_machine(common) is None else ())
     addresses = [word for word in words if is_address(word)]
     if len(addresses) == 1 == len(words):
-        robot = Robot.at(_with_ids(_with_options(addresses[0], common), common))
+        limit = {"max_velocity": abs(parse_quantity(velocity, "velocity"))} if velocity else {}
+        robot = Robot.at(_with_ids(_with_options(addresses[0], common), common), **limit)
     elif addresses:
         raise RequestError("several addresses in one command", expected="one, as feetech:/dev/ttyACM0#1-3")
     else:
