@@ -113,7 +113,8 @@ def test_a_stop_of_another_thread_goes_between_the_steps_of_an_exclusive_procedu
 def test_a_stepper_that_jogs_is_stopped_by_another_thread() -> None:
     with motorbus.simulate("stepper", clock="real") as sim, motorbus.open(sim.url) as bus:
         motor = stepper.Controller(bus)
-        machine = sim.simulator.controller.machine
+        simulator: Any = sim.simulator
+        machine = simulator.controller.machine
         before = machine.position(bus.now())
         jog = started(lambda: bus.run(catch(stepper.Controller.jog.function(motor, 1.0, 2 * LIMIT))))
         while machine.position(bus.now()) == before:

@@ -145,7 +145,7 @@ class Part:
         return min(self.sends_at, *[tree.next_moment() for tree in self._stepped])
 
     def wait(self) -> None:
-        """Wait for data, a deadline, or the next moment of a tree; without the turn sleep for at most `longest_sleep`."""
+        """Wait for data, a deadline, or the next moment of a tree; without the turn sleep."""
         bus, moment = self.bus, self.next_moment()
         if self.holds_turn:
             listens = self.is_idle and bus.engine.notification_handlers and not bus.link.virtual
