@@ -50,8 +50,16 @@ def test_help_loads_neither_hardware_nor_numbers_nor_files() -> None:
     assert set(printed.splitlines()[-1].split()) & (HARDWARE_AND_NUMBERS | FILES) == set()
 
 
+def test_reading_a_register_loads_a_part_of_motorbus() -> None:
+    words = ["read", "feetech:sim,ids=1#1", "present_position"]
+    code = f"from motorbus.cli import main; main({words!r}); import sys; " + (
+        "print(sum(name.startswith('motorbus') for name in sys.modules))"
+    )
+    assert int(run(code).splitlines()[-1]) <= 120
+
+
 def test_reading_a_machine_loads_no_editor_of_files() -> None:
-    code = f"from motorbus.motion.machine import Machine; Machine.parse('format = 1'); {LOADED}"
+    code = f"import motorbus.motion.machine; {LOADED}"
     loaded = set(run(code).split())
     assert loaded & (HARDWARE_AND_NUMBERS | FILES) == {"msgspec"}
 
@@ -71,7 +79,7 @@ def test_the_version_is_the_one_that_is_installed() -> None:
 
 
 def test_logging_is_silent_until_asked_for() -> None:
-    code = "import logging, motorbus.session; logging.getLogger('motorbus').error('nobody asked')"
+    code = "import logging, motorbus.session; logging.getLogger('motorbus').error('not shown')"
     command = [sys.executable, "-c", code]
     assert subprocess.run(command, capture_output=True, text=True, timeout=60).stderr == ""
 

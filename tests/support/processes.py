@@ -21,6 +21,8 @@ LATENCY: Final = ",latency=0.1"
 """Option of a serial address: a child on a busy machine may hold a reply back for so long (s)."""
 LIMIT: Final = 60.0
 """s after which a child counts as hung."""
+OPTIONS: Final = {"model", "control", "faults"}
+"""Flags that are options of `simulate`; the others are quirks."""
 
 
 @contextmanager
@@ -99,7 +101,7 @@ def simulator(port: Path, family: str, *arguments: str) -> Iterator[Simulator]:
 
 
 class Simulated:
-    """`motorbus simulate` as a child, for a `with`; flags are those of the command. `bus` is its first address.
+    """`motorbus simulate` as a child, for a `with`; other flags are quirks. `bus` is its first address.
 
     Raises MotorbusError with the text of the command if it ends before it is ready.
     """
@@ -118,7 +120,8 @@ class Simulated:
         words += ["--link", str(link)] if link else []
         words += ["--tcp", tcp] if tcp else []
         words += ["--pace"] if pace else []
-        words += [word for name, value in flags.items() for word in (f"--{name}", value)]
+        for name, value in flags.items():
+            words += [f"--{name}", value] if name in OPTIONS else ["-o", f"{name}={value}"]
         self._words = words
         self._process: subprocess.Popen[str] | None = None
         self.ready: dict[str, Any] = {}
