@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import re
 import shlex
+from io import StringIO
 from pathlib import Path
 from typing import Final, NamedTuple
 
 import pytest
-from motorbus.cli import main
 
+from motorbus.cli import main
 from motorbus.link.memory import MemoryLink
 
 MACHINE: Final = """format = 1
@@ -51,7 +52,6 @@ FILES: Final = {
 }
 PYTHON: Final = re.compile(r"Traceback|NoneType|object at 0x|\berrno\b|Errno|KeyError|invalid literal|__")
 WRITES: Final = {0x03, 0x04, 0x05, 0x06, 0x0A, 0x0B, 0x83}  # FEETECH instructions that change something
-STEPPER_READS: Final = {b"\x80", b"\x81"}
 
 
 class Ran(NamedTuple):
@@ -85,7 +85,7 @@ def shell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captur
     """A shell in a folder with the files of the table, and without a terminal."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    monkeypatch.setattr("sys.stdin", open("/dev/null", encoding="utf-8"))  # noqa: SIM115
+    monkeypatch.setattr("sys.stdin", StringIO())
     for name in ("MOTORBUS_MACHINE", "MOTORBUS_BUS"):
         monkeypatch.delenv(name, raising=False)
     for name, text in FILES.items():

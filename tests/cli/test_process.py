@@ -167,7 +167,19 @@ def test_version_imports_no_part_of_motorbus(tmp_path: Path) -> None:
         "import sys; from motorbus.cli import main; main(['--version']); "
         "print(*sorted(n for n in sys.modules if n.startswith('motorbus')))"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=LIMIT)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=LIMIT, check=True
+    )
     version, modules = done.stdout.splitlines()
     assert version.startswith("motorbus ")
     assert set(modules.split()) <= {"motorbus", "motorbus.errors", "motorbus.cli", "motorbus.cli.main"}
+
+
+def test_read_imports_a_part_of_motorbus(served: Simulator) -> None:
+    words = ["read", f"{served.address}#1", "present_position"]
+    count = "print(sum(name.startswith('motorbus') for name in sys.modules))"
+    code = f"import sys; from motorbus.cli import main; main({words!r}); {count}"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=LIMIT, check=True
+    )
+    assert int(done.stdout.splitlines()[-1]) <= 120

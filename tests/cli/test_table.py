@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 
 import pytest
-from motorbus.cli.main import build
 
 import motorbus
+from motorbus.cli.main import build
 from motorbus.link.memory import MemoryLink
 from tests.cli.rows import NAMES, ROWS, Row
 from tests.cli.shell import Shell, check_error, check_json_error, shell
