@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
-from math import degrees, pi
+from math import pi
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from msgspec import Meta, Struct
@@ -18,6 +18,7 @@ from motorbus.errors import MotorbusError
 if TYPE_CHECKING:
     from motorbus.bus.blocking import Bus
     from motorbus.cli.target import Target, Writing
+    from motorbus.core.family import Explanation
     from motorbus.motion.robot import Robot
 
 FAR: Final = pi  # rad; a longer move needs consent
@@ -163,8 +164,19 @@ def print_frames(overlay: Overlay) -> None:
         print("nothing would be written")
     for frame in overlay.withheld:
         for one in overlay.driver.decode(frame):
-            parts = [f"{part.name} {part.meaning}" for part in one.parts if part.name not in FRAMING]
-            print(f"would send {one.data.hex(' ').upper()}\n    {one.title}: {'; '.join(parts)}")
+            print(f"would send {one.data.hex(' ').upper()}\n    {_meaning(one)}")
+
+
+def _meaning(one: Explanation) -> str:
+    """What a frame of the host says, without its framing and without what it could be from a device."""
+    names = [part.name for part in one.parts]
+    start = names.index("instruction") + 1 if "instruction" in names else 0
+    parts = [
+        f"{part.name} {part.meaning}"
+        for part in one.parts[start:]
+        if part.name not in FRAMING and not part.name.startswith("as an")
+    ]
+    return "; ".join([one.title.partition(" (or ")[0], *parts])
 
 
 # -- robot ---------------------------------------------------------------------------------------------------------
@@ -233,8 +245,3 @@ def _plan(robot: Robot, command: Any, goals: dict[str, float], places: dict[str,
     kind = getattr(command, "kind", "trapezoid")
     profile = synchronize(moves, kind=kind, duration=command.duration)
     return Plan(shown, profile.duration, profile.limited_by)
-
-
-def shown_degrees(angle: float) -> str:
-    """`90.0 deg`."""
-    return f"{degrees(angle):.1f} deg"

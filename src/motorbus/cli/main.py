@@ -143,15 +143,13 @@ def build() -> App:
 
 
 def _families() -> dict[str, str]:
-    """The module of the commands of each built-in family that has some."""
-    from importlib.util import find_spec
-
-    from motorbus import families
-
+    """The module of the commands of each built-in family that has some; imports no family."""
+    folder = os.path.join(os.path.dirname(os.path.dirname(__file__)), "families")
+    names = sorted(os.listdir(folder))
     return {
-        name: module
-        for name in families.names()
-        if find_spec(module := f"motorbus.families.{name}.cli") is not None
+        name: f"motorbus.families.{name}.cli"
+        for name in names
+        if os.path.exists(os.path.join(folder, name, "cli.py"))
     }
 
 
@@ -210,7 +208,7 @@ def _show_examples(app: App, words: list[str]) -> None:
     """The help of a command ends with the examples of its docstring."""
     import inspect
 
-    chain, apps, _ = app.parse_commands(words)
+    chain, apps, _ = app.parse_commands([word for word in words if word not in ("--help", "-h")])
     command = apps[-1].default_command
     if chain and command is not None:
         apps[-1].help_epilogue = (inspect.getdoc(command) or "").partition("Examples:")[2].strip("\n")

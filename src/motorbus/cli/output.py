@@ -40,10 +40,15 @@ def emit_line(result: Any, common: Common) -> None:
     if common.json or not sys.stdout.isatty():
         emit(result, common)
         return
-    lines = _struct_lines(result)
-    if _drawn:
-        sys.stdout.write(f"\x1b[{_drawn[0]}A\x1b[J")
-    _drawn[:] = [len(lines)]
+    redraw(_struct_lines(result))
+
+
+def redraw(lines: Sequence[str]) -> None:
+    """Print lines in place of the last ones on a terminal, else below them."""
+    if sys.stdout.isatty():
+        if _drawn:
+            sys.stdout.write(f"\x1b[{_drawn[0]}A\x1b[J")
+        _drawn[:] = [len(lines)]
     print("\n".join(lines), flush=True)
 
 
