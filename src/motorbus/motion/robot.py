@@ -158,9 +158,9 @@ class RobotMethods(OpenMachine):
         """Move an axis at a velocity (rad/s, m/s), then brake; gives a `LoopResult`. See `moves.jog`."""
         return self.carry_out(moves.jog(self, name, velocity, seconds, until))
 
-    def home(self, names: Names = None, *, timeout: float = 30.0) -> Any:
+    def home(self, names: Names = None, *, timeout: float = 30.0, velocity: float | None = None) -> Any:
         """Move to the reference switches; gives the positions by name. Needs `attended()`."""
-        return self.carry_out(moves.home(self, names, timeout))
+        return self.carry_out(moves.home(self, names, timeout, velocity))
 
     def run(self, name: str, number: int, *, timeout: float | None = None) -> Any:
         """Run a stored program of the device of an axis; gives its result as text."""

@@ -1,0 +1,134 @@
+"""`motorbus teach replay follow`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from motorbus.cli.motion import For, axes_of, parse_time, until_enter
+from motorbus.cli.output import confirm, emit, note
+from motorbus.cli.target import Common, Writing, open_robot
+from motorbus.errors import RequestError
+
+Rate = Annotated[float, Parameter(help="Cycles per s.")]
+
+
+def teach(
+    file: Annotated[str, Parameter(name="FILE")],
+    /,
+    *axes: Annotated[str, Parameter(name="AXIS")],
+    for_: For = "",
+    rate: Rate = 50.0,
+    keep_torque: Annotated[bool, Parameter(help="Torque stays as it is.")] = False,
+    common: Common = Common(),
+) -> None:
+    """Record axes that are moved by hand into a new CSV file.
+
+    Torque is switched off and stays off: AN ARM SAGS, hold it. Without --for Enter
+    or Ctrl-C ends it. If a device is lost, the recording until then is kept.
+
+    Examples:
+
+    motorbus teach wave.csv arm
+    motorbus teach wave.csv shoulder elbow --for 10s --rate 100
+    motorbus teach wave.csv --keep-torque --for 3s
+    """
+    from motorbus.motion.teach import teach_file
+
+    if Path(file).exists():
+        raise RequestError(f"{file} exists", advice="name another file, or delete it; nothing was sent")
+    seconds = parse_time(for_)
+    pressed = until_enter() if seconds is None else None
+    with open_robot(common, axes) as robot:
+        names = tuple(name for word in axes for name in axes_of(robot, word)) or None
+        if not keep_torque:
+            note("torque goes off now and stays off: hold what could sag")
+        result = robot.carry_out(
+            teach_file(
+                robot, file, names=names, seconds=seconds, until=pressed, rate=rate, keep_torque=keep_torque
+            )
+        )
+        emit(result, common)
+
+
+def replay(
+    file: Annotated[str, Parameter(name="FILE")],
+    /,
+    *,
+    speed: Annotated[float, Parameter(help="Times as fast as recorded, above 0, at most 10.")] = 1.0,
+    smooth: Annotated[float | None, Parameter(help="Remove what is quicker, in Hz.")] = None,
+    repeat: Annotated[int, Parameter(help="How often.")] = 1,
+    writing: Writing = Writing(),
+    common: Common = Common(),
+) -> None:
+    """Play a recorded trajectory.
+
+    All goals are checked against the limits before anything moves; then the axes
+    move to the start together, and along the trajectory.
+
+    Examples:
+
+    motorbus replay wave.csv
+    motorbus replay wave.csv --dry-run
+    motorbus replay wave.csv --smooth 5 --speed 0.5 --repeat 3
+    """
+    from motorbus.cli.target import load_machine
+    from motorbus.motion.commands import Replay
+    from motorbus.motion.trajectory import Trajectory
+
+    machine = load_machine(common)
+    if machine is None:
+        raise RequestError(f"no machine file {common.machine}", advice="`motorbus init NAME=BUS` writes one")
+    trajectory = Trajectory.load(file, machine.axes)
+    with open_robot(common, tuple(trajectory.axes)) as robot:
+        result = writing.execute(robot, Replay(file, speed, smooth, repeat))
+        if result is not None:
+            emit(result, common)
+
+
+def follow(
+    leader: Annotated[str, Parameter(name="LEADER")],
+    follower: Annotated[str, Parameter(name="FOLLOWER")],
+    /,
+    *,
+    for_: For = "",
+    rate: Rate = 100.0,
+    writing: Writing = Writing(),
+    common: Common = Common(),
+) -> None:
+    """Let the axes of FOLLOWER track those of LEADER, in the order of the file.
+
+    Torque of the leaders is switched off: AN ARM SAGS, hold it. Followers keep to
+    their own limits. Without --for Enter ends it; the followers brake and hold.
+
+    Examples:
+
+    motorbus follow left right
+    motorbus follow shoulder elbow --for 10s
+    motorbus follow left right --rate 200 --yes
+    """
+    from motorbus.motion.commands import Follow
+
+    seconds = parse_time(for_)
+    if seconds is None and writing.dry_run:
+        raise RequestError("--dry-run needs a time", expected="--for, as --for 1s")
+    pressed = until_enter() if seconds is None else None
+    with open_robot(common, (leader, follower)) as robot:
+        leaders, followers = axes_of(robot, leader), axes_of(robot, follower)
+        if len(leaders) != len(followers):
+            raise RequestError(
+                f"{leader} has {len(leaders)} axes and {follower} has {len(followers)}",
+                expected="as many followers as leaders",
+                advice="make a [group.NAME] of each side",
+            )
+        pairs = dict(zip(leaders, followers, strict=True))
+        if not writing.dry_run:
+            confirm(f"switch torque of {', '.join(leaders)} off, and move {', '.join(followers)}", writing)
+        if seconds is not None:
+            result = writing.execute(robot, Follow(pairs, seconds, rate))
+        else:
+            result = robot.follow(pairs, until=pressed, rate=rate)
+        if result is not None:
+            emit(result, common)
