@@ -15,12 +15,11 @@ from math import inf, isfinite, nan, pi, radians
 from random import Random
 from typing import Any, NamedTuple
 
-from motorbus.session.robot import Robot
-
 from motorbus.core.steps import catch, gather
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import ServoGroup, sync_write
 from motorbus.families.kst import broadcast_write, settings_of
+from motorbus.session.robot import Robot
 from motorbus.simulation.named import Simulation
 from tests.safety.decoders import COUNT, TENTH, FeetechWitness, KstWitness, Witness
 

@@ -11,14 +11,13 @@ from collections.abc import Callable, Mapping
 from math import inf, isfinite, nan, pi
 from typing import Any
 
-from motorbus.motion.safety.lease import Lease
-from motorbus.session.robot import Robot
-
 import motorbus
 from motorbus.core.request import Effect, Request
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import ServoGroup, action_all, protocol, sync_write
 from motorbus.families.kst import broadcast_write, settings_of
+from motorbus.motion.safety.lease import Lease
+from motorbus.session.robot import Robot
 from motorbus.simulation.named import Simulation
 from tests.safety.calls import BOUNDS, SLACK, TURN, UNIT, WHEEL, Call, Spot
 from tests.safety.courses import Courses

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import pytest
-from motorbus.motion.safety.lease import Standing
 
 from motorbus import Robot
 from motorbus.core.request import Data
 from motorbus.errors import Refused
 from motorbus.link.base import Delivery, PerfectLine, Side
+from motorbus.motion.safety.lease import Standing
 from tests.conftest import Figures, Rounds
 from tests.support.machines import machine
 

@@ -7,14 +7,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import pytest
-from motorbus.motion.safety import restarts
-from motorbus.session.robot import AsyncRobot, Robot
 
 import motorbus
 from motorbus.bus.base import BaseBus
 from motorbus.core.steps import INTENT, OUTCOME, READABLE, JournalEntry
 from motorbus.errors import Refused
 from motorbus.motion.machine import Machine
+from motorbus.motion.safety import restarts
+from motorbus.session.robot import AsyncRobot, Robot
 from motorbus.simulation.named import Simulation
 from tests.support.machines import listened, machine, said
 

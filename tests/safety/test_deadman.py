@@ -10,13 +10,13 @@ from threading import Event
 from typing import Any
 
 import pytest
-from motorbus.motion.safety.lease import Lease, Standing
 
 from motorbus import AsyncRobot, Robot
 from motorbus.core.request import Data
 from motorbus.core.steps import Sleep
 from motorbus.errors import Refused, RequestError
 from motorbus.link.base import Delivery, PerfectLine, Side
+from motorbus.motion.safety.lease import Lease, Standing
 from motorbus.simulation.named import Simulation
 from tests.support.machines import listened, machine, said
 

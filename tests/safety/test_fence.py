@@ -6,17 +6,17 @@ from math import inf, pi, radians
 from typing import Any
 
 import pytest
-from motorbus.motion.safety.fence import bounds, follow
-from motorbus.motion.safety.gate import Gate
-from motorbus.motion.safety.guard import Bounds
-from motorbus.motion.safety.lease import Lease
-from motorbus.session.robot import AsyncRobot, Robot
 
 from motorbus.core.family import IdChanged
 from motorbus.core.request import Effect, Request, Response
 from motorbus.core.setpoint import Setpoint
 from motorbus.errors import LimitExceeded, NoReply, Refused
 from motorbus.families.feetech import ServoGroup
+from motorbus.motion.safety.fence import bounds, follow
+from motorbus.motion.safety.gate import Gate
+from motorbus.motion.safety.guard import Bounds
+from motorbus.motion.safety.lease import Lease
+from motorbus.session.robot import AsyncRobot, Robot
 from tests.support.machines import listened, machine, said
 
 STEP = {"max_step": "10 deg"}

@@ -8,14 +8,14 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from motorbus.motion.safety.gate import Gate
-from motorbus.motion.safety.guard import Bounds, Guard
-from motorbus.motion.safety.lease import Lease, Standing
-from motorbus.motion.safety.track import FRESH
 
 from motorbus.core.request import EVERY_LANE, Effect, Expected, Priority, Request, Response
 from motorbus.core.setpoint import Setpoint, Stays, torque_on
 from motorbus.errors import LimitExceeded, Refused
+from motorbus.motion.safety.gate import Gate
+from motorbus.motion.safety.guard import Bounds, Guard
+from motorbus.motion.safety.lease import Lease, Standing
+from motorbus.motion.safety.track import FRESH
 
 
 def motion(*goals: Setpoint, priority: Priority = Priority.POLL) -> Request[Response]:

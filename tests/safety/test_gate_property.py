@@ -10,8 +10,8 @@ from collections.abc import Callable
 from itertools import count
 
 import pytest
-from motorbus.session.robot import Robot
 
+from motorbus.session.robot import Robot
 from tests.safety.calls import AXES, Tally, drawn
 from tests.safety.courses import POSES
 from tests.safety.matters import Matters

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from motorbus.motion.safety.gate import Gate
-from motorbus.session.robot import Robot
 
 from motorbus.core.steps import Sleep
 from motorbus.errors import Faulted, LinkLost, NotHomed
+from motorbus.motion.safety.gate import Gate
+from motorbus.session.robot import Robot
 from tests.support.machines import Heard, machine
 
 AWAY = 0.5

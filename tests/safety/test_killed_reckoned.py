@@ -16,11 +16,11 @@ from pathlib import Path
 from random import Random
 
 import pytest
-from motorbus.cli import main
-from motorbus.session.robot import Robot
 
+from motorbus.cli import main
 from motorbus.core.request import Data
 from motorbus.link.serial import SerialLink
+from motorbus.session.robot import Robot
 from tests.support.machines import described
 from tests.support.processes import Simulated
 

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
-from motorbus.motion.safety.lease import LASTS, Lease, Standing
 
 from motorbus.errors import MotorbusError, Refused, RequestError
+from motorbus.motion.safety.lease import LASTS, Lease, Standing
 
 
 def held(*, attended: bool = False) -> Lease:

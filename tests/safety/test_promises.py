@@ -12,8 +12,6 @@ from math import inf, nan, pi, radians
 from typing import Any
 
 import pytest
-from motorbus.motion.safety.standstill import Rest, stopped
-from motorbus.session.robot import Robot
 
 import motorbus
 from motorbus.core.request import Data
@@ -21,6 +19,8 @@ from motorbus.core.steps import Sleep
 from motorbus.errors import LimitExceeded, MotorbusError, Refused, RequestError
 from motorbus.families.feetech import ServoGroup, sync_write
 from motorbus.link.base import Delivery, PerfectLine, Side
+from motorbus.motion.safety.standstill import Rest, stopped
+from motorbus.session.robot import Robot
 from tests.conftest import Rounds
 from tests.safety.points import asks, known, sent
 from tests.safety.test_estop import is_stop, requests

@@ -6,13 +6,13 @@ from contextlib import ExitStack
 from math import nan, pi
 
 import pytest
-from motorbus.motion.safety.gate import Gate
-from motorbus.session.robot import Robot
 
 import motorbus
 from motorbus.core.steps import Emit
 from motorbus.errors import Faulted, LimitExceeded, MotorbusError, Overloaded, Refused, RequestError
 from motorbus.families.feetech import ServoGroup, reg_write_all
+from motorbus.motion.safety.gate import Gate
+from motorbus.session.robot import Robot
 from tests.conformance.cuts import Kind, violations
 from tests.safety.points import asks, known, sent
 from tests.support.catalogue.cuts import COMMANDS

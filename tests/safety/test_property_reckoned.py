@@ -12,9 +12,9 @@ from random import Random
 from typing import Any
 
 import pytest
-from motorbus.session.robot import Robot
 
 from motorbus.errors import MotorbusError
+from motorbus.session.robot import Robot
 from tests.support.machines import machine
 
 PULSES = 1600

@@ -8,10 +8,10 @@ from math import pi
 from typing import Any
 
 import pytest
-from motorbus.session.robot import Robot
 
 from motorbus.errors import LimitExceeded
 from motorbus.families.feetech import ServoGroup
+from motorbus.session.robot import Robot
 from tests.safety.points import known, sent
 from tests.support.machines import listened, machine
 

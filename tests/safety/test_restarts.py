@@ -7,15 +7,15 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from motorbus.motion.safety import restarts
-from motorbus.motion.safety.restarts import HEALTH, LET_GO, RESTART, FaultNoted, RestartDetector
-from motorbus.session.robot import AsyncRobot, Robot
 
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import Health, State
 from motorbus.core.request import Data
 from motorbus.errors import Faulted, Refused, RequestError
 from motorbus.link.base import Delivery, PerfectLine, Side
+from motorbus.motion.safety import restarts
+from motorbus.motion.safety.restarts import HEALTH, LET_GO, RESTART, FaultNoted, RestartDetector
+from motorbus.session.robot import AsyncRobot, Robot
 from tests.safety.decoders import READ, REG_WRITE, SYNC_WRITE, WRITE
 from tests.support.machines import machine
 

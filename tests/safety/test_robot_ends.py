@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import pytest
-from motorbus.motion.safety.lease import Lease
 
 from motorbus import Robot
 from motorbus.core.steps import Sleep
 from motorbus.errors import MotorbusError
+from motorbus.motion.safety.lease import Lease
 from motorbus.simulation.named import Simulation
 from tests.support.machines import listened, machine, said
 

@@ -7,10 +7,10 @@ from math import inf, nan, radians
 from typing import Any
 
 import pytest
-from motorbus.motion.moving.stream import SETTLE
-from motorbus.session.robot import AsyncRobot, Robot
 
 from motorbus.errors import RequestError, Stalled
+from motorbus.motion.moving.stream import SETTLE
+from motorbus.session.robot import AsyncRobot, Robot
 from tests.support.machines import listened, machine, said
 
 BLOCKED = (2000, 2048 + 240)

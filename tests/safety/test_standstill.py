@@ -12,9 +12,6 @@ from importlib import import_module
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from motorbus.motion.safety.standstill import READS, SPAN, STILL, Rest, Standstill, Stopped, seen, stopped
-from motorbus.motion.safety.track import Sample
-from motorbus.session.robot import AsyncRobot, Robot
 
 from motorbus import families
 from motorbus.core.family import Quality
@@ -22,6 +19,9 @@ from motorbus.core.request import Data
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech.registers.rows import SCS_COUNT
 from motorbus.link.base import Delivery, Side
+from motorbus.motion.safety.standstill import READS, SPAN, STILL, Rest, Standstill, Stopped, seen, stopped
+from motorbus.motion.safety.track import Sample
+from motorbus.session.robot import AsyncRobot, Robot
 from tests.support.machines import Heard, listened, machine, said
 
 

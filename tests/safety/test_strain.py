@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from motorbus.motion.safety.strain import SECONDS, USUAL, Bearable, Strain, Verdict
 
 from motorbus.core.family import State
 from motorbus.errors import RequestError
+from motorbus.motion.safety.strain import SECONDS, USUAL, Bearable, Strain, Verdict
 
 HARD: dict[str, Any] = {"load": 0.95, "position": 0.0}
 

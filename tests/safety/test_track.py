@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from motorbus.motion.safety.track import FASTEST, FRESH, MARGIN, REACH, TREMBLING, Sample, Track, believed
 
 from motorbus.core.family import Quality
 from motorbus.core.steps import Sleep
 from motorbus.errors import WireError
+from motorbus.motion.safety.track import FASTEST, FRESH, MARGIN, REACH, TREMBLING, Sample, Track, believed
 
 QUICK = st.floats(-FASTEST, FASTEST)
 

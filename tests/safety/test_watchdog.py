@@ -10,8 +10,6 @@ from threading import Event, active_count
 from typing import Any
 
 import pytest
-from motorbus.motion.safety.lease import Lease, Standing
-from motorbus.session.watchdog import RETRY_PERIOD
 
 from motorbus import Robot
 from motorbus.core.request import Data
@@ -19,6 +17,8 @@ from motorbus.core.steps import Sleep
 from motorbus.errors import MotorbusError, Refused
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion import capabilities
+from motorbus.motion.safety.lease import Lease, Standing
+from motorbus.session.watchdog import RETRY_PERIOD
 from motorbus.simulation.named import Simulation
 from tests.support.machines import listened, machine, said
 
