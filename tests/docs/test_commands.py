@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-from motorbus.cli import main
 
 import motorbus
+from motorbus.cli import main
 from motorbus.motion.machine import MachineConfig
 from tests.docs.pages import FIRST_MACHINE, PAGES, ROOT, blocks, commands
 

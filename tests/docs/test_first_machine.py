@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from motorbus.cli import main
 
+from motorbus.cli import main
 from motorbus.link import usb_adapters
 from motorbus.motion.machine import MachineConfig
 from tests.docs.pages import FIRST_MACHINE, blocks, commands

@@ -51,7 +51,7 @@ def test_help_loads_neither_hardware_nor_numbers() -> None:
 
 
 def test_reading_a_machine_loads_no_editor_of_files() -> None:
-    code = f"import motorbus.motion.machine; {LOADED}"
+    code = f"from motorbus.motion.machine import MachineConfig; MachineConfig.parse('format = 1'); {LOADED}"
     loaded = set(run(code).split())
     assert loaded & (HARDWARE_AND_NUMBERS | FILES) == {"msgspec"}
 
@@ -71,7 +71,7 @@ def test_the_version_is_the_one_that_is_installed() -> None:
 
 
 def test_logging_is_silent_until_asked_for() -> None:
-    code = "import logging, motorbus.session; logging.getLogger('motorbus').error('not shown')"
+    code = "import logging, motorbus.session; logging.getLogger('motorbus').error('nobody asked')"
     command = [sys.executable, "-c", code]
     assert subprocess.run(command, capture_output=True, text=True, timeout=60).stderr == ""
 

@@ -10,7 +10,7 @@ from mypy import api
 
 ROOT = Path(__file__).resolve().parents[2]
 SNIPPET = """
-from motorbus import AsyncRobot, Robot
+from motorbus import Robot
 from motorbus.families.feetech import AsyncServo, Servo
 
 def blocking(servo: Servo) -> None:
@@ -19,7 +19,7 @@ def blocking(servo: Servo) -> None:
     servo.move(1.0, speed=2.0)  # call-arg: there is no such argument
     servo.move("far")  # arg-type: a position is a number
     text: str = servo.position()  # assignment: a position is a number
-    servo.mvoe(1.0)  # attr-defined: there is no such method
+    servo.mvoe(1.0)  # attr-defined: there is no such verb
 
 async def awaiting(servo: AsyncServo) -> None:
     await servo.move(1.0, velocity=2.0, wait=False)
@@ -34,10 +34,7 @@ def together(robot: Robot) -> None:
     robot.move({"shoulder": 0.5}, duration=1.0)
     robot.move({"shoulder": "far"})  # dict-item: a goal is a number
     robot.mvoe({"shoulder": 0.5})  # attr-defined: there is no such method
-
-async def together_awaited(robot: AsyncRobot) -> None:
-    await robot.stop("shoulder", verify=True)
-    await robot.stop(when="now")  # call-arg: there is no such argument
+    robot.stop(when="now")  # call-arg: there is no such argument
 """
 
 
