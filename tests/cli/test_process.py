@@ -123,7 +123,7 @@ def test_a_pipe_that_closes(served: Simulator) -> None:
 
 def test_a_terminal_is_asked_and_may_refuse(served: Simulator) -> None:
     main_end, port_end = pty.openpty()
-    words = ("write", f"{served.address}#1", "max_temperature=66")
+    words = ("write", f"{served.address}#1", "max_temperature=66°C")
     with start(*words, stdin=port_end, stdout=port_end, stderr=port_end) as process:
         os.close(port_end)
         shown = read_until(main_end, "?")
