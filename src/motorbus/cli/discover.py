@@ -179,8 +179,8 @@ def info(
             emit(result, common)
     if failures and shown:
         raise Partial("; ".join(f"{name}: {error.summary}" for name, error in failures.items()))
-    for error in failures.values():
-        raise error
+    if failures:
+        raise next(iter(failures.values()))
 
 
 def _info(target: Target, common: Common, *, registers: bool) -> Info:
@@ -204,7 +204,7 @@ def _info(target: Target, common: Common, *, registers: bool) -> Info:
         _axis_limits(config),
         "" if config is None else config.exit_action,
         (config.estop if config is not None and config.estop else "") or (stops[0] if stops else "stop"),
-        {name: str(value) for name, value in identity.details.items()},
+        {name: str(value) for name, value in identity.details.items() if name not in Info.__struct_fields__},
         read_values(target, (), all=True) if registers else [],
     )
 

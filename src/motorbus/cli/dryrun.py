@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from motorbus.bus.blocking import Bus
     from motorbus.cli.target import Target, Writing
     from motorbus.core.family import Explanation
+    from motorbus.motion.profile import Kind
     from motorbus.motion.robot import Robot
 
 FAR: Final = pi  # rad; a longer move needs consent
@@ -137,7 +138,7 @@ def carry_out(
     """Run `action(device or bus)`, after the question if there is one; gives its result.
 
     --dry-run prints the frames and gives None. Before a question, the action runs without its writes, so that what
-    would be refused is refused first.
+    would be refused is refused first; an action that writes nothing needs no question.
     """
     real = getattr(target, "device", target)
     if writing.dry_run or (question and not writing.yes):
@@ -154,7 +155,8 @@ def carry_out(
         if writing.dry_run:
             print_frames(overlay)
             return None
-        confirm(question, writing)
+        if overlay.withheld:
+            confirm(question, writing)
     return action(real)
 
 
@@ -242,6 +244,6 @@ def _plan(robot: Robot, command: Any, goals: dict[str, float], places: dict[str,
             moves[name] = Move(place, goal, limits)
     if not moves:
         return Plan(shown)
-    kind = getattr(command, "kind", "trapezoid")
+    kind: Kind = getattr(command, "kind", "trapezoid")
     profile = synchronize(moves, kind=kind, duration=command.duration)
     return Plan(shown, profile.duration, profile.limited_by)

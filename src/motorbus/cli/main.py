@@ -153,20 +153,12 @@ def _families() -> dict[str, str]:
     }
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command line, without the name of the program; return its exit code.
-
-    Without `argv` it is the command line of the process: later signals are ignored, output that cannot be written is
-    dropped, and the exit code is that of the process.
-    """
-    words = list(sys.argv[1:] if argv is None else argv)
-    if words == ["--version"]:
-        sys.stdout.write(f"motorbus {__version__}\n")
-        return Exit.OK
+def run(words: list[str], *, last: bool) -> int:
+    """Run a command line; `last`: the process ends with it. Returns the exit code."""
     _open_closed_streams()
-    with _signals(last=argv is None):
+    with _signals(last=last):
         try:
-            code = _run(words)
+            code = _dispatch(words)
             sys.stdout.flush()
         except SystemExit as end:  # rich ends the program when the reader of a help page is gone
             code = _report(BrokenPipeError(), words) if end.code == 1 else Exit.OK
@@ -174,7 +166,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             if exit_code(error) is None:
                 raise
             code = _report(error, words)
-    if argv is None:
+    if last:
         for stream in (sys.stdout, sys.stderr):
             try:
                 stream.flush()
@@ -190,7 +182,10 @@ def exit_code(error: BaseException) -> Exit | None:
     return next((CODES[kind] for kind in type(error).__mro__ if kind in CODES), None)
 
 
-def _run(words: list[str]) -> int:
+def _dispatch(words: list[str]) -> int:
+    from motorbus.cli import output
+
+    output.begin()
     app = build()
     words = [_protect(word) for word in _common_last(words)]
     if "--help" in words or "-h" in words:

@@ -33,6 +33,13 @@ def emit(result: Any, common: Common) -> None:
 
 
 _drawn: list[int] = []  # lines of the last table on the terminal
+_noted: set[str] = set()  # by `note_once`
+
+
+def begin() -> None:
+    """A command begins."""
+    _drawn.clear()
+    _noted.clear()
 
 
 def emit_line(result: Any, common: Common) -> None:
@@ -69,7 +76,9 @@ def _struct_lines(result: Any) -> list[str]:
         value = getattr(result, name)
         if _is_table(value):
             tables.append(value)
-        elif value not in (None, "", (), [], {}):
+        elif isinstance(value, Mapping):
+            values += [[f"{key.replace('_', ' ')}:", show(one)] for key, one in value.items()]
+        elif value not in (None, "", (), []):
             values.append([name.replace("_", " ") + ":", show(value, units.get(name, ""))])
     lines = _align(values)
     for table in tables:
@@ -167,6 +176,13 @@ def note(text: str) -> None:
     with suppress(OSError, ValueError):
         parts = [escape(part) for part in _PARTS.split(text)]
         print("\n".join(parts), file=sys.stderr, flush=True)
+
+
+def note_once(text: str) -> None:
+    """Print a note unless the same command has printed it."""
+    if text not in _noted:
+        _noted.add(text)
+        note(text)
 
 
 def escape(text: str, limit: int | None = LONGEST) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Sequence
 from contextlib import ExitStack
+from functools import partial
 from math import inf
 from typing import Annotated, Any, Final
 
@@ -14,7 +15,16 @@ from msgspec import Struct
 from motorbus.cli.dryrun import carry_out
 from motorbus.cli.main import Partial
 from motorbus.cli.output import emit, escape, redraw, table_lines
-from motorbus.cli.target import Common, Target, Writing, load_machine, open_bus, open_devices, parse_quantity
+from motorbus.cli.target import (
+    Common,
+    Target,
+    Writing,
+    bus_address,
+    load_machine,
+    open_bus,
+    open_devices,
+    parse_quantity,
+)
 from motorbus.core import units
 from motorbus.core.family import AxisDriver, Identity
 from motorbus.core.register import Register, RegisterMap, Storage
@@ -42,7 +52,7 @@ def map_of(target: Target) -> RegisterMap:
             f"{target.name}: {identity.model}, firmware {identity.firmware}: its registers are not known",
             node=target.node,
         )
-    return table  # type: ignore[no-any-return]
+    return table
 
 
 def read(
@@ -103,34 +113,52 @@ def write(
     """
     if not values:
         raise RequestError("no register to write", expected="REGISTER=VALUE, as torque_limit=50%")
-    pairs = [_pair(text) for text in values]
+    pairs = assignments(values)
     with open_devices(common, (target,)) as devices:
         orders = [(one, _parse_values(one, pairs)) for one in devices]
-        question = _question(devices, [map_of(devices[0])[name] for name, _ in pairs])
-        for number, (one, wanted) in enumerate(orders):
-            carry_out(
-                writing if number == 0 else Writing(yes=True, dry_run=writing.dry_run),
-                one,
-                lambda device, wanted=wanted: device.write(**wanted),
-                question,
-            )
+        rows = [map_of(devices[0])[name] for name, _ in pairs]
+        question = _question(devices, rows)
+        together = devices[0].family.sync_write
+        if together is not None and _may_sync(devices, rows):
+            by_node = {one.node: wanted for one, wanted in orders}
+            carry_out(writing, devices[0].bus, lambda bus: bus.run(together(by_node)), question)
+        else:
+            for number, (one, wanted) in enumerate(orders):
+                how = writing if number == 0 else Writing(yes=True, dry_run=writing.dry_run)
+                carry_out(how, one, partial(_write_one, wanted), question)
         if not writing.dry_run:
             emit([value for one, wanted in orders for value in _read_back(one, wanted)], common)
 
 
-def _pair(text: str) -> tuple[str, str]:
-    name, equals, value = text.partition("=")
-    if not (name and equals and value.strip()):
-        raise RequestError(f"{text!r} is not an assignment", expected="REGISTER=VALUE, as torque_limit=50%")
-    return name, value.strip()
+def _write_one(values: dict[str, float | int], device: Any) -> None:
+    device.write(**values)
+
+
+def _may_sync(devices: Sequence[Target], rows: Sequence[Register]) -> bool:
+    """One request may write these rows of all devices."""
+    is_one_bus = len({id(one.bus) for one in devices}) == 1
+    return len(devices) > 1 and is_one_bus and all(row.storage is Storage.RAM for row in rows)
+
+
+def assignments(texts: Sequence[str]) -> list[tuple[str, str]]:
+    """REGISTER=VALUE texts, parsed. Raises RequestError."""
+    found = []
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not (name and equals and value.strip()):
+            raise RequestError(
+                f"{text!r} is not an assignment", expected="REGISTER=VALUE, as torque_limit=50%"
+            )
+        found.append((name, value.strip()))
+    return found
 
 
 def _parse_values(target: Target, pairs: Sequence[tuple[str, str]]) -> dict[str, float | int]:
     table = map_of(target)
-    return {name: _parse_value(target, table[name], text) for name, text in pairs}
+    return {name: parse_value(target, table[name], text) for name, text in pairs}
 
 
-def _parse_value(target: Target, row: Register, text: str) -> float | int:
+def parse_value(target: Target, row: Register, text: str) -> float | int:
     """`65°C`, `2048raw`, `1` of a row without unit -> the value in the unit of the row."""
     number = text.removesuffix("raw").strip()
     if number == text and row.unit in units.QUANTITIES:
@@ -145,7 +173,7 @@ def _parse_value(target: Target, row: Register, text: str) -> float | int:
     if number == text:
         return raw
     of_device = getattr(target.device, "value", None)
-    return of_device(row, raw) if of_device is not None else row.to_value(int(raw))  # type: ignore[no-any-return]
+    return of_device(row, raw) if of_device is not None else row.to_value(int(raw))
 
 
 def _question(devices: Sequence[Target], rows: Sequence[Register]) -> str:
@@ -179,6 +207,7 @@ class Sample(Struct, frozen=True):
     voltage: float | None = None
     temperature: float | None = None
     alarm: tuple[str, ...] = ()
+    note: str = ""
     error: str = ""
 
 
@@ -262,7 +291,7 @@ def _sample(target: Target, axes: Any, drivers: dict[str, AxisDriver]) -> Sample
         if key not in drivers:
             drivers[key] = target.bus.driver.axis(target.device.identify())
         if "state" not in drivers[key]:
-            return Sample(target.name, error="reports no state")
+            return Sample(target.name, note="reports no state")
         state = target.bus.run(drivers[key].state(target.device))
     except LinkLost as error:
         if not target.bus.reconnects:
@@ -297,7 +326,7 @@ def _show_samples(result: Samples, axes: Any, common: Common) -> None:
             "" if value is None else f"{value * scale:.{places}f}"
             for value, (_, _, scale, places) in zip(values, used, strict=True)
         ]
-        alarm = ", ".join(one.alarm) or escape(one.error)
+        alarm = ", ".join(one.alarm) or escape(one.error or one.note)
         rows.append([one.device, _place(one, axes), *cells, alarm])
     redraw(table_lines(rows))
 
@@ -329,8 +358,10 @@ class Frame(Struct, frozen=True, tag="frame"):
 
 def _listen(word: str, seconds: float, common: Common) -> None:
     """Show what is received on a bus, and send nothing."""
-    common.option.append("listen_only=yes")
-    with open_bus(common, word) as bus:
+    address = bus_address(word, common)
+    if "listen_only=" not in address:
+        address += ",listen_only=yes"
+    with open_bus(common, address) as bus:
         records = bus.trace.subscribe(10_000)
         end = bus.now() + seconds
         try:

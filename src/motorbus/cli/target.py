@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
 from cyclopts import Parameter
 
-from motorbus.cli.output import note
+from motorbus.cli.output import note, note_once
 from motorbus.errors import NoReply, RequestError
 
 if TYPE_CHECKING:
@@ -149,7 +149,7 @@ def _report(event: object) -> None:
 
 def _notes(simulated: bool, warnings: Sequence[str], common: Common) -> None:
     if simulated and not common.json:
-        note("simulated")
+        note_once("simulated")
     for text in warnings:
         note(f"note: {text}")
 
