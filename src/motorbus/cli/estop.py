@@ -40,7 +40,7 @@ class StoppedBus(Struct, frozen=True, tag="estop"):
 def estop(
     *buses: Annotated[str, Parameter(name="BUS")],
     all_: Annotated[bool, Parameter(name="--all", help="Also simulated buses of other programs.")] = False,
-    common: Common = Common(),  # noqa: B008
+    common: Common = Common(),
 ) -> None:
     """Emergency stop. FEETECH servos lose their torque: AN ARM SAGS.
 
@@ -127,7 +127,7 @@ def _stop(common: Common, address: str, port: str, nodes: set[int]) -> StoppedBu
 
 
 def _request(port: str, owner: Owner | None) -> StopOutcome:
-    """Let the process that has the port open stop it. Raises PortNotFound without one, NoReply if it does not answer."""
+    """Let the process that has the port open stop it. Raises PortNotFound without one, NoReply if it is silent."""
     from motorbus.bus.stop_socket import request_estop
     from motorbus.link.lock import PortLock, socket_path
 
