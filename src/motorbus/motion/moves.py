@@ -164,14 +164,15 @@ class _Mover:
                 await on_axes(self._timed, lambda axis: self._plans[axis.name].prepare(profile.duration))
             )
             starts = {axis.bus: [self._plans[axis.name].start] for axis in self._timed}
-            if self._loop is None:
+            if self._loop is None and starts:
                 begun = machine.now()
                 for values in (await Exchange(starts)).values():
                     raise_first(dict(enumerate(values)) if isinstance(values, list) else {0: values})
-            else:
+            elif self._loop is not None:
                 peaks = {name: one.peak for name, one in profile.profiles.items()}
                 course = Course(profile.duration, profile.positions, peaks, self._goals)
                 begun = await lead(self._loop, course, starts, tolerance, timeout)
+            raise_first(await on_axes(self._timed, lambda axis: self._plans[axis.name].finish()))
         for axis in self._timed:
             start = self._starts[axis.name]
             axis.status.estimate = None if start is None else start + self._plans[axis.name].angle
@@ -213,6 +214,7 @@ class _Mover:
 
         self._plans = await on_axes(self._timed, plan)
         raise_first(self._plans)
+        self._timed = [axis for axis in self._timed if self._plans[axis.name].angle]
         shortest = max((one.shortest for one in self._plans.values()), default=0.0)
         profile = synchronize(moves, kind=kind, duration=duration, shortest=shortest)
         longest = max((one.fit(profile.duration) for one in self._plans.values()), default=profile.duration)
@@ -222,7 +224,7 @@ class _Mover:
 
 
 class _Finishes(Guard):
-    """Self-timed moves are waited for; each gives back what it borrowed, also after an error."""
+    """After an error or interrupt self-timed moves are stopped, and each gives back what it borrowed."""
 
     def __init__(self, axes: list[Axis], plans: Mapping[str, SelfTimedMove]) -> None:
         self._axes, self._plans = axes, plans
@@ -230,9 +232,7 @@ class _Finishes(Guard):
     async def leave(self, error: BaseException | None) -> None:
         if error is not None:
             await stop_axes([axis for axis in self._axes if axis.status.moving])
-        results = await on_axes(self._axes, lambda axis: self._plans[axis.name].finish())
-        if error is None:
-            raise_first(results)
+            await on_axes(self._axes, lambda axis: self._plans[axis.name].finish())
 
 
 class Course(NamedTuple):
