@@ -43,6 +43,7 @@ from motorbus.families.feetech.driver.requests import (
     verified,
     write_block,
 )
+from motorbus.families.feetech.models import NO_LOAD
 from motorbus.families.feetech.traits import Mode
 
 TOLERANCE: Final = 0.05
@@ -490,6 +491,12 @@ async def limits(node: Node) -> tuple[float, float]:
     """Lowest and highest position (rad); read if unknown. Raises RequestError where 0 and 0 have no known meaning."""
     await writable(node)
     return goals.checked_limits(node)
+
+
+async def max_velocity(node: Node) -> float | None:
+    """The velocity (rad/s) of its model without load; None where no source tells it."""
+    await known(node)
+    return NO_LOAD.get(node.identity.model) if node.identity else None
 
 
 async def travel(node: Node) -> tuple[float, float] | None:
