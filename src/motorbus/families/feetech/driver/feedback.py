@@ -134,5 +134,5 @@ async def _identify_then(node: Node, read: Callable[[Node], Runnable[T]]) -> T:
 
 def _unknown(node: Node, what: str) -> DeviceError:
     if not node.is_writable:
-        return unknown_map(node, f"cannot tell its {what} in a unit")
+        return unknown_map(node)
     return DeviceError(f"node {node.node}: its {what} has no known unit", advice="read_raw()", node=node.node)

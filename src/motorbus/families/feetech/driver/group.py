@@ -27,6 +27,7 @@ from motorbus.core.steps import Emit, Exclusive, SetBitrate, catch, with_cleanup
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech import protocol
 from motorbus.families.feetech.driver.access import (
+    GROUPS,
     Span,
     action_all,
     check_names,
@@ -45,6 +46,7 @@ from motorbus.families.feetech.driver.requests import (
     DATA,
     PRESENT,
     Block,
+    outdated,
     read_block,
     reports_position,
     unanswered,
@@ -93,6 +95,11 @@ async def sync_read(names: Sequence[str], ids: Iterable[int | Node]) -> GroupRes
         if node.node in raws:
             groups.setdefault((_table(node).name, _table(node)["present_position"].order), []).append(node)
     for group in groups.values():
+        for node in group:
+            if error := _lacks(node, names):
+                errors[node.node] = error
+        if group[0].node in errors:
+            continue
         for span in spans(rows_of(_table(group[0]), names)):
             here = [node for node in group if node.node not in errors]
             for part in await divided(here, span.size):
@@ -112,9 +119,19 @@ async def sync_read(names: Sequence[str], ids: Iterable[int | Node]) -> GroupRes
     )
 
 
+def _lacks(node: Node, names: Sequence[str]) -> MotorbusError | None:
+    """The error for a servo whose map lacks one of these registers."""
+    lacking = [name for name in names if name not in GROUPS and name not in _table(node)]
+    return (
+        node.refusal(f"has the map {_table(node).name}, which has no {', '.join(lacking)}")
+        if lacking
+        else None
+    )
+
+
 async def prepare_all(ids: Iterable[int | Node]) -> dict[int, MotorbusError]:
     """Identify those of these servos that are unknown; the errors by id."""
-    nodes = [node for node in as_nodes(ids) if node.table is None or node.settings is None]
+    nodes = [node for node in as_nodes(ids) if node.settings is None or node.is_outdated]
     errors: dict[int, MotorbusError] = {}
     for part in await divided(nodes, IMAGE):
         images = await collect(part, 0, IMAGE, errors)
@@ -136,7 +153,8 @@ async def collect(
 ) -> dict[int, bytes]:
     """One block of each: by SYNC READ, then by READ of those that it did not return; errors of the rest by id."""
     able = [node for node in nodes if node.traits.sync_read and not node.reads_alone]
-    found = await _sync_blocks(able, address, count) if len(able) > 1 else {}
+    able = able if len(able) > 1 else []
+    found = await _sync_blocks(able, address, count) if able else {}
     for node in nodes:
         if node.node in found:
             node.reads_alone = False
@@ -259,10 +277,10 @@ def _table(node: Node) -> RegisterMap:
 
 def known_row(node: Node, name: str) -> Register:
     """A row of an identified servo. Raises RequestError if it is not, DeviceError for an unknown map."""
-    if node.table is None or node.settings is None:
+    if node.table is None or node.settings is None or node.is_outdated:
         raise node.refusal("is not identified, so its limits and units are unknown", "run prepare_all()")
     if not node.table[name].unit:
-        raise unknown_map(node, f"cannot tell its {name.replace('_', ' ')} in a unit")
+        raise unknown_map(node)
     return node.row(name)
 
 
@@ -354,7 +372,13 @@ class GoalWriter:
 
     def holds(self) -> bool:
         """Whether the settings of all servos are those that it was made by."""
-        return all(node.settings is settings for node, settings in self._made)
+        return self._outdated() is None
+
+    def _outdated(self) -> Node | None:
+        for node, settings in self._made:
+            if node.settings is not settings or node.is_outdated:
+                return node
+        return None
 
     def __call__(self, goals: Sequence[float]) -> Request[None]:
         """The packet with these goals (rad), one for each servo; the gate judges the limits.
@@ -385,6 +409,8 @@ class GoalWriter:
 
     def _checked(self, goals: Sequence[float]) -> Request[None]:
         """The packet with a negative goal, or one outside the limits, which the gate judges."""
+        if node := self._outdated():
+            raise outdated(node)
         blocks = []
         for node, row, goal in zip(self._nodes, self._rows, goals, strict=True):
             raw, order = position_goal(node, goal)
@@ -519,6 +545,6 @@ async def reg_write_all(values: Mapping[One, Mapping[str, Value]]) -> None:
                 raise
         await action_all(nodes)
         for node in nodes:
-            node.pending = None
+            node.facts.pending.pop(node.node, None)
 
     await Exclusive(hand_over_all())

@@ -192,11 +192,11 @@ def unanswered(
 
 def unchanged(nodes: Iterable[Node], further: Precondition | None = None) -> Precondition:
     """Refuses a request once one of these servos has other settings than now: its goals would mean something else."""
-    made = [(node, node.settings) for node in nodes]
+    made = [(node, node.settings, node.facts.changes[node.node]) for node in nodes]
 
     def refusal(stops: Stops) -> MotorbusError | None:
-        for node, settings in made:
-            if node.settings is not settings:
+        for node, settings, changes in made:
+            if node.settings is not settings or node.facts.changes[node.node] != changes:
                 return outdated(node)
         return further(stops) if further is not None else None
 
