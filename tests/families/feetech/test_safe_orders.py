@@ -180,7 +180,7 @@ def test_a_row_that_one_map_lacks_costs_that_servo_only() -> None:
 
 def test_a_read_of_an_unknown_map_is_not_called_a_write() -> None:
     with world(firmware="9.99") as (_, servo, __), pytest.raises(MotorbusError) as caught:
-        servo.position()
+        servo.mode()
     assert "refuses to write" not in str(caught.value)
 
 

@@ -45,6 +45,7 @@ from motorbus.families.feetech.driver.node import IMAGE, Node, as_nodes
 from motorbus.families.feetech.driver.requests import (
     DATA,
     PRESENT,
+    SOUND,
     Block,
     outdated,
     read_block,
@@ -57,7 +58,6 @@ T = TypeVar("T")
 One = TypeVar("One", bound=int | Node)
 
 AIR: Final = 0.004  # s of replies of one request
-SOUND: Final = 0xFD  # low byte of the sum of a whole valid packet, header and checksum included
 BITS: Final = 10  # of a byte on the wire
 MOST_IDS: Final = 251
 NUMBERS: Final = frozenset((float, int))
