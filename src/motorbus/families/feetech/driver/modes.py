@@ -87,11 +87,11 @@ def _by_limits(node: Node, table: RegisterMap, wanted: Mode, limits: tuple[float
     """Both limits 0 for a motor; else limits, which only the caller or this object knows."""
     if wanted is Mode.PWM:
         node.former_limits = node.limits or node.former_limits
-        return limits_block(node, table, (0, 0))
+        return limits_block(table, (0, 0))
     wished = limits or node.limits or node.former_limits
     if wished is None:
         raise node.refusal("needs limits for position mode", "give limits=(low, high) in rad")
-    return limits_block(node, table, raw_limits(node, table, wished))
+    return limits_block(table, raw_limits(node, table, wished))
 
 
 def raw_limits(node: Node, table: RegisterMap, limits: tuple[float, float]) -> tuple[int, int]:
@@ -105,7 +105,7 @@ def raw_limits(node: Node, table: RegisterMap, limits: tuple[float, float]) -> t
     return raws
 
 
-def limits_block(node: Node, table: RegisterMap, raws: Sequence[int]) -> Block:
+def limits_block(table: RegisterMap, raws: Sequence[int]) -> Block:
     """The block of both position limits."""
     low, high = table["min_position_limit"], table["max_position_limit"]
     return Block(low.address, low.encode(raws[0]) + high.encode(raws[1]))
