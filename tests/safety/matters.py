@@ -75,8 +75,7 @@ class Matters(Courses):
         calls: list[tuple[str, Callable[[], object], dict[Spot, float]]] = [
             ("action", device.action, own),
             ("action by another", lambda: motorbus.feetech.Servo(bus, spot[1]).action(), own),
-            ("action_all", lambda: bus.run(action_all()), every),
-            ("action_all of those named", lambda: bus.run(action_all([device])), every),
+            ("action_all", lambda: bus.run(action_all([device])), every),
         ]
         return Call(*self.chance.choice(calls), once=True)
 

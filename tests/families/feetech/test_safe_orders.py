@@ -65,6 +65,18 @@ def test_a_bound_of_the_force_is_not_raised_in_a_group_packet(what: str) -> None
         assert "write(torque_limit" in caught.value.advice
 
 
+def test_a_loop_may_bound_the_force_of_an_hls_that_has_some() -> None:
+    with world("hls") as (bus, servo, _):
+        servo.prepare()
+        send = ServoGroup([servo]).write("goal_torque")
+        with pytest.raises(RequestError, match="may jump"):
+            send([0.5])
+        servo.enable_torque()
+        for bound in (0.5, 0.6):
+            bus.run(send([bound]))
+        assert servo.read("goal_torque")["goal_torque"] == pytest.approx(0.6, abs=0.01)
+
+
 @pytest.mark.parametrize("how", ["stop", "disable_torque", "disable_torque_all"])
 @pytest.mark.parametrize("by", ["action", "action_all"])
 def test_an_action_after_a_stop_by_another_object_is_refused(how: str, by: str) -> None:
@@ -89,6 +101,27 @@ def test_an_action_by_another_object_carries_out_the_order() -> None:
         Servo(bus, 1).action()
         later(bus, 1.0)
         assert servo.position() == pytest.approx(2.0, abs=0.01)
+
+
+def test_a_broadcast_action_is_refused_for_a_servo_that_it_does_not_name() -> None:
+    with world(ids="1,2") as (bus, servo, _):
+        other = Servo(bus, 2)
+        for one in (servo, other):
+            one.enable_torque()
+            one.reg_write(goal_position=2.0)
+        Servo(bus, 2).stop()
+        with pytest.raises(RequestError, match="node 2 was stopped"):
+            bus.run(action_all([servo]))
+        other.reg_write(goal_position=2.0)
+        bus.run(action_all([servo]))
+        later(bus, 1.0)
+        assert [one.position() for one in (servo, other)] == pytest.approx([2.0, 2.0], abs=0.01)
+        servo.stop()
+        bus.run(action_all([other]))  # nothing waits any more
+        nothing: Any
+        for nothing in ([], [1]):
+            with pytest.raises(RequestError, match="takes servo objects"):
+                bus.run(action_all(nothing))
 
 
 def test_recover_refuses_two_servos_that_could_be_the_one() -> None:
@@ -213,7 +246,8 @@ def test_a_loop_sees_settings_that_another_object_has_written() -> None:
         send = ServoGroup([servo]).write("goal_position")
         kept = send([3.0])
         Servo(bus, 1).write(angular_resolution=2)
-        for goal in (lambda: kept, lambda: send([3.1]), lambda: send([99.0])):
+        orders: list[Callable[[], Any]] = [lambda: kept, lambda: send([3.1]), lambda: send([99.0])]
+        for goal in orders:
             with pytest.raises(RequestError, match="other settings"):
                 bus.run(goal())
         with pytest.raises(RequestError, match="not identified"):

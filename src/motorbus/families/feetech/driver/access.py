@@ -18,7 +18,7 @@ from motorbus.families.feetech import protocol
 from motorbus.families.feetech.driver import eeprom, goals
 from motorbus.families.feetech.driver.identity import check_map, known, writable
 from motorbus.families.feetech.driver.motion import calm_without_force, disable_torque
-from motorbus.families.feetech.driver.node import Node, Pending, as_nodes
+from motorbus.families.feetech.driver.node import Node, Pending
 from motorbus.families.feetech.driver.requests import (
     Block,
     acknowledged,
@@ -275,16 +275,21 @@ def ram_block(node: Node, values: Mapping[str, Value], what: str) -> Block:
     assert node.table is not None
     raws = raw_values(node, node.table, values)
     found = list(blocks_of(node, raws))
-    if not any(row.effect is Effect.MOTION and row.name in ORDERS for row, _ in raws):
-        for row, raw in raws:
-            if raw and _bounds_force(node, row):
-                raise node.refusal(
-                    f"may jump by {row.name} in a {what}", f"write({row.name}=…) calms it first"
-                )
+    _check_force(node, raws, what)
     if len(found) == 1 and all(row.storage is Storage.RAM and not _needs_limp(row) for row, _ in raws):
         return found[0]
     names = ", ".join(values) or "none"
     raise node.refusal(f"takes adjoining RAM registers by {what}, not {names}", "write() the others")
+
+
+def _check_force(node: Node, raws: Raws, what: str) -> None:
+    """Raise RequestError for a bound of the force without a goal: from 0 it would let the servo move to an old one."""
+    if any(row.name in ORDERS for row, _ in raws):
+        return
+    for row, raw in raws:
+        known = row.name == node.traits.current and node.has_force
+        if raw and _bounds_force(node, row) and not known:
+            raise node.refusal(f"may jump by {row.name} in a {what}", f"write({row.name}=…) calms it first")
 
 
 # -- REG WRITE and ACTION --------------------------------------------------------------------------------------
@@ -324,9 +329,9 @@ async def action(node: Node) -> None:
     Raises RequestError if it was stopped, limp or given other settings since; OutcomeUnknown without acknowledgement.
     """
     await writable(node)
-    check_waiting([node])
     deferred = Deferred(node.node, begins=True)
-    request = acknowledged(node, protocol.action(node.node), _released([node]), deferred=deferred)
+    block = _released([node], [node.node])
+    request = acknowledged(node, protocol.action(node.node), block, deferred=deferred)
     await request
     node.facts.pending.pop(node.node, None)
     if not request.expected:
@@ -336,46 +341,52 @@ async def action(node: Node) -> None:
 def action_all(nodes: Sequence[Node]) -> Request[None]:
     """ACTION as a broadcast without replies: every servo carries out its last REG WRITE at the same moment.
 
-    `nodes` are those whose goals the gate judges once more, and for which it is refused as `action` says; others obey
-    as well.
+    `nodes` are some servos of the bus; all others obey as well. It is refused as `action` says if it is stale for one
+    servo to which a REG WRITE of this bus object went, and the gate judges the goals of all of these once more.
     """
-    as_nodes(nodes)
+    if not nodes or not all(isinstance(node, Node) for node in nodes):
+        raise RequestError("action_all() takes servo objects, which know what waits", expected="one or more")
     for node in nodes:
         if node.identity is not None:
             check_map(node)
-    check_waiting(nodes)
-    block = _released(nodes)
-    return unanswered(
+    pending = nodes[0].facts.pending
+    block = _released(nodes, list(pending))
+    request = unanswered(
         protocol.action(),
         block.effect,
         block.goals,
         unless=block.unless,
         deferred=Deferred(None, begins=True),
     )
+    return request.convert(lambda _: pending.clear())
 
 
-def _released(nodes: Sequence[Node]) -> Block:
-    waiting = [node.facts.pending[node.node] for node in nodes if node.node in node.facts.pending]
-    goals = tuple(goal for pending in waiting for goal in pending.goals)
-    effect = Effect.MOTION if goals else Effect.TORQUE
-    return Block(0, b"", effect, goals, repeatable=False, unless=lambda stops: _stale(nodes, stops))
+def _released(nodes: Sequence[Node], ids: Sequence[int]) -> Block:
+    """What an ACTION to these ids releases. Raises RequestError if it is stale."""
 
+    def stale(stops: Stops) -> MotorbusError | None:
+        return _stale(nodes, ids, stops)
 
-def check_waiting(nodes: Sequence[Node]) -> None:
-    """Raise RequestError if one of these was stopped, limp or given other settings since its REG WRITE."""
-    if error := _stale(nodes, lambda _: 0):
+    if error := stale(lambda _: 0):
         raise error
+    waiting = nodes[0].facts.pending
+    goals = tuple(goal for id in ids if id in waiting for goal in waiting[id].goals)
+    effect = Effect.MOTION if goals else Effect.TORQUE
+    return Block(0, b"", effect, goals, repeatable=False, unless=stale)
 
 
-def _stale(nodes: Sequence[Node], stops: Stops) -> MotorbusError | None:
+def _stale(nodes: Sequence[Node], ids: Sequence[int], stops: Stops) -> MotorbusError | None:
+    """The error if one of these was stopped, limp or given other settings since its REG WRITE."""
+    facts = nodes[0].facts
     for node in nodes:
-        pending = node.facts.pending.get(node.node)
-        if pending is None:
-            continue
-        if pending.settings != node.settings or node.is_outdated:
+        pending = facts.pending.get(node.node)
+        if pending is not None and (pending.settings != node.settings or node.is_outdated):
             return outdated(node)
-        if pending.epoch != node.facts.epochs[node.node] or stops(node.node) > pending.stops:
-            return node.refusal("was stopped or made limp after its REG WRITE", "reg_write() it again")
+    for id in ids:
+        pending = facts.pending.get(id)
+        if pending is not None and (pending.epoch != facts.epochs[id] or stops(id) > pending.stops):
+            what = f"node {id} was stopped or made limp after its REG WRITE"
+            return RequestError(what, advice="reg_write() it again", node=id)
     return None
 
 

@@ -517,7 +517,5 @@ async def reg_write_all(values: Mapping[One, Mapping[str, Value]]) -> None:
                 error.add_note(f"servos {held} may hold a REG WRITE, which the next ACTION would carry out")
                 raise
         await action_all(nodes)
-        for node in nodes:
-            node.facts.pending.pop(node.node, None)
 
     await Exclusive(hand_over_all())

@@ -237,6 +237,7 @@ async def ordered(node: Node, block: Block) -> None:
     await confirmed(node, block)
     if row is not None and has_bound:
         node.bound = row.decode(block.data[at : at + row.size])
+        node.has_force = node.bound != 0
 
 
 async def read_bound(node: Node, current: float | None = None) -> None:
@@ -244,6 +245,7 @@ async def read_bound(node: Node, current: float | None = None) -> None:
     if node.traits.current and node.bound is None and current is None:
         row = node.row(node.traits.current)
         node.bound = await read_block(node, row.address, row.size, row.decode)
+        node.has_force = node.bound != 0
 
 
 async def _read_commands(node: Node) -> bytes:

@@ -108,6 +108,7 @@ class Node:
         self.at = -inf  # arrival of the last reply (s, link clock)
         self.last_move: object = None
         self.bound: int | None = None  # raw goal torque of an HLS, as last read or written
+        self.has_force = False  # an HLS whose goal torque was above 0 after its settings were read
         self.former_limits: tuple[float, float] | None = None  # of an SCS that was made a motor
         self.reads_alone: bool | None = None  # it answers READ and not SYNC READ; None: unknown
         self.kept: Final[dict[str, tuple[Settings, Request[Any]]]] = {}  # requests, with their settings
@@ -158,6 +159,7 @@ class Node:
         """Its settings may have changed, or were `written`: they are read before they are used again."""
         self.settings = None
         self.bound = None
+        self.has_force = False
         if written:
             self._is_written = True
             self.facts.changes[self.node] += 1
