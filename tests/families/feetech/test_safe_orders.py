@@ -58,7 +58,7 @@ def test_a_bound_of_the_force_is_not_raised_in_a_group_packet(what: str) -> None
         orders: dict[str, Callable[[], Any]] = {
             "reg_write": lambda: servo.reg_write(torque_limit=0.5),
             "sync_write": lambda: bus.run(sync_write({servo: {"torque_limit": 0.5}})),
-            "group": lambda: ServoGroup([servo]).write("torque_limit")([0.5]),
+            "group": lambda: bus.run(ServoGroup([servo]).write("torque_limit")([0.5])),
         }
         with pytest.raises(RequestError, match="may jump") as caught:
             orders[what]()
