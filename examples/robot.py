@@ -12,14 +12,15 @@ HERE = Path(__file__).with_name("motorbus.toml")
 
 def main(path: str | Path = HERE) -> None:
     with motorbus.Robot.load(path) as robot:
-        print(f"{robot.machine.name}: {len(robot.axes)} axes{', simulated' if robot.simulated else ''}")
-        for name, axis in robot.axes.items():
-            print(f"{name}: {', '.join(sorted(axis.capabilities))}")
-        robot["slide"].declare(0.0)  # nothing tells where it is: homing would, or a person who has seen it
-        moved = robot.move({"shoulder": -0.3, "pan": 0.2, "slide": 0.02}, duration=1.0)
+        machine = robot.describe()
+        simulated = all(bus.simulated for bus in machine.buses.values())
+        print(f"{machine.name}: {len(machine.axes)} axes{', simulated' if simulated else ''}")
+        for name, axis in machine.axes.items():
+            print(f"{name}: {axis.model}, {', '.join(axis.commands)}")
+        moved = robot.move({"shoulder": -0.3, "pan": 0.2}, duration=1.0)
         print(moved)
-        for name, position in robot.positions(["shoulder", "pan", "slide"]).items():
-            print(f"{name} at {position:.3f}{', estimated' if moved.axes[name].estimated else ''}")
+        for name, position in robot.positions(["shoulder", "pan"]).items():
+            print(f"{name} at {position:.3f}")
 
 
 if __name__ == "__main__":

@@ -179,7 +179,7 @@ def machine_file(folder: Path, sims: Sequence[Any]) -> Path:
     for index, sim in enumerate(sims):
         lines += [f"[bus.b{index}]", f'address = "{sim.url}"']
         for node in IDS[sim.family.name]:
-            lines += [f"[axis.a{index}_{node}]", f'device = "b{index}#{node}"', 'exit = "leave"']
+            lines += [f"[axis.a{index}_{node}]", f'device = "b{index}#{node}"', 'max_velocity = "1 rad/s"']
     path = folder / "motorbus.toml"
     path.write_text("\n".join(lines) + "\n")
     return path

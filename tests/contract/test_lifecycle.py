@@ -106,8 +106,9 @@ low = "-90 deg"
 high = "90 deg"
 max_velocity = "2 deg/s"
 max_acceleration = "90 deg/s2"
-park = "-80 deg"
 exit = "park"
+[pose.park]
+a1 = "-80 deg"
 """
 
 

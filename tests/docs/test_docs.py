@@ -7,9 +7,9 @@ import shlex
 from pathlib import Path
 
 import pytest
+from motorbus.cli import build, main, parse
 
 from motorbus import errors
-from motorbus.cli import build, main, parse
 from tests.docs.test_readme import LINES as README
 
 ROOT = Path(__file__).resolve().parents[2]

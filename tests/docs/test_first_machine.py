@@ -12,8 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-
 from motorbus.cli import main
+
 from motorbus.link import usb_adapters
 from motorbus.motion.machine import Machine
 

@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-
-import motorbus
 from motorbus.cli import main
 from motorbus.cli.exits import Exit
+
+import motorbus
 from motorbus.motion.machine import Machine
 from motorbus.session import prepare
 

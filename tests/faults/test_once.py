@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from motorbus.bus.blocking import Bus
+from motorbus.bus.interlock import DeviceLimits
 from motorbus.bus.policy import RETRIES
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Data
@@ -21,7 +22,6 @@ from motorbus.families.feetech.driver.requests import Block, acknowledged, write
 from motorbus.families.kst.driver.requests import write_row
 from motorbus.families.stepper import protocol as stepper
 from motorbus.link.base import Delivery, PerfectLine, Side
-from motorbus.bus.interlock import DeviceLimits
 from tests.families.stepper.rig import Rig as StepperRig
 from tests.faults.test_stepper_single_faults import COMMANDS, ask
 from tests.support.catalogue.kst import NODE, KstRig

@@ -19,7 +19,7 @@ from motorbus.families import feetech
 from motorbus.motion.commands import SetPosition
 from motorbus.motion.machine import MachineConfig
 from motorbus.motion.robot import Robot
-from tests.motion.rig import listen, orders, rig
+from tests.support.machines import listen, machine, orders
 
 WHEEL = {"kind": "wheel", "zero": None, "low": None, "high": None}
 
@@ -42,7 +42,7 @@ def with_functions(
 @pytest.fixture
 def wheel(monkeypatch: pytest.MonkeyPatch) -> Any:
     """A position axis a1 and a wheel a2."""
-    with rig("1-2", axes={"a2": WHEEL}) as (config, sims):
+    with machine("1-2", axes={"a2": WHEEL}) as (config, sims):
         with motorbus.open(sims["arm"].url) as bus:
             feetech.Servo(bus, 2).set_mode("velocity")
 
@@ -174,7 +174,7 @@ def timed(monkeypatch: pytest.MonkeyPatch) -> Any:
         return replace(axis, plan_move=plan)
 
     with_functions(monkeypatch, type(stepper.FAMILY.open()), change)
-    with rig("1", "1", lift=True) as (config, sims), Robot(config) as robot:
+    with machine("1", "1", lift=True) as (config, sims), Robot(config) as robot:
         yield robot, sims, plans
 
 
@@ -235,7 +235,7 @@ def test_an_address_has_axes_with_the_limits_of_its_devices(family: str, far: fl
 
 def test_raw_counts_become_angles_when_the_device_is_known() -> None:
     keys = {"zero": "2048 raw", "low": "1024 raw", "high": "3072 raw", "sign": -1}
-    with rig("1", axes={"a1": keys}) as (config, sims), Robot(config) as robot:
+    with machine("1", axes={"a1": keys}) as (config, sims), Robot(config) as robot:
         axis = robot.describe().axes["a1"]
         assert axis.low == pytest.approx(-pi / 2)
         assert axis.high == pytest.approx(pi / 2)
@@ -251,7 +251,7 @@ def test_a_velocity_above_that_of_the_model_is_noted(monkeypatch: pytest.MonkeyP
         return replace(axis, max_velocity=top)
 
     with_functions(monkeypatch, type(feetech.FAMILY.open()), change)
-    with rig("1-2", axes={"a1": {"max_velocity": "10 rad/s"}}) as (config, _), Robot(config) as robot:
+    with machine("1-2", axes={"a1": {"max_velocity": "10 rad/s"}}) as (config, _), Robot(config) as robot:
         assert [note.partition(":")[0] for note in robot.warnings] == ["a1"]
         assert "297.9 deg/s" in robot.warnings[0]
         assert robot.describe().axes["a1"].notes
@@ -259,11 +259,11 @@ def test_a_velocity_above_that_of_the_model_is_noted(monkeypatch: pytest.MonkeyP
 
 def test_a_key_that_a_device_cannot_follow_is_refused() -> None:
     for keys in ({"max_torque": 0.5}, {"exit": "torque_off"}, {"estop": "torque_off"}):
-        with rig(can="1", axes={"c1": keys}) as (config, _), pytest.raises(MotorbusError, match="c1"):
+        with machine(can="1", axes={"c1": keys}) as (config, _), pytest.raises(MotorbusError, match="c1"):
             Robot(config)
 
 
 def test_max_torque_is_written_before_torque_comes_on() -> None:
-    with rig("1", axes={"a1": {"max_torque": 0.5}}) as (config, sims), Robot(config) as robot:
+    with machine("1", axes={"a1": {"max_torque": 0.5}}) as (config, sims), Robot(config) as robot:
         robot.enable_torque()
         assert sims["arm"][1].memory["torque_limit"] == 500

@@ -20,7 +20,7 @@ from motorbus.motion.lease import Lease
 from motorbus.motion.machine import AxisConfig, Position, Step, Velocity
 from motorbus.motion.robot import Robot
 from motorbus.motion.status import AxisStatus
-from tests.motion.rig import Recorded, listen, rig
+from tests.support.machines import Recorded, listen, machine
 
 NOW = 100.0
 
@@ -263,7 +263,7 @@ def test_no_goal_outside_the_limits_leaves(seed: int) -> None:
         "max_step": "200 deg",
     }
     sent = accepted = 0
-    with rig("1-3", **keys) as (config, sims), Robot(config) as robot:
+    with machine("1-3", **keys) as (config, sims), Robot(config) as robot:
         listen(sims)
         line = sims["arm"].line
         assert isinstance(line, Recorded)

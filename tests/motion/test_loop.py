@@ -14,11 +14,11 @@ from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, NoReply, 
 from motorbus.link.base import Delivery, Side
 from motorbus.motion.program import OnBuses
 from motorbus.motion.robot import Robot
-from tests.motion.rig import Recorded, listen, orders, rig
+from tests.support.machines import Recorded, listen, machine, orders
 
 
 def test_entering_writes_nothing_and_torque_comes_with_the_first_target() -> None:
-    with rig("1-2", "1") as (config, sims), Robot(config) as robot:
+    with machine("1-2", "1") as (config, sims), Robot(config) as robot:
         listen(sims)
         with robot.loop(50) as loop:
             for _ in islice(loop, 5):
@@ -34,7 +34,7 @@ def test_entering_writes_nothing_and_torque_comes_with_the_first_target() -> Non
 
 @pytest.mark.parametrize("name", ["a1", "c1"])
 def test_a_target_is_followed_within_velocity_and_acceleration(name: str) -> None:
-    with rig("1", "1") as (config, _), Robot(config) as robot, robot.loop(50) as loop:
+    with machine("1", "1") as (config, _), Robot(config) as robot, robot.loop(50) as loop:
         places = []
         for state in loop:
             loop.set_target(name, 0.8 if state.number < 40 else -0.2)
@@ -50,7 +50,7 @@ def test_a_target_is_followed_within_velocity_and_acceleration(name: str) -> Non
 
 
 def test_a_target_outside_the_limits_is_refused_or_clamped_and_counted() -> None:
-    with rig("1") as (config, _), Robot(config) as robot:
+    with machine("1") as (config, _), Robot(config) as robot:
         with robot.loop(50) as loop:
             for wrong in (9.0, -9.0, float("nan"), float("inf")):
                 with pytest.raises(LimitExceeded):
@@ -67,7 +67,10 @@ def test_a_target_outside_the_limits_is_refused_or_clamped_and_counted() -> None
 
 
 def test_an_axis_outside_its_limits_may_come_back() -> None:
-    with rig("1", axes={"a1": {"low": "20 deg", "high": "90 deg"}}) as (config, _), Robot(config) as robot:
+    with (
+        machine("1", axes={"a1": {"low": "20 deg", "high": "90 deg"}}) as (config, _),
+        Robot(config) as robot,
+    ):
         with pytest.raises(LimitExceeded):
             robot.move({"a1": 0.1})
         robot.move({"a1": 0.5})
@@ -75,7 +78,7 @@ def test_an_axis_outside_its_limits_may_come_back() -> None:
 
 
 def test_the_end_of_the_block_brakes() -> None:
-    with rig("1", "1") as (config, _), Robot(config) as robot:
+    with machine("1", "1") as (config, _), Robot(config) as robot:
         with robot.loop(50) as loop:
             for state in loop:
                 loop.set_target("a1", 2.0)
@@ -102,7 +105,7 @@ def lead(robot: Robot, cycle: int, then: Callable[[], object]) -> None:
 
 @pytest.mark.parametrize("how", ["stop", "torque", "device", "estop", "move"])
 def test_another_source_ends_the_loop_before_another_goal_leaves(how: str) -> None:
-    with rig("1", "1") as (config, sims), Robot(config) as robot:
+    with machine("1", "1") as (config, sims), Robot(config) as robot:
         takes: dict[str, Any] = {
             "stop": lambda: robot.stop("c1"),
             "torque": lambda: robot.disable_torque("a1"),
@@ -125,7 +128,7 @@ def test_another_source_ends_the_loop_before_another_goal_leaves(how: str) -> No
 
 @pytest.mark.parametrize("name", ["a1", "c1"])
 def test_no_goal_leaves_after_a_stop_between_plan_and_write(name: str) -> None:
-    with rig("1", "1") as (config, sims), Robot(config) as robot, robot.loop(50) as loop:
+    with machine("1", "1") as (config, sims), Robot(config) as robot, robot.loop(50) as loop:
         for state in loop:
             loop.set_target(name, 0.5)
             if state.number > 10:
@@ -160,7 +163,7 @@ class Lossy(Recorded):
 
 
 def test_a_missing_axis_gets_no_goals_and_goes_on_when_it_is_back() -> None:
-    with rig("1-2") as (config, sims), Robot(config) as robot, robot.loop(50) as loop:
+    with machine("1-2") as (config, sims), Robot(config) as robot, robot.loop(50) as loop:
         line = Lossy()
         for state in loop:
             loop.set_target("a1", 0.6)
@@ -177,7 +180,7 @@ def test_a_missing_axis_gets_no_goals_and_goes_on_when_it_is_back() -> None:
 
 
 def test_a_silent_axis_ends_the_loop() -> None:
-    with rig("1", "1") as (config, sims), Robot(config) as robot:
+    with machine("1", "1") as (config, sims), Robot(config) as robot:
         with pytest.raises(NoReply, match=r"c1 \(can#1\) has not answered"):
             lead(robot, 10, sims["can"][1].unplug)
         assert robot.stop("a1", verify=True).axes["a1"].at_rest
@@ -195,7 +198,7 @@ def test_a_late_host_is_counted_and_ends_a_movement_after_half_a_second(late: fl
                     break
         return loop.statistics
 
-    with rig("1") as (config, _), Robot(config) as robot:
+    with machine("1") as (config, _), Robot(config) as robot:
         if ends:
             with pytest.raises(Interrupted, match="held up"):
                 run(robot)
@@ -207,7 +210,7 @@ def test_a_late_host_is_counted_and_ends_a_movement_after_half_a_second(late: fl
 
 
 def test_positions_and_targets_without_a_clock() -> None:
-    with rig("1", "1") as (config, _), Robot(config) as robot, robot.loop(50, policy="clamp") as loop:
+    with machine("1", "1") as (config, _), Robot(config) as robot, robot.loop(50, policy="clamp") as loop:
         assert loop.read() == pytest.approx({"a1": 0.0, "c1": 0.0}, abs=0.01)
         sent = {}
         for _ in range(80):
@@ -223,7 +226,7 @@ async def pause(robot: Robot, seconds: float) -> None:
 
 
 def test_a_rate_is_chosen_and_one_that_the_wire_cannot_carry_is_refused() -> None:
-    with rig("1-6", options={}) as (config, _), Robot(config) as robot:
+    with machine("1-6") as (config, _), Robot(config) as robot:
         with robot.loop() as loop:
             assert loop.statistics.rate == 100
         with pytest.raises(RequestError, match="Hz"):
@@ -233,7 +236,7 @@ def test_a_rate_is_chosen_and_one_that_the_wire_cannot_carry_is_refused() -> Non
 
 
 def test_axes_that_follow_no_setpoints_are_left_out_or_refused_by_name() -> None:
-    with rig("1", lift=True) as (config, _), Robot(config) as robot:
+    with machine("1", lift=True) as (config, _), Robot(config) as robot:
         with robot.loop(50) as loop:
             assert list(loop.read()) == ["a1"]
         with pytest.raises(RequestError, match="lift"):
@@ -241,7 +244,10 @@ def test_axes_that_follow_no_setpoints_are_left_out_or_refused_by_name() -> None
 
 
 def test_jog_stops_at_the_limit_and_refuses_what_is_too_fast() -> None:
-    with rig("1", axes={"a1": {"low": "-20 deg", "high": "20 deg"}}) as (config, _), Robot(config) as robot:
+    with (
+        machine("1", axes={"a1": {"low": "-20 deg", "high": "20 deg"}}) as (config, _),
+        Robot(config) as robot,
+    ):
         result = robot.jog("a1", 0.5, 3.0)
         assert result.positions["a1"] == pytest.approx(20 * 3.14159 / 180, abs=0.01)
         for wrong in (0.0, 5.0, float("nan")):
@@ -255,6 +261,6 @@ def test_jog_stops_at_the_limit_and_refuses_what_is_too_fast() -> None:
 
 
 def test_an_unlimited_axis_jogs_at_its_velocity() -> None:
-    with rig(can="1", axes={"c1": {"low": None, "high": None}}) as (config, _), Robot(config) as robot:
+    with machine(can="1", axes={"c1": {"low": None, "high": None}}) as (config, _), Robot(config) as robot:
         robot.jog("c1", -0.4, 1.0)
         assert robot.positions()["c1"] == pytest.approx(-0.4, abs=0.08)

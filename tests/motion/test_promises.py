@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.steps import Sleep
 from motorbus.errors import (
     Faulted,
     Interrupted,
@@ -23,21 +22,11 @@ from motorbus.errors import (
 )
 from motorbus.families import feetech
 from motorbus.motion.robot import AsyncRobot, Robot
-from tests.motion.rig import listen, orders, rig
-
-
-def wait(robot: Robot, seconds: float) -> None:
-    """Let time pass on all buses."""
-    from motorbus.motion.program import OnBuses
-
-    async def sleep() -> None:
-        await OnBuses({bus: Sleep(seconds) for bus in robot.buses.values()})
-
-    robot.carry_out(sleep())
+from tests.support.machines import listen, machine, orders, wait
 
 
 def test_01_nothing_moves_on_connect() -> None:
-    with rig("1-2", "1-2", lift=True) as (config, sims):
+    with machine("1-2", "1-2", lift=True) as (config, sims):
         listen(sims)
         for _ in range(20):
             with Robot(config) as robot:
@@ -50,7 +39,7 @@ def test_01_nothing_moves_on_connect() -> None:
 
 @pytest.mark.parametrize("name", ["a1", "c1"])
 def test_01_torque_on_moves_by_a_count_at_most(name: str) -> None:
-    with rig("1", "1") as (config, sims), Robot(config) as robot:
+    with machine("1", "1") as (config, sims), Robot(config) as robot:
         sims["arm"][1].memory["goal_position"] = 500  # an old goal, far away
         before = robot.positions()[name]
         assert robot.enable_torque(name) == (name,)
@@ -60,7 +49,7 @@ def test_01_torque_on_moves_by_a_count_at_most(name: str) -> None:
 
 
 def test_02_unknown_is_not_safe_and_a_stop_is_allowed() -> None:
-    with rig("1", lift=True) as (config, sims), Robot(config) as robot:
+    with machine("1", lift=True) as (config, sims), Robot(config) as robot:
         with pytest.raises(MotorbusError, match="lift: stage#1 has no plan move"):
             robot.move({"lift": 0.01})
         wait(robot, 1.0)
@@ -96,7 +85,7 @@ def _one_cycle(robot: Robot, to: float) -> None:
 @pytest.mark.parametrize("way", ["move", "loop", "device", "register", "group", "buffer"])
 def test_03_one_gate_judges_each_spelling(way: str) -> None:
     with (
-        rig("1", axes={"a1": {"low": "-60 deg", "high": "60 deg"}}) as (config, sims),
+        machine("1", axes={"a1": {"low": "-60 deg", "high": "60 deg"}}) as (config, sims),
         Robot(config) as robot,
     ):
         robot.enable_torque()
@@ -113,7 +102,7 @@ def test_03_one_gate_judges_each_spelling(way: str) -> None:
 
 
 def test_04_a_goal_is_one_cycle_ahead() -> None:
-    with rig("1") as (config, sims), Robot(config) as robot, robot.loop(50) as loop:
+    with machine("1") as (config, sims), Robot(config) as robot, robot.loop(50) as loop:
         most = config.axes["a1"].max_velocity / 50
         for state in loop:
             loop.set_target("a1", 2.0)
@@ -125,14 +114,17 @@ def test_04_a_goal_is_one_cycle_ahead() -> None:
 
 
 def test_04_endless_motion_needs_a_lease() -> None:
-    with rig(lift=True, axes={"lift": {"low": None, "high": None}}) as (config, _), Robot(config) as robot:
+    with (
+        machine(lift=True, axes={"lift": {"low": None, "high": None}}) as (config, _),
+        Robot(config) as robot,
+    ):
         with pytest.raises(Refused) as caught:
             robot.home(timeout=1.0)
         assert caught.value.reason == "unattended"
 
 
 def test_05_a_silent_holder_loses_the_machine() -> None:
-    with rig("1-2") as (config, _), Robot(config) as robot:
+    with machine("1-2") as (config, _), Robot(config) as robot:
         attended = robot.attended(0.3)
         lease = attended.__enter__()
         robot.move({"a1": 0.1})
@@ -151,7 +143,7 @@ def test_05_a_silent_holder_loses_the_machine() -> None:
 
 
 def test_05_nothing_moves_after_the_loss_until_a_reset() -> None:
-    with rig("1") as (config, _), Robot(config) as robot, robot.attended(0.2) as lease:
+    with machine("1") as (config, _), Robot(config) as robot, robot.attended(0.2) as lease:
         wait(robot, 0.5)
         with pytest.raises(Refused):
             lease.beat()
@@ -163,7 +155,7 @@ def test_05_nothing_moves_after_the_loss_until_a_reset() -> None:
 
 
 def test_06_an_emergency_stop_latches() -> None:
-    with rig("1-2", "1") as (config, sims), Robot(config) as robot:
+    with machine("1-2", "1") as (config, sims), Robot(config) as robot:
         robot.enable_torque()
         outcome = robot.estop()
         assert outcome["arm"].acknowledged == (1, 2)
@@ -179,14 +171,14 @@ def test_06_an_emergency_stop_latches() -> None:
 
 
 def test_06_an_emergency_stop_holds_what_the_file_says() -> None:
-    with rig("1-2", axes={"a1": {"estop": "hold"}}) as (config, sims), Robot(config) as robot:
+    with machine("1-2", axes={"a1": {"estop": "hold"}}) as (config, sims), Robot(config) as robot:
         robot.enable_torque()
         robot.estop()
         assert [sims["arm"][node].memory["torque_enable"] for node in (1, 2)] == [1, 0]
 
 
 def test_07_stopped_is_what_was_seen_at_rest() -> None:
-    with rig("1", lift=True) as (config, _), Robot(config) as robot:
+    with machine("1", lift=True) as (config, _), Robot(config) as robot:
         robot.enable_torque("a1")
         result = robot.stop(verify=True)
         assert result.axes["a1"].at_rest is True
@@ -197,7 +189,7 @@ def test_07_stopped_is_what_was_seen_at_rest() -> None:
 @pytest.mark.parametrize("dead", [None, 1, 2])
 @pytest.mark.parametrize("action", ["hold", "torque_off", "leave"])
 def test_08_every_axis_is_visited_at_the_end(action: str, dead: int | None) -> None:
-    with rig("1-3", exit=action) as (config, sims):
+    with machine("1-3", exit=action) as (config, sims):
         try:
             with Robot(config) as robot:
                 robot.enable_torque()
@@ -215,7 +207,7 @@ def test_08_every_axis_is_visited_at_the_end(action: str, dead: int | None) -> N
 def test_08_parking_is_last() -> None:
     extra = {"pose": {"park": {"a1": "20 deg"}}}
     axes = {"a1": {"exit": "park"}, "a2": {"exit": "torque_off"}}
-    with rig("1-2", axes=axes, extra=extra) as (config, sims):
+    with machine("1-2", axes=axes, extra=extra) as (config, sims):
         with Robot(config) as robot:
             robot.enable_torque()
         assert abs(sims["arm"][1].memory["present_position"] - 2048 - 20 * 4096 / 360) < 10
@@ -224,7 +216,7 @@ def test_08_parking_is_last() -> None:
 
 
 def test_08_the_graceful_stop_parks_and_releases() -> None:
-    with rig("1-2", extra={"pose": {"park": {"a1": "20 deg"}}}) as (config, sims):
+    with machine("1-2", extra={"pose": {"park": {"a1": "20 deg"}}}) as (config, sims):
         with Robot(config) as robot:
             robot.enable_torque()
             robot.shutdown()
@@ -245,7 +237,7 @@ def _lead_until(robot: Robot, cycle: int, then: Callable[[], object]) -> None:
 
 
 def test_11_a_restart_is_a_fault_until_it_is_cleared() -> None:
-    with rig("1-2") as (config, sims), Robot(config) as robot:
+    with machine("1-2") as (config, sims), Robot(config) as robot:
         with pytest.raises(Faulted) as caught:
             _lead_until(robot, 20, lambda: sims["arm"][1].power_cycle())
         assert caught.value.reason == "restart"
@@ -258,7 +250,7 @@ def test_11_a_restart_is_a_fault_until_it_is_cleared() -> None:
 
 
 def test_11_an_axis_that_only_held_is_asked_before_it_moves() -> None:
-    with rig("1") as (config, sims), Robot(config) as robot:
+    with machine("1") as (config, sims), Robot(config) as robot:
         robot.move({"a1": 0.2})
         sims["arm"][1].power_cycle()
         wait(robot, 1.0)
@@ -267,7 +259,7 @@ def test_11_an_axis_that_only_held_is_asked_before_it_moves() -> None:
 
 
 def test_13_a_move_is_refused_as_a_whole() -> None:
-    with rig("1-2", "1") as (config, sims), Robot(config) as robot:
+    with machine("1-2", "1") as (config, sims), Robot(config) as robot:
         listen(sims)
         with pytest.raises(LimitExceeded):
             robot.move({"a1": 0.2, "a2": 5.0, "c1": 0.1})
@@ -275,7 +267,7 @@ def test_13_a_move_is_refused_as_a_whole() -> None:
 
 
 def test_14_a_blocked_motor_ends_the_move() -> None:
-    with rig("1-2") as (config, sims), Robot(config) as robot:
+    with machine("1-2") as (config, sims), Robot(config) as robot:
         robot.move({"a1": 0.1})
         sims["arm"][1].block_shaft()
         with pytest.raises((Overloaded, Stalled), match="a1"):
@@ -286,7 +278,7 @@ def test_14_a_blocked_motor_ends_the_move() -> None:
 
 @pytest.mark.parametrize("frame", range(3, 60, 7))
 def test_an_interrupted_move_stops(frame: int) -> None:
-    with rig("1-2", "1") as (config, sims), Robot(config) as robot:
+    with machine("1-2", "1") as (config, sims), Robot(config) as robot:
         robot.enable_torque()
         listen(sims, frame)
         with pytest.raises(KeyboardInterrupt):
@@ -300,7 +292,7 @@ def test_an_interrupted_move_stops(frame: int) -> None:
 
 def test_the_async_robot_moves_and_a_cancelled_move_stops() -> None:
     async def run() -> None:
-        with rig("1-2", "1") as (config, _):
+        with machine("1-2", "1") as (config, _):
             async with AsyncRobot(config) as robot:
                 await robot.move({"a1": 0.3, "c1": 0.2})
                 task = asyncio.create_task(robot.move({"a1": 1.5, "c1": 0.8}))
@@ -322,7 +314,7 @@ def test_the_async_robot_moves_and_a_cancelled_move_stops() -> None:
 
 
 def test_a_silent_axis_ends_a_move_and_stops_the_others() -> None:
-    with rig("1-2", "1") as (config, sims), Robot(config) as robot:
+    with machine("1-2", "1") as (config, sims), Robot(config) as robot:
         robot.enable_torque()
 
         def unplug(state: Any) -> None:
@@ -337,13 +329,13 @@ def test_a_silent_axis_ends_a_move_and_stops_the_others() -> None:
 
 def test_rounding_a_speed_up_never_makes_it_illegal() -> None:
     for velocity in ("1 deg/s", "7.3 deg/s", "33.3 deg/s", "119.9 deg/s", "298.7 deg/s"):
-        with rig("1", "1", max_velocity=velocity) as (config, _), Robot(config) as robot:
+        with machine("1", "1", max_velocity=velocity) as (config, _), Robot(config) as robot:
             robot.enable_torque()
             robot.move({"a1": 0.02, "c1": 0.02})
 
 
 def test_setpoints_of_other_devices_are_judged_by_their_own_limits() -> None:
-    with rig("1-2") as (config, _), Robot(config, "a1") as robot:
+    with machine("1-2") as (config, _), Robot(config, "a1") as robot:
         gate = robot.gates[robot.buses["arm"]]
         assert set(gate.axes) == {1}
         other = feetech.Servo(robot.buses["arm"], 2)

@@ -17,7 +17,7 @@ from motorbus.motion import commands
 from motorbus.motion.commands import RobotCommand
 from motorbus.motion.machine import MachineConfig
 from motorbus.motion.robot import PROGRAMS, AsyncRobot, Robot
-from tests.motion.rig import listen, orders, rig
+from tests.support.machines import listen, machine, orders
 
 JSON = {
     '{"type":"move","goals":{"a1":0.2}}': "moved",
@@ -36,7 +36,7 @@ JSON = {
 
 
 def test_each_command_is_one_json_text_and_its_result_is_another() -> None:
-    with rig("1-2", extra={"pose": {"ready": {"a1": "5 deg"}}}) as (config, _), Robot(config) as robot:
+    with machine("1-2", extra={"pose": {"ready": {"a1": "5 deg"}}}) as (config, _), Robot(config) as robot:
         for text, tag in JSON.items():
             command = msgspec.json.decode(text.replace('"type"', '"type"'), type=RobotCommand)
             result = msgspec.json.encode(robot.execute(command))
@@ -63,7 +63,7 @@ WRONG = {
 
 @pytest.mark.parametrize("text", WRONG)
 def test_a_wrong_command_is_refused_in_one_line(text: str) -> None:
-    with rig("1", "1") as (config, sims), Robot(config) as robot:
+    with machine("1", "1") as (config, sims), Robot(config) as robot:
         robot.states()
         listen(sims)
         with pytest.raises(RequestError, match=WRONG[text]) as caught:
@@ -73,7 +73,7 @@ def test_a_wrong_command_is_refused_in_one_line(text: str) -> None:
 
 
 def test_a_device_that_does_not_answer_is_named() -> None:
-    with rig("1-2") as (config, sims):
+    with machine("1-2") as (config, sims):
         sims["arm"][2].unplug()
         with pytest.raises(NoReply, match=r"a2: arm#2 does not answer on feetech:sim"):
             Robot(config)
@@ -82,7 +82,7 @@ def test_a_device_that_does_not_answer_is_named() -> None:
 
 
 def test_states_show_what_the_devices_report() -> None:
-    with rig("1", "1", lift=True) as (config, _), Robot(config) as robot:
+    with machine("1", "1", lift=True) as (config, _), Robot(config) as robot:
         states = robot.states()
         assert states["a1"].voltage == pytest.approx(7.4, abs=0.3)
         assert states["a1"].age is not None
@@ -93,7 +93,7 @@ def test_states_show_what_the_devices_report() -> None:
 
 
 def test_a_subscription_drops_the_oldest_and_keeps_its_rate() -> None:
-    with rig("1") as (config, _), Robot(config) as robot:
+    with machine("1") as (config, _), Robot(config) as robot:
         every, few = robot.subscribe(depth=5), robot.subscribe(rate=10)
         robot.move({"a1": 0.8})
         states = list(iter(every.get, None))
@@ -215,7 +215,7 @@ def test_asyncio_stops_by_another_task_and_never_blocks() -> None:
 def test_a_second_signal_shortens_the_end_and_skips_no_axis(second: int) -> None:
     extra = {"pose": {"park": {"a1": "60 deg"}}}
     axes = {"a1": {"exit": "park"}, "a2": {"exit": "torque_off"}}
-    with rig("1-2", axes=axes, extra=extra) as (config, sims):
+    with machine("1-2", axes=axes, extra=extra) as (config, sims):
         with pytest.raises(KeyboardInterrupt):
             _press_twice(config, sims, second)
         assert sims["arm"][2].memory["torque_enable"] == 0

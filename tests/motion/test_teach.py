@@ -12,7 +12,7 @@ from motorbus.errors import LimitExceeded, RequestError, Stalled
 from motorbus.motion.commands import Follow, Replay, Teach
 from motorbus.motion.robot import Robot
 from motorbus.motion.trajectory import Trajectory
-from tests.motion.rig import listen, orders, rig
+from tests.support.machines import listen, machine, orders
 
 TIMES = [index * pi / 60 for index in range(121)]
 WAVE = Trajectory(
@@ -29,7 +29,7 @@ def course_of(sims: Any, node: int, robot: Robot) -> list[float]:
 
 @pytest.mark.parametrize("kind", ["spline", "linear"])
 def test_a_trajectory_is_played_from_its_start(kind: Any) -> None:
-    with rig("1", "1") as (config, sims), Robot(config) as robot:
+    with machine("1", "1") as (config, sims), Robot(config) as robot:
         result = robot.replay(WAVE, interpolation=kind, speed=0.8)
         assert result.positions["a1"] == pytest.approx(WAVE.axes["a1"][-1], abs=0.02)
         assert result.positions["c1"] == pytest.approx(WAVE.axes["c1"][-1], abs=0.03)
@@ -41,7 +41,7 @@ def test_a_trajectory_is_played_from_its_start(kind: Any) -> None:
 
 
 def test_nothing_moves_when_a_goal_on_the_way_is_illegal() -> None:
-    with rig("1", "1") as (config, sims), Robot(config) as robot:
+    with machine("1", "1") as (config, sims), Robot(config) as robot:
         listen(sims)
         for wrong in (
             Trajectory([0, 5, 10], {"a1": [0, 9, 0]}),
@@ -56,7 +56,7 @@ def test_nothing_moves_when_a_goal_on_the_way_is_illegal() -> None:
 
 
 def test_a_blocked_shaft_ends_a_replay() -> None:
-    with rig("1", "1") as (config, sims), Robot(config) as robot:
+    with machine("1", "1") as (config, sims), Robot(config) as robot:
         robot.move({"a1": 0.2})
         sims["arm"][1].block_shaft()
         with pytest.raises(Stalled, match="a1"):
@@ -66,7 +66,7 @@ def test_a_blocked_shaft_ends_a_replay() -> None:
 
 def test_teach_records_a_limp_arm_and_says_where_it_left_its_limits() -> None:
     with (
-        rig("1-2", axes={"a1": {"low": "-10 deg", "high": "10 deg"}}) as (config, sims),
+        machine("1-2", axes={"a1": {"low": "-10 deg", "high": "10 deg"}}) as (config, sims),
         Robot(config) as robot,
     ):
         robot.enable_torque()
@@ -89,7 +89,7 @@ def test_teach_records_a_limp_arm_and_says_where_it_left_its_limits() -> None:
 
 
 def test_teach_ends_by_ctrl_c_and_gives_what_was_taught() -> None:
-    with rig("1") as (config, sims), Robot(config) as robot:
+    with machine("1") as (config, sims), Robot(config) as robot:
         listen(sims, 40)
         made = robot.teach()
         assert 10 < len(made.times) < 45
@@ -97,7 +97,7 @@ def test_teach_ends_by_ctrl_c_and_gives_what_was_taught() -> None:
 
 def test_followers_track_their_leaders_within_their_limits() -> None:
     axes = {"a2": {"low": "-30 deg", "high": "30 deg", "max_velocity": "45 deg/s"}}
-    with rig("1-2", axes=axes) as (config, sims), Robot(config) as robot:
+    with machine("1-2", axes=axes) as (config, sims), Robot(config) as robot:
         robot.enable_torque()
         turns = iter(range(10_000))
 
@@ -117,7 +117,7 @@ def test_followers_track_their_leaders_within_their_limits() -> None:
 
 def test_the_commands_of_the_shell_write_and_play_a_file(tmp_path: Path) -> None:
     file = str(tmp_path / "nod.csv")
-    with rig("1-2") as (config, _), Robot(config) as robot:
+    with machine("1-2") as (config, _), Robot(config) as robot:
         recorded = robot.execute(Teach(file, 0.5, names=("a1",)))
         assert recorded.cycles > 20
         with pytest.raises(FileExistsError):

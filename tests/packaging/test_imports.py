@@ -51,7 +51,7 @@ def test_help_loads_neither_hardware_nor_numbers_nor_files() -> None:
 
 
 def test_reading_a_machine_loads_no_editor_of_files() -> None:
-    code = f"from motorbus.motion.machine import Machine; Machine.parse('format = 1'); {LOADED}"
+    code = f"from motorbus.motion.machine import MachineConfig; MachineConfig.parse('format = 1'); {LOADED}"
     loaded = set(run(code).split())
     assert loaded & (HARDWARE_AND_NUMBERS | FILES) == {"msgspec"}
 

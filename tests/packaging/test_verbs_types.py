@@ -10,7 +10,7 @@ from mypy import api
 
 ROOT = Path(__file__).resolve().parents[2]
 SNIPPET = """
-from motorbus import AsyncRobot, Robot
+from motorbus import Robot
 from motorbus.families.feetech import AsyncServo, Servo
 
 def blocking(servo: Servo) -> None:
@@ -31,21 +31,10 @@ async def awaiting(servo: AsyncServo) -> None:
     text: str = await servo.position()  # assignment: a position is a number
 
 def together(robot: Robot) -> None:
-    places: dict[str, float | None] = robot.positions("arm")
-    here: float = robot["shoulder"].position()
     robot.move({"shoulder": 0.5}, duration=1.0)
-    robot.move({"shoulder": 0.5}, time=1.0)  # call-arg: there is no such argument
     robot.move({"shoulder": "far"})  # dict-item: a goal is a number
-    robot["shoulder"].jgo(0.1, 1.0)  # attr-defined: there is no such verb
-    text: str = robot["shoulder"].position()  # assignment: a position is a number
-
-async def together_awaited(robot: AsyncRobot) -> None:
-    places: dict[str, float | None] = await robot.positions("arm")
-    here: float = await robot["shoulder"].position()
-    robot.stop()  # unused-coroutine: await is forgotten
-    robot["shoulder"].stop()  # unused-coroutine: await is forgotten
-    there: float = robot["shoulder"].position()  # assignment: await is forgotten
-    await robot.stop(when="now")  # call-arg: there is no such argument
+    robot.mvoe({"shoulder": 0.5})  # attr-defined: there is no such method
+    robot.stop(when="now")  # call-arg: there is no such argument
 """
 
 

@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
-
-from motorbus.errors import Faulted, Refused
 from motorbus.motion.safety.restarts import FaultNoted
 from motorbus.session.robot import Robot
-from tests.safety.decoders import READ
 from tests.safety.test_restarts import moving_or_giving_torque
+
+from motorbus.errors import Faulted, Refused
+from tests.safety.decoders import READ
 from tests.support.machines import described
 from tests.support.processes import Simulated
 

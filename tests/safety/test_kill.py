@@ -21,8 +21,8 @@ from threading import Timer
 from typing import Any, NamedTuple
 
 import pytest
-
 from motorbus.session.robot import Robot
+
 from tests.conftest import Rounds
 from tests.support.machines import described
 from tests.support.processes import Simulated

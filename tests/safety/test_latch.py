@@ -17,13 +17,13 @@ from threading import Thread
 from typing import Any
 
 import pytest
+from tests.safety.points import asks, sent
 
 from motorbus import AsyncRobot, Interrupted, Robot, feetech, kst
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Data, Effect, Request
 from motorbus.core.setpoint import Setpoint
 from motorbus.errors import MotorbusError
-from tests.safety.points import asks, sent
 from tests.support.machines import listened, machine
 
 ROOT = Path(__file__).parents[2]

@@ -8,11 +8,11 @@ from math import pi
 from typing import Any
 
 import pytest
+from motorbus.session.robot import Robot
+from tests.safety.points import known, sent
 
 from motorbus.errors import LimitExceeded
 from motorbus.families.feetech import ServoGroup
-from motorbus.session.robot import Robot
-from tests.safety.points import known, sent
 from tests.support.machines import listened, machine
 
 AXES = {name: {"low": "-60 deg", "high": "60 deg", "max_step": "15 deg"} for name in ("a1", "a2")}

@@ -54,13 +54,16 @@ def motorbus(*arguments: str) -> tuple[int, dict[str, Any]]:
 
 
 class Simulator:
-    """`motorbus simulate` in a child. `address` is for motorbus.open, `port` the path of its pseudo-terminal."""
+    """Devices on a pseudo-terminal, served by a child.
+
+    `address` is for motorbus.open, `port` the path of its pseudo-terminal.
+    """
 
     def __init__(self, port: Path, family: str, *arguments: str) -> None:
         self.port = port
         self.control = port.with_name(port.name + ".control")
-        flags = ("--link", str(port), "--control", str(self.control), "--json")
-        self._child = _started(("-m", "motorbus", "simulate", family, *flags, *arguments))
+        flags = ("--link", str(port), "--control", str(self.control))
+        self._child = _started(("-m", "tests.support.serve", family, *flags, *arguments))
         assert self._child.stdout is not None
         ready = self._child.stdout.readline()
         assert ready, self._child.communicate()[1]
@@ -99,9 +102,9 @@ def simulator(port: Path, family: str, *arguments: str) -> Iterator[Simulator]:
 
 
 class Simulated:
-    """`motorbus simulate` as a child, for a `with`; flags are those of the command. `bus` is its first address.
+    """Simulated devices served by a child, for a `with`; flags are those of `serve`. `bus` is the first address.
 
-    Raises MotorbusError with the text of the command if it ends before it is ready.
+    Raises MotorbusError with the text of the child if it ends before it is ready.
     """
 
     def __init__(
@@ -114,7 +117,7 @@ class Simulated:
         pace: bool = False,
         **flags: str,
     ) -> None:
-        words = ["-m", "motorbus", "simulate", family, "--ids", ids, "--json"]
+        words = ["-m", "tests.support.serve", family, "--ids", ids]
         words += ["--link", str(link)] if link else []
         words += ["--tcp", tcp] if tcp else []
         words += ["--pace"] if pace else []

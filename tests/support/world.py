@@ -16,6 +16,7 @@ from motorbus.bus.attempt import Attempt
 from motorbus.bus.base import BaseBus
 from motorbus.bus.blocking import Bus
 from motorbus.bus.engine import Engine
+from motorbus.bus.interlock import DeviceLimits
 from motorbus.bus.stop_socket import StopOutcome
 from motorbus.bus.tasks import Tree
 from motorbus.bus.trace import Subscription, TraceRecord
@@ -26,7 +27,6 @@ from motorbus.core.steps import Exclusive, Gather, Runnable, Shielded, catch, di
 from motorbus.errors import RequestError
 from motorbus.link.base import Line, Link
 from motorbus.link.memory import MemoryLink
-from motorbus.bus.interlock import DeviceLimits
 from tests.support.subjects import possible, tables_of, vectors
 
 __all__ = ["AsyncBus", "Bus", "StopOutcome", "Subscription", "TraceRecord"]

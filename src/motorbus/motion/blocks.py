@@ -5,7 +5,7 @@ Both are for `with` of a `Robot` and for `async with` of an `AsyncRobot`; `run` 
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Self
 
 from motorbus.bus.base import BaseBus
@@ -42,9 +42,12 @@ class Loop:
         while True:
             yield self._run(self._loop.cycle())
 
-    async def __aiter__(self) -> AsyncIterator[LoopState]:
-        while True:
-            yield await self._run(self._loop.cycle())
+    def __aiter__(self) -> Self:
+        return self
+
+    async def __anext__(self) -> LoopState:
+        state: LoopState = await self._run(self._loop.cycle())
+        return state
 
     def __enter__(self) -> Self:
         self._run(self._loop.enter())

@@ -397,18 +397,15 @@ class AsyncRobot(RobotMethods):
         from motorbus.bus.aio import TaskSignals
 
         async with AsyncExitStack() as stack:
+            stack.callback(TaskSignals().end)
             for name, bus in self.config.buses.items():
                 opened = open_async(bus.address, **bus_options(self._whole, name))
                 self.buses[name] = await stack.enter_async_context(opened)
             await drive_async(identify(self, "awaiting"))
+            stack.callback(self._closed.set)
             self._stack = stack.pop_all()
-        self._signals = TaskSignals()
         return self
 
     async def __aexit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        try:
+        async with self._stack:
             await self.carry_out(self._leave(error))
-        finally:
-            self._closed.set()
-            await self._stack.aclose()
-            self._signals.end()

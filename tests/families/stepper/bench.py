@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from motorbus.bus.blocking import Bus
+from motorbus.bus.interlock import DeviceLimits
 from motorbus.core.request import Data
 from motorbus.core.steps import Runnable
 from motorbus.families.stepper import FAMILY, Controller
@@ -15,7 +16,6 @@ from motorbus.families.stepper.simulator import Controller as SimulatedControlle
 from motorbus.journal import BusJournal
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.link.memory import MemoryLink
-from motorbus.bus.interlock import DeviceLimits
 
 T = TypeVar("T")
 

@@ -13,9 +13,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from motorbus.cli import main
 
 import motorbus
-from motorbus.cli import main
 from motorbus.families.stepper import Controller
 from tests.support.processes import Simulated
 
