@@ -228,8 +228,7 @@ class Servo(PoweredDevice):
 
     def obeys(self, id: int) -> bool:
         """Whether it carries out writes to this id; an HLS has a second one (HLS memory table)."""
-        names = [name for name in ("id", "second_id") if name in self.model.table]
-        return any(self.memory[name] == id for name in names)
+        return self.id == id or ("second_id" in self.model.table and self.memory["second_id"] == id)
 
     @property
     def baud_rate(self) -> int | None:
