@@ -10,43 +10,40 @@ The names a user needs are here and are loaded when first used, so that `import 
     the families        motorbus.feetech …                          device classes and driver functions
 """
 
-from __future__ import annotations
-
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
-from motorbus.errors import (
-    AnotherAdapter,
-    ChecksumError,
-    DeviceError,
-    Faulted,
-    FramingError,
-    Interrupted,
-    LimitExceeded,
-    LinkError,
-    LinkFull,
-    LinkLost,
-    MotionError,
-    MotorbusError,
-    NoReply,
-    NotHomed,
-    OutcomeUnknown,
-    Overloaded,
-    PortBusy,
-    PortNotFound,
-    Refused,
-    RequestError,
-    Stalled,
-    UnexpectedReply,
-    VerificationFailed,
-    WireError,
-)
-
+TYPE_CHECKING = False  # `typing` takes longer to import than all of this
 if TYPE_CHECKING:
+    from typing import Any
+
     from motorbus import recorder
+    from motorbus.errors import (
+        AnotherAdapter,
+        ChecksumError,
+        DeviceError,
+        Faulted,
+        FramingError,
+        Interrupted,
+        LimitExceeded,
+        LinkError,
+        LinkFull,
+        LinkLost,
+        MotionError,
+        MotorbusError,
+        NoReply,
+        NotHomed,
+        OutcomeUnknown,
+        Overloaded,
+        PortBusy,
+        PortNotFound,
+        Refused,
+        RequestError,
+        Stalled,
+        UnexpectedReply,
+        VerificationFailed,
+        WireError,
+    )
     from motorbus.families import feetech, kst, stepper
-    from motorbus.session import open, open_async, simulate
     from motorbus.motion.robot import AsyncRobot, Robot
+    from motorbus.session import open, open_async, simulate
 
 __version__ = "0.1.0"
 
@@ -99,13 +96,17 @@ def __dir__() -> list[str]:
     return __all__
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
+    from importlib import import_module
+
     if name in _LAZY:
         return getattr(import_module(_LAZY[name]), name)
     if name == "recorder":
         return import_module("motorbus.recorder")
     if name.startswith("_"):
         raise AttributeError(name)
+    if name in __all__ and name[0].isupper():
+        return getattr(import_module("motorbus.errors"), name)
     try:
         return import_module(f"motorbus.families.{name}")
     except ModuleNotFoundError as error:

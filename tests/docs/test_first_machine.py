@@ -1,8 +1,7 @@
-"""The tutorial of the first machine, done: every command in it as it is written, in order, in an empty folder."""
+"""The tutorial of the first machine: all of its commands as written, in order, in an empty folder."""
 
 from __future__ import annotations
 
-import re
 import shlex
 import subprocess
 import sys
@@ -12,19 +11,16 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+
 from motorbus.cli import main
-
 from motorbus.link import usb_adapters
-from motorbus.motion.machine import Machine
+from motorbus.motion.machine import MachineConfig
+from tests.docs.pages import FIRST_MACHINE, blocks, commands
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "tutorial" / "first-machine.md").read_text(
-    encoding="utf-8"
-)
-CONSOLE = "\n".join(re.findall(r"^```console\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL))
-LINES = [line[2:].partition("  #")[0] for line in CONSOLE.splitlines() if line.startswith("$ motorbus ")]
+LINES = commands(FIRST_MACHINE)
 SERVED = [line for line in LINES if line.startswith("motorbus simulate ")]
 TYPED = [line for line in LINES if line not in SERVED]
-PROGRAMS = re.findall(r"^```py\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+PROGRAMS = blocks(FIRST_MACHINE, "py")
 
 
 def words(line: str) -> list[str]:
@@ -34,7 +30,7 @@ def words(line: str) -> list[str]:
 
 @contextmanager
 def terminal(line: str, folder: Path) -> Iterator[None]:
-    """A command that goes on in a terminal of its own, from its first line of output on."""
+    """Run a command in a process, from its first line of output on."""
     with subprocess.Popen(
         words(line), cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
     ) as process:
@@ -75,9 +71,9 @@ def test_the_page_does_what_it_says(
         code = main(shlex.split(line)[1:])
         out, err = capsys.readouterr()
         assert (code, out != "") == (0, True), f"{line}: {err}"
-    made = Machine.load(folder / "motorbus.toml")
+    made = MachineConfig.load(folder / "motorbus.toml")
     assert list(made.axes) == ["arm_1", "arm_2", "arm_3", "lift_1"]
-    assert list(made.poses["rest"]) == ["arm_1", "arm_2", "arm_3"]
+    assert {"arm_1", "arm_2", "arm_3"} <= set(made.poses["rest"])
     for program in PROGRAMS:
         with warnings.catch_warnings(action="error"):
             exec(compile(program, "<page>", "exec"), {"__name__": "__main__"})

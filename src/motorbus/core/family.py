@@ -433,6 +433,10 @@ class Family:
     recording_module: str = ""
     """Has `Recording(direction)`. "": the bus driver decodes recordings, frames by `decode`, bytes by its receiver."""
     cli: str = ""  # has the shell commands of this family
+    commands: Mapping[str, Callable[..., Runnable[Any]]] = field(default_factory=dict)
+    """The commands of the manual: `function(device, …)` by name."""
+    sync_write: Callable[[Mapping[Any, Mapping[str, float]]], Runnable[None]] | None = None
+    """sync_write({device: {register: value}}) writes RAM registers of many devices with one request."""
 
     def open(self, **settings: object) -> BusDriver:
         """The driver of one open bus. Raises RequestError for an unknown or invalid setting."""

@@ -27,7 +27,7 @@ class Owner(NamedTuple):
 
 def not_found(port: str, others: Sequence[PortInfo]) -> PortNotFound:
     """There is no such port; `others` are the ports of this machine."""
-    advice = "is the adapter plugged in, the simulator running? `motorbus ports` lists what there is"
+    advice = "is the adapter plugged in, the simulator running? `motorbus scan` lists the ports"
     cause = ""
     if os.path.islink(port):
         cause = f"it leads to {os.readlink(port)}, which is gone"
@@ -45,7 +45,7 @@ def not_a_port(port: str, others: Sequence[PortInfo]) -> PortNotFound:
     return PortNotFound(
         f"{port} is not a serial port",
         expected=_listed(others),
-        advice="`motorbus ports` lists what there is",
+        advice="`motorbus scan` lists the ports",
     )
 
 

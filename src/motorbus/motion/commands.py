@@ -16,13 +16,17 @@ AxisNames: TypeAlias = tuple[str, ...] | None
 
 
 class Move(Struct, frozen=True, tag="move"):
-    """Move axes to these positions; all start and end together. `relative`: by these distances."""
+    """Move axes to these positions; all start and end together. `relative`: by these distances.
+
+    `velocity` is the highest of each axis, None: that of the machine file.
+    """
 
     goals: dict[str, float]
     duration: float | None = None
     speed: float = 1.0
     kind: Kind = "trapezoid"
     relative: bool = False
+    velocity: float | None = None
 
 
 class Pose(Struct, frozen=True, tag="pose"):
@@ -42,10 +46,11 @@ class Jog(Struct, frozen=True, tag="jog"):
 
 
 class Home(Struct, frozen=True, tag="home"):
-    """Move to the reference switch."""
+    """Move to the reference switch, at `velocity` or as the device is set."""
 
     names: AxisNames = None
     timeout: float = 30.0
+    velocity: float | None = None
 
 
 class RunProgram(Struct, frozen=True, tag="run"):

@@ -28,6 +28,7 @@ REST_TIME: Final = 0.1  # s for which readings must agree
 REST_READS: Final = 3
 REST_PERIOD: Final = 0.02  # s
 WATCH_TIME: Final = 1.0  # s
+NOTE_TIME: Final = 0.3  # s that an interrupted axis is watched, to say where it stopped
 
 
 class StopsIfInterrupted(Guard):
@@ -40,9 +41,16 @@ class StopsIfInterrupted(Guard):
         if error is None:
             return
         moving = [axis for axis in self._axes if axis.status.moving and not axis.status.fault]
-        for name, result in (await stop_axes(moving)).items():
-            text = f"not stopped: {result.summary}" if isinstance(result, MotorbusError) else result.promise
-            error.add_note(f"{name}: {text}")
+        results = await stop_axes(moving)
+        accepted = [axis for axis in moving if not isinstance(results[axis.name], MotorbusError)]
+        await on_axes(accepted, lambda axis: watch_rest(axis, NOTE_TIME))
+        for axis in moving:
+            result, position = results[axis.name], axis.status.known_position
+            if isinstance(result, MotorbusError):
+                text = f"not stopped: {result.summary}"
+            else:
+                text = result.promise if position is None else f"stopped at {axis.config.show(position)}"
+            error.add_note(f"{axis.name}: {text}")
 
 
 # -- move ------------------------------------------------------------------------------------------------------
@@ -56,19 +64,22 @@ async def move(
     speed: float = 1.0,
     kind: Kind = "trapezoid",
     relative: bool = False,
+    velocity: float | None = None,
     tolerance: float = TOLERANCE,
     timeout: float = SETTLE_TIME,
 ) -> MoveResult:
     """Move axes to these goals (rad, m), or by these distances; all start and end together.
 
     All goals are checked before anything is sent. `speed` is a share of the velocity and acceleration of each axis,
-    `tolerance` in rad of the device; each axis must be in position within `timeout` s after the end. Raises
-    RequestError, LimitExceeded, NotHomed before anything moves; Stalled, NoReply, Faulted, Overloaded, Interrupted when
-    a stop was sent to all.
+    `velocity` (rad/s, m/s) the highest of each, `tolerance` in rad of the device; each axis must be in position within
+    `timeout` s after the end. Raises RequestError, LimitExceeded, NotHomed before anything moves; Stalled, NoReply,
+    Faulted, Overloaded, Interrupted when a stop was sent to all.
     """
     axes = [machine.axis(name) for name in goals]
     if not (isfinite(speed) and 0 < speed <= 1):
         raise RequestError(f"speed {speed}", expected="above 0, at most 1")
+    if velocity is not None and not (isfinite(velocity) and velocity > 0):
+        raise RequestError(f"velocity {velocity}", expected="a finite number above 0")
     for axis in axes:
         _check_goal(axis, goals[axis.name], relative=relative)
     led = [axis for axis in axes if axis.follows_setpoints]
@@ -79,7 +90,7 @@ async def move(
             if loop is not None:
                 await loop.enter()
             return await _Mover(machine, loop, timed, goals, relative).run(
-                duration, speed, kind, tolerance, timeout
+                duration, speed, velocity or inf, kind, tolerance, timeout
             )
         finally:
             if loop is not None:
@@ -96,6 +107,7 @@ async def pose(machine: OpenMachine, name: str, **options: Any) -> MoveResult:
 
 def _check_goal(axis: Axis, goal: float, *, relative: bool) -> None:
     config = axis.config
+    axis.status.check_fault()
     if config.is_wheel:
         raise RequestError(f"{axis.name}: a wheel has no position", advice="jog it", node=config.node)
     if not axis.follows_setpoints:
@@ -136,11 +148,17 @@ class _Mover:
         self._starts = {axis.name: axis.status.estimate for axis in timed}
 
     async def run(
-        self, duration: float | None, speed: float, kind: Kind, tolerance: float, timeout: float
+        self,
+        duration: float | None,
+        speed: float,
+        highest: float,
+        kind: Kind,
+        tolerance: float,
+        timeout: float,
     ) -> MoveResult:
         machine = self._machine
         begun = machine.now()
-        profile = await self._plan(duration, speed, kind)
+        profile = await self._plan(duration, speed, highest, kind)
         async with _Finishes(self._timed, self._plans):
             raise_first(
                 await on_axes(self._timed, lambda axis: self._plans[axis.name].prepare(profile.duration))
@@ -165,7 +183,7 @@ class _Mover:
         position = self._machine.axes[name].status.known_position
         return AxisResult(goal, position, estimated=name in self._plans)
 
-    async def _plan(self, duration: float | None, speed: float, kind: Kind) -> Synchronized:
+    async def _plan(self, duration: float | None, speed: float, highest: float, kind: Kind) -> Synchronized:
         moves = {}
         for axis in self._loop.members if self._loop is not None else ():
             assert self._loop is not None
@@ -173,7 +191,9 @@ class _Mover:
             goal = self._goals[axis.name] + (here if self._relative else 0.0)
             check_reach(axis, goal)
             self._goals[axis.name] = goal
-            limits = Limits(axis.config.max_velocity * speed, axis.config.acceleration * speed**2)
+            limits = Limits(
+                min(axis.config.max_velocity * speed, highest), axis.config.acceleration * speed**2
+            )
             moves[axis.name] = Move(here, goal, limits)
 
         def plan(axis: Axis) -> Any:
@@ -185,7 +205,8 @@ class _Mover:
             else:
                 assert start is not None
                 angle = axis.config.to_device(self._goals[axis.name]) - start
-            velocity, acceleration = axis.config.max_velocity * speed, axis.config.acceleration * speed**2
+            velocity = min(axis.config.max_velocity * speed, highest)
+            acceleration = axis.config.acceleration * speed**2
             return axis.driver.plan_move(
                 axis.device, angle, velocity=abs(velocity * ratio), acceleration=abs(acceleration * ratio)
             )
@@ -303,7 +324,8 @@ async def jog(
     config = axis.config
     if not 0 < abs(velocity) <= config.max_velocity:
         raise LimitExceeded(
-            f"{name}: {velocity} is not a velocity", expected=f"at most {config.max_velocity:g}"
+            f"{name}: velocity {config.show(velocity)}/s",
+            expected=f"at most {config.show(config.max_velocity)}/s",
         )
     check_seconds(seconds)
     if not axis.follows_setpoints:
@@ -353,8 +375,13 @@ def _moved(axis: Axis, start: float | None, angle: float | None) -> None:
     axis.status.moving = axis.status.endless = False
 
 
-async def home(machine: OpenMachine, names: Names = None, timeout: float = 30.0) -> dict[str, float]:
-    """Move to the reference switches, all buses at the same time, at most `timeout` s; gives the positions."""
+async def home(
+    machine: OpenMachine, names: Names = None, timeout: float = 30.0, velocity: float | None = None
+) -> dict[str, float]:
+    """Move to the reference switches, all buses at the same time, at most `timeout` s; gives the positions.
+
+    `velocity` (rad/s, m/s): None is that of the device.
+    """
     axes = machine.chosen(names)
     if names is None:
         axes = [axis for axis in axes if "home" in axis.driver]
@@ -362,8 +389,13 @@ async def home(machine: OpenMachine, names: Names = None, timeout: float = 30.0)
         raise RequestError("no axis has a reference switch")
     for axis in axes:
         axis.require("home")
+
+    def visit(axis: Axis) -> Any:
+        speed = {} if velocity is None else {"velocity": abs(velocity * axis.config.ratio)}
+        return axis.driver.home(axis.device, deadline=timeout, **speed)
+
     async with StopsIfInterrupted(axes):
-        results = await on_axes(axes, lambda axis: axis.driver.home(axis.device, deadline=timeout))
+        results = await on_axes(axes, visit)
         for axis in axes:
             if not isinstance(results[axis.name], MotorbusError):
                 _moved(axis, 0.0, 0.0)
@@ -451,6 +483,8 @@ async def switch_torque(machine: OpenMachine, on: bool, names: Names = None) -> 
         raise RequestError(f"{others}: torque cannot be switched {'on' if on else 'off'}")
     groups = by_bus(able)
     if on:
+        for axis in able:
+            axis.status.check_fault()
         raise_first(
             await OnBuses({bus: start_axes(bus, members, machine.health) for bus, members in groups.items()})
         )

@@ -42,7 +42,7 @@ async def teach(
 ) -> Trajectory:
     """Record axes that are moved by hand, `rate` times per s, for `seconds` or until `until()` is true.
 
-    Torque is switched off first and stays off, unless `keep_torque`. Without `seconds` and `until` Ctrl-C ends it. A
+    Torque is switched off first and stays off, unless `keep_torque`. Without `seconds` Ctrl-C ends it, too. A
     cycle without the position of an axis gives no sample; notes say where an axis was outside its limits. The error
     that ends a recording has it as `so_far`.
     """
@@ -63,7 +63,7 @@ async def teach(
         error.so_far = recording.trajectory() if len(recording.times) > 1 else None
         raise
     except KeyboardInterrupt:
-        if seconds is not None or until is not None:
+        if seconds is not None:
             raise
     return recording.trajectory()
 
@@ -217,8 +217,17 @@ async def replay_file(
 
 
 async def teach_file(machine: OpenMachine, file: str, **options: Any) -> LoopResult:
-    """Record into a new file. Options and errors as for `teach`."""
+    """Record into a new file. Options and errors as for `teach`; what an error leaves is in the file."""
     with Path(file).open("x") as opened:  # refused before anything is recorded
-        made = await teach(machine, **options)
+        try:
+            made = await teach(machine, **options)
+        except BaseException as error:
+            kept = getattr(error, "so_far", None)
+            if isinstance(kept, Trajectory):
+                opened.write(kept.text(machine.config.axes))
+                error.add_note(f"{kept.duration:.2f} s until then are in {file}")
+            else:
+                Path(file).unlink()
+            raise
         opened.write(made.text(machine.config.axes))
     return LoopResult(made.duration, len(made.times), made.positions(made.duration), notes=made.notes)

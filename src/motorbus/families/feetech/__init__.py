@@ -62,6 +62,8 @@ _SETTINGS: Final = (
     Option("map", str, "", "register map by which bytes of unknown servos are explained", ("", *TABLES)),
 )
 
+_COMMANDS: Final = ("ping", "read", "write", "reg_write", "action", "clear_turns", "factory_restore")
+
 FAMILY: Final = Family(
     name="feetech",
     link=LinkSpec(
@@ -73,4 +75,6 @@ FAMILY: Final = Family(
     simulator_module="motorbus.families.feetech.simulator",
     recording_module="motorbus.families.feetech.recording",
     cli="motorbus.families.feetech.cli",
+    commands={name: getattr(Servo, name).function for name in _COMMANDS},
+    sync_write=sync_write,
 )

@@ -44,6 +44,10 @@ _SETTINGS: Final = (
     Option("nmt", str, "profile", "form of start and stop: profile, none, vendor or standard", NMT),
 )
 
+_COMMANDS: Final = (
+    "position", "move", "version", "node_id", "set_node_id", "set_bit_rate", "save", "set_mid_point", "set_reversed",
+)  # fmt: skip
+
 FAMILY: Final = Family(
     name="kst",
     link=LinkSpec("frames", DEFAULT_RATE, RATES, _SETTINGS, stops=("hold",)),
@@ -52,4 +56,5 @@ FAMILY: Final = Family(
     driver=KstDriver,
     simulator_module="motorbus.families.kst.simulator",
     cli="motorbus.families.kst.cli",
+    commands={name: getattr(Servo, name).function for name in _COMMANDS},
 )

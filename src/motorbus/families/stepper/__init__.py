@@ -25,7 +25,7 @@ from motorbus.families.stepper.program.backup import Backup
 from motorbus.families.stepper.program.estimate import Estimate
 from motorbus.families.stepper.program.file import Program
 from motorbus.families.stepper.program.lint import Finding
-from motorbus.families.stepper.protocol import MOTOR, ONLY, RATE
+from motorbus.families.stepper.protocol import COMMANDS, MOTOR, ONLY, RATE
 
 __all__ = [
     "FAMILY",
@@ -63,4 +63,5 @@ FAMILY: Final = Family(
     simulator_module="motorbus.families.stepper.simulator",
     recording_module="motorbus.families.stepper.recording",
     cli="motorbus.families.stepper.cli",
+    commands={name: getattr(Controller, name).function for name in COMMANDS},
 )

@@ -1,0 +1,158 @@
+"""Every command line of README and docs runs as written, on simulated devices.
+
+A port is replaced by a simulated bus of this process, in virtual time. `test_first_machine` runs the page of that name.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+import motorbus
+from motorbus.cli import main
+from motorbus.motion.machine import MachineConfig
+from tests.docs.pages import FIRST_MACHINE, PAGES, ROOT, blocks, commands
+
+LINES = sorted({line for page in PAGES if page != FIRST_MACHINE for line in commands(page)})
+PORT = re.compile(r"(feetech|kst|stepper):(?!sim\b)([^\s#,]+)")
+IDS = {"feetech": "1-7", "kst": "0x25", "stepper": "1"}
+WITHOUT_MACHINE = re.compile(r"motorbus (decode|demo|recover|scan|simulate|stepper check)")
+GROUPS = '\n[group.left]\naxes = ["base", "shoulder"]\n[group.right]\naxes = ["wrist", "roll"]\n'
+FEED = """format = 1
+name = "Feed"
+project = 2
+[motor]
+microsteps = 8
+step_angle = "1.8 deg"
+turn_distance = 1600
+[[step]]
+move = "1 turns"
+speed = "240 rpm"
+start = "200 Hz"
+acceleration = "20 Hz"
+"""
+WAVE = "time (s),shoulder (deg),elbow (deg)\n0,0,0\n1,10,-10\n2,0,0\n"
+
+
+class Ran(NamedTuple):
+    """Exit code and output of a command."""
+
+    code: int
+    out: str
+    err: str
+
+
+Shell = Callable[[str], Ran]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The working folder, with the files that the pages name."""
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    (tmp_path / "feed.toml").write_text(FEED, encoding="utf-8")
+    (tmp_path / "wave.csv").write_text(WAVE, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    for name in ("MOTORBUS_MACHINE", "MOTORBUS_BUS"):
+        monkeypatch.delenv(name, raising=False)
+    return tmp_path
+
+
+@pytest.fixture
+def shell(folder: Path, capsys: pytest.CaptureFixture[str]) -> Shell:
+    """Run a line in `folder`; it says `--yes` where it is asked for consent."""
+
+    def run(line: str) -> Ran:
+        words = shlex.split(line)[1:]
+        if words[0] == "simulate":
+            return interrupted(words)
+        capsys.readouterr()
+        ran = Ran(main(words), *capsys.readouterr())
+        if ran.code == 8 and "--yes" in ran.err:
+            ran = Ran(main([*words, "--yes"]), *capsys.readouterr())
+        return ran
+
+    return run
+
+
+@pytest.fixture
+def open_bus() -> Iterator[Callable[[re.Match[str]], str]]:
+    """Replace a port by a simulated bus; the same port by the same bus."""
+    found: dict[str, str] = {}
+    with ExitStack() as stack:
+
+        def simulate(match: re.Match[str]) -> str:
+            family = match[1]
+            if match[0] not in found:
+                faults = "at 9 s: power-cycle 37" if "set-id" in match.string and family == "kst" else ""
+                ids = "1" if re.search("set-(id|baud)", match.string) and family == "feetech" else IDS[family]
+                if "#7" in match.string:
+                    ids = "7"
+                sim = stack.enter_context(motorbus.simulate(family, ids=ids, faults=faults))
+                found[match[0]] = sim.url
+            return found[match[0]]
+
+        yield simulate
+
+
+def interrupted(words: list[str]) -> Ran:
+    """Run the command in a process; send Ctrl-C after its first line."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "motorbus", *words],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        first = process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    return Ran(process.returncode, first + out, err)
+
+
+def finite(line: str) -> str:
+    """The same line with an end: fewer ids, one sample."""
+    line = re.sub(r"--for \d+s", "--for 1s", line).replace("--rates all", "--rates all --ids 1,0x25")
+    if line.startswith("motorbus monitor") and not re.search("--(count|for)", line):
+        line += " --count 1" if "--listen" not in line else " --for 1s"
+    return line
+
+
+def test_there_are_commands_to_run() -> None:
+    assert len(LINES) > 90
+
+
+def test_the_machine_file_of_the_readme_is_valid() -> None:
+    (text,) = blocks(ROOT / "README.md", "toml")
+    assert list(MachineConfig.parse(text).axes) == ["shoulder"]
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_a_command_runs(
+    line: str, folder: Path, shell: Shell, open_bus: Callable[[re.Match[str]], str]
+) -> None:
+    if not re.search(r"(feetech|kst|stepper):", line) and not WITHOUT_MACHINE.match(line):
+        text = (ROOT / "examples" / "motorbus.toml").read_text(encoding="utf-8")
+        (folder / "motorbus.toml").write_text(text + GROUPS, encoding="utf-8")
+    meant = finite(line) if "simulate" in line else PORT.sub(open_bus, finite(line))
+    if " teach " in meant:
+        (folder / "wave.csv").unlink()
+    meant = meant.replace("/tmp/", f"{folder}/")
+    if meant.startswith("motorbus stepper run") and not meant.startswith("motorbus stepper run stepper:sim "):
+        address = shlex.split(meant)[3]
+        assert shell(f"motorbus stepper write feed.toml {address}").code == 0
+    if meant.startswith("motorbus restore"):
+        assert shell(f"motorbus backup {shlex.split(meant)[3]} {shlex.split(meant)[2]}").code == 0
+    ran = shell(meant)
+    assert ran.code == 0, ran.err
+    assert ran.out
