@@ -16,7 +16,7 @@ import pytest
 
 import motorbus
 from motorbus.errors import MotionError
-from motorbus.families.feetech import FAMILY, Servo
+from motorbus.families.feetech import FAMILY, Node, Servo
 from motorbus.families.feetech.driver.motion import Motion, move_all
 from motorbus.families.feetech.registers import TABLES
 from motorbus.families.feetech.traits import TRAITS, Mode
@@ -203,7 +203,9 @@ def test_a_move_of_two_goes_no_farther_after_power_loss(name: str) -> None:
         ):
             for node in (1, 2):
                 sim[node].raw_position = int(TRAITS[name].turn * 0.7)
-            goals = {servo: servo.position() - TURN for servo in (Servo(bus, 1), Servo(bus, 2))}
+            goals: dict[Node, float] = {
+                servo: servo.position() - TURN for servo in (Servo(bus, 1), Servo(bus, 2))
+            }
             start = [sim[node].motion.position(bus.link.now()) for node in (1, 2)]
             link: Any = bus.link
             write, sent = link.write, [0]

@@ -55,10 +55,11 @@ def _raw_write(servo: Servo, address: int, data: bytes) -> Any:
 def test_a_bound_of_the_force_is_not_raised_in_a_group_packet(what: str) -> None:
     with world() as (bus, servo, _):
         servo.prepare()
+        group = ServoGroup([servo])
         orders: dict[str, Callable[[], Any]] = {
             "reg_write": lambda: servo.reg_write(torque_limit=0.5),
             "sync_write": lambda: bus.run(sync_write({servo: {"torque_limit": 0.5}})),
-            "group": lambda: bus.run(ServoGroup([servo]).write("torque_limit")([0.5])),
+            "group": lambda: bus.run(group.write("torque_limit")([0.5])),
         }
         with pytest.raises(RequestError, match="may jump") as caught:
             orders[what]()
@@ -70,7 +71,7 @@ def test_a_loop_may_bound_the_force_of_an_hls_that_has_some() -> None:
         servo.prepare()
         send = ServoGroup([servo]).write("goal_torque")
         with pytest.raises(RequestError, match="may jump"):
-            send([0.5])
+            bus.run(send([0.5]))
         servo.enable_torque()
         for bound in (0.5, 0.6):
             bus.run(send([bound]))

@@ -121,7 +121,7 @@ class FeetechBus:
         self._pass(at)
         if self.quirks.echo:
             self._speak([Reply(at, 0, data, None, 0)])
-        if at - len(data) * self._byte_time(None) - self._received_at > FRAME_GAP:
+        if self._parser.held and at - len(data) * self._byte_time(None) - self._received_at > FRAME_GAP:
             self._parser = protocol.parser()
         self._received_at = at
         for frame, fault in self._parser.feed(data):

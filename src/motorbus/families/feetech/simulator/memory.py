@@ -37,6 +37,7 @@ class Layout:
         self.shipped = bytearray(SIZE)
         self.codes: dict[str, tuple[slice, ByteOrder, int]] = {}
         """Row -> its bytes, their order, and the code of the sign bit."""
+        self._touched: dict[tuple[int, int], list[Register]] = {}
         self.rows: list[Register | None] = [None] * SIZE
         for row in table.values():
             self.rows[span(row)] = [row] * row.size
@@ -46,7 +47,11 @@ class Layout:
 
     def touched(self, address: int, count: int) -> list[Register]:
         """The rows with at least one of these bytes, in order."""
-        return list({row.name: row for row in self.rows[address : address + count] if row}.values())
+        found = self._touched.get((address, count))
+        if found is None:
+            found = list({row.name: row for row in self.rows[address : address + count] if row}.values())
+            self._touched[address, count] = found
+        return found
 
 
 class Memory:
