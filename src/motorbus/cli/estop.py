@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Final
 from cyclopts import Parameter
 from msgspec import Struct
 
-from motorbus.cli.main import Partial
+from motorbus.cli.common import Common, Partial
 from motorbus.cli.motion import with_others
 from motorbus.cli.output import emit, note
-from motorbus.cli.target import Common, bus_address, is_address, load_machine, open_bus
+from motorbus.cli.target import bus_address, is_address, load_machine, open_bus
 from motorbus.core.steps import catch, gather
 from motorbus.errors import LinkError, MotorbusError, NoReply, PortNotFound, RequestError
 from motorbus.session import lock_name, parse_address

@@ -13,20 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 from msgspec import Struct
 
-from motorbus.cli.dryrun import FAR, carry_out
-from motorbus.cli.main import Partial
+from motorbus.cli.common import Common, Partial, Target, Writing
+from motorbus.cli.dryrun import FAR, carry_out, execute
 from motorbus.cli.output import confirm, emit, note, print_table
-from motorbus.cli.target import (
-    Common,
-    Target,
-    Writing,
-    is_address,
-    load_machine,
-    open_bus,
-    open_devices,
-    open_robot,
-    parse_quantity,
-)
+from motorbus.cli.target import is_address, load_machine, open_bus, open_devices, open_robot, parse_quantity
 from motorbus.errors import LinkError, MotorbusError, RequestError, VerificationFailed
 from motorbus.motion.commands import LoopResult, Move, MoveResult, Pose, StopResult, StopState
 from motorbus.session.address import parse_address
@@ -205,7 +195,7 @@ def move(
             _send_goals(robot, found, speed, fastest, writing)
             return
         command = Move(found, seconds, speed, kind, relative == {True}, fastest)
-        report(robot, writing.execute(robot, command), common)
+        report(robot, execute(writing, robot, command), common)
 
 
 def join_addresses(words: Sequence[str]) -> list[str]:
@@ -233,7 +223,7 @@ def _send_goals(
         if "velocity" in signature(function.function).parameters:
             highest = min(axis.config.max_velocity * speed, fastest or axis.config.max_velocity)
             arguments["velocity"] = highest * abs(axis.config.ratio)
-        writing.execute(robot, DeviceCommand(name, "move", arguments))
+        execute(writing, robot, DeviceCommand(name, "move", arguments))
 
 
 def jog(
@@ -341,7 +331,7 @@ def pose(
             known = ", ".join(machine.poses) or "none; `motorbus pose --save NAME` adds one"
             raise RequestError(f"no pose {name!r}", expected=f"one of {known}")
         with open_robot(common, tuple(machine.poses[name])) as robot:
-            report(robot, writing.execute(robot, Pose(name, speed=speed)), common)
+            report(robot, execute(writing, robot, Pose(name, speed=speed)), common)
     else:
         _list_poses(machine, common)
 

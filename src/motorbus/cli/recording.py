@@ -7,10 +7,11 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from motorbus.cli.common import Common, Writing
 from motorbus.cli.dryrun import FAR
 from motorbus.cli.motion import For, agree, axes_of, join_addresses, parse_time, report, until_enter
 from motorbus.cli.output import note
-from motorbus.cli.target import Common, Writing, load_machine, open_robot
+from motorbus.cli.target import load_machine, open_robot
 from motorbus.errors import RequestError
 
 Rate = Annotated[float, Parameter(help="Cycles per s.")]

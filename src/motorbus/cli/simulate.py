@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Final
 from cyclopts import Parameter
 from msgspec import Struct
 
+from motorbus.cli.common import Common
 from motorbus.cli.output import emit, note
-from motorbus.cli.target import Common, key_values
+from motorbus.cli.target import key_values
 from motorbus.errors import RequestError
 
 if TYPE_CHECKING:

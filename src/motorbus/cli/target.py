@@ -6,64 +6,18 @@ import logging
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
-from cyclopts import Parameter
-
+from motorbus.cli.common import FILE, Common, Target
 from motorbus.cli.output import note, note_once
 from motorbus.errors import NoReply, RequestError
 
 if TYPE_CHECKING:
     from motorbus.bus.blocking import Bus
-    from motorbus.core.family import Family
-    from motorbus.motion.commands import RobotCommand
     from motorbus.motion.machine import MachineConfig
     from motorbus.motion.robot import Robot
 
-FILE: Final = "motorbus.toml"
 LOG: Final = logging.getLogger("motorbus.cli")
-
-
-@Parameter(name="*")
-@dataclass
-class Common:
-    """Options of every command."""
-
-    json: Annotated[bool, Parameter(help="Print JSON.")] = False
-    machine: Annotated[
-        str, Parameter(env_var="MOTORBUS_MACHINE", show_env_var=False, help="Machine file.")
-    ] = FILE
-    bus: Annotated[str, Parameter(env_var="MOTORBUS_BUS", show_env_var=False, help="Default bus.")] = ""
-    option: Annotated[
-        list[str], Parameter(name="-o", metavar="KEY=VALUE", help="Option of the bus; repeatable.")
-    ] = field(default_factory=list)
-    verbose: Annotated[int, Parameter(name="-v", count=True, help="Log; -vv logs each frame.")] = 0
-
-
-@Parameter(name="*")
-@dataclass
-class Writing:
-    """Options of commands that write."""
-
-    yes: Annotated[bool, Parameter(name=["--yes", "-y"], help="Do not ask.")] = False
-    dry_run: Annotated[bool, Parameter(help="Show what would be sent; write nothing.")] = False
-
-    def execute(self, robot: Robot, command: RobotCommand) -> Any:
-        """Ask, show the plan (--dry-run), or carry out a command of a robot; gives what to print."""
-        from motorbus.cli.dryrun import execute
-
-        return execute(self, robot, command)
-
-
-class Target(NamedTuple):
-    """A device of an open bus. `name` is an axis, or `#ID`; `device` has the methods of its family."""
-
-    name: str
-    bus: Bus
-    node: int
-    family: Family
-    device: Any
 
 
 # -- machine file --------------------------------------------------------------------------------------------------

@@ -1,8 +1,7 @@
 """Find servos: a broadcast PING, then a PING and a READ of each silent id.
 
 Replies to a broadcast may collide and SCS do not answer it, so it only comes first. A board that lacks PING is found by
-the READ. A servo at another rate is silent. Each silent id costs about 30 ms, so where a broadcast was answered ids
-far above those that answered are not asked one by one, unless they were named.
+the READ. A servo at another rate is silent.
 """
 
 from __future__ import annotations
@@ -24,7 +23,6 @@ from motorbus.families.feetech.driver.requests import read_block
 DRAIN: Final = 0.02  # s of quiet at a new rate: a servo may answer what it has buffered (feetech-cli)
 CHATTER: Final = 8  # ids answered in garbled bytes, and none in order: the line carries something else
 ID: Final = 5  # register
-ABOVE: Final = 8  # ids above the highest that answered a broadcast
 
 
 async def scan(
@@ -55,8 +53,6 @@ async def _scan_rate(nodes: Sequence[Node], rate: int, *, broadcast: bool) -> li
     present = await broadcast_ping() if broadcast else set()
     for id in sorted(present):
         await Emit(Found(id, rate, None))
-    if present:
-        nodes = [node for node in nodes if node.node <= max(present) + ABOVE]
     garbled: set[int] = set()
     for number, request in enumerate((_ping, _read_id)):
         for done, node in enumerate(nodes):
