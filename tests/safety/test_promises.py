@@ -20,6 +20,7 @@ from motorbus.errors import (
     LinkLost,
     MotorbusError,
     NoReply,
+    NotHomed,
     Overloaded,
     Refused,
     RequestError,
@@ -60,7 +61,7 @@ def test_01_torque_on_moves_by_a_count_at_most(name: str) -> None:
 
 def test_02_unknown_is_not_safe_and_a_stop_is_allowed() -> None:
     with machine("1", lift=True) as (config, sims), Robot(config) as robot:
-        with pytest.raises(MotorbusError, match="lift: stage#1 has no plan move"):
+        with pytest.raises(NotHomed, match="lift: its position is not known"):
             robot.move({"lift": 0.01})
         wait(robot, 1.0)
         sims["arm"][1].unplug()
