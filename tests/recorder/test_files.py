@@ -41,6 +41,9 @@ def test_other_text_is_refused_with_its_line(text: str) -> None:
 DUMPED = b"\xff\xff\x01\x04\x028\x02\xbeABC   D|" + bytes(range(60, 71))
 
 
+ESCAPED = "".join(f"\\x{byte:02x}" for byte in DUMPED)
+
+
 def _ascii(data: bytes) -> str:
     return "".join(chr(byte) if 32 <= byte < 127 else "." for byte in data)
 
@@ -66,8 +69,8 @@ def _dump(form: str) -> str:
         _dump("xxd"),
         _dump("hexdump"),
         _dump("offsets"),
-        "".join(f"\\x{byte:02x}" for byte in DUMPED),
-        f"b'{''.join(f'\\x{byte:02x}' for byte in DUMPED)}'",
+        ESCAPED,
+        f"b'{ESCAPED}'",
         "const uint8_t frame[29] = {  // 3 bytes\n" + ", ".join(f"0x{byte:02X}" for byte in DUMPED) + " };",
         str(list(DUMPED)),
         f"12:30:01.123 {DUMPED.hex(' ')}",

@@ -72,7 +72,7 @@ COMMANDS: Final[Mapping[str, Mapping[str, tuple[str, str]]]] = {
     },
     "Simulate": {
         "simulate": ("simulate", "Serve simulated devices on a port."),
-        "demo": ("simulate", "Move nine simulated axes and draw them."),
+        "demo": ("demo", "Move nine simulated axes and draw them."),
     },
 }
 EPILOGUE: Final = """A bus is FAMILY:PORT, options after commas; a device is BUS#ID:

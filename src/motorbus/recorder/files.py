@@ -72,12 +72,12 @@ def _from_line(line: str, number: int, count: int) -> bytes:
 def _without_ascii(text: str) -> str:
     """A line of a hex dump without the column that repeats its bytes as ASCII characters."""
     for gap in re.finditer(r"\s{2,}\|?|\|", text):
-        head, tail = text[: gap.start()], text[gap.end() :].rstrip("|")
+        head, tail = text[: gap.start()], text[gap.end() :].strip()
         digits = "".join(head.split())
         if not re.fullmatch(r"([0-9A-Fa-f]{2})+", digits):
             break
         shown = "".join(chr(byte) if 32 <= byte < 127 else "." for byte in bytes.fromhex(digits))
-        if shown.strip() == tail.strip():
+        if tail in (shown.strip(), f"{shown}|".strip()):
             return head
     return text
 

@@ -1,170 +1,133 @@
-"""The commands `motorbus feetech ...`, and the functions that common commands use (`motorbus.cli.faces`)."""
+"""The commands `motorbus feetech …`."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import partial
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Literal
 
-from cyclopts import App, Group, Parameter
+from cyclopts import App, Parameter
+from msgspec import Struct
 
-from motorbus.cli import several
-from motorbus.cli.device_command import DeviceCommand, device_command
-from motorbus.cli.exits import Exit
-from motorbus.cli.wording import shell_words
-from motorbus.core import units
-from motorbus.core.scan import Skipped
+from motorbus.cli.common import Common, Target, Writing
+from motorbus.cli.dryrun import carry_out
+from motorbus.cli.output import emit
+from motorbus.cli.target import open_devices, parse_quantity
 from motorbus.errors import RequestError
-from motorbus.families.feetech.driver.eeprom import TorqueAfterWrite
-from motorbus.families.feetech.driver.group import ReadsAlone, disable_torque_everyone, prepare_all
-from motorbus.families.feetech.driver.identity import ScanWarning
-from motorbus.families.feetech.driver.motion import Motion, move_all
-from motorbus.families.feetech.driver.node import Node
-from motorbus.families.feetech.driver.scan import broadcast_ping
 from motorbus.families.feetech.driver.servo import Servo
 
-__all__ = ["COMMANDS", "app", "disable_torque_everyone", "move_together", "ping_everyone", "say"]
+app = App(name="feetech", help="Commands of feetech devices only.", help_epilogue="")
 
-Device = Annotated[str, Parameter(name="BUS#ID", help="As feetech:/dev/ttyACM0#3.")]
-ModeName = Annotated[
-    Literal["position", "velocity", "pwm", "step", "current"] | None,
-    Parameter(name="MODE", help="The new mode."),
-]
-Run = DeviceCommand[Servo]
-
-app = App(
-    name="feetech",
-    help="What only feetech devices can do.",
-    help_epilogue="",
-    group_arguments=Group.create_default_parameters(),
-)
-command = partial(device_command, app, Servo, Device)
+ModeName = Literal["position", "velocity", "pwm", "step", "current"]
 
 
-@command(
-    "mode BUS#ID [MODE]",
-    "STS and SMBL have position, velocity, pwm and step, SMCL all but step, HLS\n"
-    "position, velocity and current, SCS position and pwm. Without MODE it shows the\n"
-    "mode, and the settings and alarms that keep the servo from moving.",
-    "mode feetech:/dev/ttyACM0#3",
-    "mode feetech:/dev/ttyACM0#3 velocity --yes",
-    "mode feetech:COM7#2 position --low 20deg --high 280deg --yes",
-)
+class ModeState(Struct, frozen=True, tag="mode"):
+    """The operating mode of a servo, and what keeps it from moving."""
+
+    device: str
+    mode: str
+    blocked: tuple[str, ...] = ()
+
+
+class Overload(Struct, frozen=True, tag="overload"):
+    """The alarms that were cleared, and those that remain."""
+
+    device: str
+    cleared: tuple[str, ...]
+    remaining: tuple[str, ...]
+
+
+class Reset(Struct, frozen=True, tag="reset"):
+    """Where a servo answers after its reset."""
+
+    device: str
+    node: int
+    rate: int
+
+
+def _servo(devices: list[Target]) -> Target:
+    """The only device, a servo of this family. Raises RequestError."""
+    if len(devices) != 1 or not isinstance(devices[0].device, Servo):
+        names = ", ".join(f"{one.family.name} {one.name}" for one in devices)
+        raise RequestError(
+            f"{names}: one feetech servo is needed", expected="DEVICE, as feetech:/dev/ttyACM0#3"
+        )
+    return devices[0]
+
+
+@app.command
 def mode(
-    run: Run,
-    mode_: ModeName = None,
+    device: str,
+    mode: ModeName | None = None,
     /,
     *,
+    turns: Annotated[
+        bool | None, Parameter(help="More than one turn (position mode).", negative="--one-turn")
+    ] = None,
     low: Annotated[str, Parameter(help="Lowest position of an SCS that leaves pwm.")] = "",
     high: Annotated[str, Parameter(help="Its highest position.")] = "",
-) -> Exit:
-    """Show the mode of a servo and what keeps it from moving, or set another mode; it is limp then."""
+    writing: Writing = Writing(),
+    common: Common = Common(),
+) -> None:
+    """Show or set the operating mode (EEPROM); the servo loses its torque.
+
+    Examples:
+
+        motorbus feetech mode feetech:/dev/ttyACM0#3
+        motorbus feetech mode feetech:/dev/ttyACM0#3 velocity --yes
+        motorbus feetech mode shoulder position --turns --dry-run
+    """
     if bool(low) != bool(high):
         raise RequestError("one limit alone", expected="both --low and --high")
-    limits = (units.parse(low, "position"), units.parse(high, "position")) if low else None
-    if mode_ is None:
-        if limits:
-            raise RequestError("limits without a mode", expected="MODE, as position")
-        return run.show(**run.read(partial(_mode_facts, run)))
-    run.write(lambda servo: servo.set_mode(mode_, limits=limits), f"set {mode_} mode; it goes limp")
-    return run.show({"mode": mode_}, f"{run.label} is in {mode_} mode, limp")
+    limits = (parse_quantity(low, "position"), parse_quantity(high, "position")) if low else None
+    if mode is None and limits is not None:
+        raise RequestError("limits without a mode", expected="MODE, as position")
+    with open_devices(common, (device,)) as devices:
+        target = _servo(devices)
+        if mode is not None:
+            question = f"set {mode} mode in the EEPROM of {target.name}; it loses its torque"
+            carry_out(writing, target, lambda servo: servo.set_mode(mode, limits=limits), question)
+        if turns is not None:
+            many = turns
+            question = f"set {'more than one turn' if many else 'one turn'} in the EEPROM of {target.name}"
+            carry_out(writing, target, lambda servo: servo.set_multi_turn(many, limits), question)
+        if not writing.dry_run:
+            servo: Any = target.device
+            blocked = tuple(servo.why_not_moving())
+            known = servo.known_mode
+            emit(ModeState(target.name, known.value if known else "not documented", blocked), common)
 
 
-def _mode_facts(run: Run, servo: Servo) -> dict[str, Any]:
-    """What `mode` shows, as arguments of `DeviceCommand.show`."""
-    blocked = [shell_words(text, servo.bus.family) for text in servo.why_not_moving()]  # type: ignore[attr-defined]
-    name = servo.known_mode.value if servo.known_mode else "not documented"
-    text = "\n".join([f"{run.label} mode: {name}", *(f"blocked: {one}" for one in blocked)])
-    return {"facts": {"mode": name, "blocked": blocked}, "text": text}
+@app.command
+def recover_overload(device: str, /, *, writing: Writing = Writing(), common: Common = Common()) -> None:
+    """Switch torque on again after an overload; an arm sags meanwhile.
 
+    Examples:
 
-@command(
-    "recover-overload BUS#ID",
-    "Torque off, one second, the goal to where it stands, torque on: an arm sags\n"
-    "meanwhile. Exit code 7 and a limp servo if the alarm stays: then only a power\n"
-    "cycle helps.",
-    "recover-overload feetech:/dev/ttyACM0#3",
-    "recover-overload feetech:/dev/ttyACM0#3 --dry-run",
-    consent="",
-)
-def recover_overload(run: Run, /) -> Exit:
-    """Switch torque on again after an overload."""
-    found = run.write(lambda servo: servo.recover_overload())
-    if run.dry_run:
-        return Exit.OK
-    text = f"{run.label} has no overload to recover from"
-    if found.tripped:
-        text = f"{run.label} holds where it stands; the alarm {' and '.join(found.tripped)} is gone"
-    return run.show(found._asdict(), "\n".join([text, *(f"warning: {one}" for one in found.remaining)]))
+        motorbus feetech recover-overload feetech:/dev/ttyACM0#3
+        motorbus feetech recover-overload shoulder
+        motorbus feetech recover-overload shoulder --dry-run
 
-
-@command(
-    "reset BUS#ID",
-    "Instruction 0x06; as a rule the id is kept.",
-    "reset feetech:/dev/ttyACM0#3 --dry-run",
-    "reset feetech:/dev/ttyACM0#3 --yes",
-)
-def reset(run: Run, /) -> Exit:
-    """Restore the factory values of a servo; it goes limp."""
-    found = run.write(lambda servo: servo.factory_restore(), "overwrite all its settings; it goes limp")
-    if run.dry_run:
-        return Exit.OK
-    text = f"{run.label} has its factory values; it answers as #{found.node} at {found.rate} bit/s"
-    return run.show({"found": found.node, "baud": found.rate}, text)
-
-
-# -- what the commands of all families (motorbus scan, read, move, ...) use of this family ---------------------
-
-COMMANDS: Final = {
-    "calibrate()": "`motorbus calibrate`",
-    "factory_restore()": "`motorbus feetech reset`",
-    "limits=(low, high)": "--low and --high",
-    "move()": "`motorbus move`",
-    "recover_overload()": "`motorbus feetech recover-overload`",
-    **{
-        f"set_mode('{name}')": f"`motorbus feetech mode BUS#ID {name}`"
-        for name in ("position", "velocity", "pwm", "step", "current")
-    },
-}
-"""A call in an error text -> the command that does the same."""
-
-
-def say(event: object) -> str:
-    """The text that a command prints for an event of a scan, a group or a write; "": none."""
-    if isinstance(event, ScanWarning):
-        return f"#{event.node} at {event.rate} bit/s: {event.what}"
-    if isinstance(event, Skipped):
-        return f"nothing was sent at {event.rate} bit/s: {event.why}"
-    if isinstance(event, ReadsAlone):
-        return f"#{event.node} answers READ and not SYNC READ: it is read by itself"
-    if isinstance(event, TorqueAfterWrite):
-        state = "has its torque back" if event.on else f"stays without torque: {event.why}"
-        return f"#{event.node} was limp while its EEPROM was written, and {state}"
-    return ""
-
-
-def ping_everyone(bus: Any) -> list[int]:
-    """For `motorbus ping BUS`: the ids that answer one broadcast PING; replies of several servos may collide."""
-    return sorted(bus.run(broadcast_ping()))
-
-
-def move_together(
-    bus: Any,
-    goals: Mapping[int, float],
-    *,
-    velocity: float | None = None,
-    acceleration: float | None = None,
-    wait: bool = True,
-) -> None:
-    """For `motorbus move` with several servos: move them to these goals (rad by id) after all are checked.
-
-    If one does not answer, the others stop. Errors as `Servo.move` raises.
+    Torque off, 1 s, goal to the present position, torque on. Exit code 7 if the alarm stays: then switch the supply.
     """
-    servos: dict[Node, float] = {Servo(bus, id): goal for id, goal in goals.items()}
+    with open_devices(common, (device,)) as devices:
+        target = _servo(devices)
+        found = carry_out(writing, target, lambda servo: servo.recover_overload())
+        if found is not None:
+            emit(Overload(target.name, tuple(found.tripped), tuple(found.remaining)), common)
 
-    async def move() -> None:
-        for error in (await prepare_all(servos)).values():
-            raise error
-        await move_all(Motion(velocity, acceleration), servos, wait=wait, around=several.or_all_stop)
 
-    several.carried_out(bus, move())
+@app.command
+def reset(device: str, /, *, writing: Writing = Writing(), common: Common = Common()) -> None:
+    """Restore the factory settings (EEPROM); the servo loses its torque, and as a rule keeps its id.
+
+    Examples:
+
+        motorbus feetech reset feetech:/dev/ttyACM0#3 --dry-run
+        motorbus feetech reset feetech:/dev/ttyACM0#3 --yes
+        motorbus feetech reset shoulder
+    """
+    with open_devices(common, (device,)) as devices:
+        target = _servo(devices)
+        question = f"overwrite all settings of {target.name} with factory values"
+        found = carry_out(writing, target, lambda servo: servo.factory_restore(), question)
+        if found is not None:
+            emit(Reset(target.name, found.node, found.rate), common)

@@ -55,6 +55,5 @@ FAMILY: Final = Family(
     devices=DeviceTypes(Servo, AsyncServo),
     driver=KstDriver,
     simulator_module="motorbus.families.kst.simulator",
-    cli="motorbus.families.kst.cli",
     commands={name: getattr(Servo, name).function for name in _COMMANDS},
 )

@@ -1,351 +1,341 @@
-"""The commands `motorbus stepper ...`, and the functions that common commands use of this family.
-
-`motorbus.cli.faces` finds the functions by their names.
-"""
+"""The commands `motorbus stepper …`."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from math import tau
+from math import pi, tau
+from pathlib import Path
 from typing import Annotated, Any, Final
 
-from cyclopts import App, Group, Parameter
+from cyclopts import App, Parameter
+from msgspec import Struct
 
-from motorbus.cli import consent, dry, target
-from motorbus.cli.device_command import DeviceCommand, device_command, family_command
-from motorbus.cli.exits import Exit
-from motorbus.cli.output import Bar, Output
-from motorbus.cli.parameters import Silent
+from motorbus.cli.common import Common, Exit, Target, Writing
+from motorbus.cli.dryrun import carry_out
+from motorbus.cli.output import confirm, emit, note
+from motorbus.cli.target import open_devices, parse_quantity
 from motorbus.core import units
 from motorbus.core.steps import Progress
 from motorbus.errors import Interrupted, MotorbusError, NoReply, OutcomeUnknown, RequestError
 from motorbus.families.stepper.driver.controller import Controller
 from motorbus.families.stepper.driver.io import InputChanged
-from motorbus.families.stepper.driver.projects import Written
 from motorbus.families.stepper.driver.run import Outcome, Ran
-from motorbus.families.stepper.edits import edited
 from motorbus.families.stepper.execution import ramp, sequence
-from motorbus.families.stepper.parameters import BLANK, PARAMETERS, PROJECTS, decode_image, encode_image
+from motorbus.families.stepper.parameters import PARAMETERS
 from motorbus.families.stepper.program import estimate
-from motorbus.families.stepper.program.backup import KIND, Backup
-from motorbus.families.stepper.program.file import Program, read_text, read_toml
-from motorbus.families.stepper.protocol import REPLY_LENGTH, decode_request, encode, encode_reply
+from motorbus.families.stepper.program.file import Program
 
-Device = Annotated[str, Parameter(name="BUS", help="As stepper:/dev/ttyUSB0.")]
-File = Annotated[str, Parameter(name="FILE", help="A program, or a backup of all projects.")]
-Number = Annotated[int | None, Parameter(help="Project 1 to 4.")]
-Expert = Annotated[bool, Parameter(negative="", help="Allow errors of `check`.")]
-Endless = Annotated[bool, Parameter(negative="", help="Allow a project without end; needs --timeout.")]
-Run = DeviceCommand[Controller]
+app = App(name="stepper", help="Commands of stepper controllers only.", help_epilogue="")
+
 LEVELS: Final = {"on": True, "off": False}
-WORDS: Final = {True: "active", False: "inactive", None: "unknown"}
 PORTS: Final = {"1": 1, "2": 2, "3": 3, "all": 4, "leds": 5}
-COLUMNS: Final = ("step", "times", "units", "pulses", "Hz", "motion s", "pause s", "output", "wait", "stop")
-
-app = App(
-    name="stepper",
-    help="What only the stepper controller can do.",
-    help_epilogue="",
-    group_arguments=Group.create_default_parameters(),
-)
-command = partial(device_command, app, Controller, Device)
-
-
-# -- programs ------------------------------------------------------------------------------------------
-
-
-@family_command(
-    app,
-    "check FILE",
-    "Opens no port. Exit code 1 if a finding is an error.",
-    "check examples/pick_and_place.toml",
-    "check feed.toml --unattended --highest 20000",
-)
-def check(
-    file: File,
-    /,
-    *,
-    highest: Annotated[float, Parameter(help="Frequency (Hz) that the driver follows.")] = 100_000.0,
-    unattended: Annotated[bool, Parameter(negative="", help="No operator is present.")] = False,
-    output: Silent,
-) -> Exit:
-    """Show the steps and the duration of a program, and its mistakes."""
-    program = Program.load(file)
-    duration, found = program.estimate(), program.lint(highest=highest, unattended=unattended)
-    rows = [_step_row(program, number) for number in estimate.numbers(program.project)]
-    facts = [{"rule": one.rule, "level": one.level, "step": one.step, "text": one.text} for one in found]
-    times = {name: getattr(duration, name) for name in duration.__struct_fields__}
-    output.document("motorbus.stepper.check/1", {"file": file, "findings": facts, "estimate": times})
-    output.table(program.name or file, [f">{column}" for column in COLUMNS], rows)
-    output.text("\n".join([str(duration), *(str(one) for one in found)]))
-    return Exit.FAILURE if any(one.level == "error" for one in found) else Exit.OK
-
-
-def _step_row(program: Program, number: int) -> list[object]:
-    project, step = program.project, program.project.step(number)
-    move = [ramp.pulses_of(project, step), f"{ramp.ramp_of(project, step).run:.6g}"]
-    seconds = [f"{estimate.step_seconds(project, step):.3f}", f"{step.delay / 1000:g}"]
-    action = PARAMETERS["output"].choices[step.output] if step.output else ""
-    units_ = step.sign * step.distance
-    ports = [step.start_input or "", step.stop_input or ""]
-    return [number, sequence.times(project, number), units_, *move, *seconds, action, *ports]
-
-
-@command(
-    "write FILE BUS",
-    "Shows what differs and asks. Only that is sent; the project is then read back, saved\n"
-    "and read back again. A file of `read --all` restores its projects.",
-    "write feed.toml stepper:/dev/ttyUSB0 --project 3",
-    "write examples/pick_and_place.toml stepper:sim --dry-run",
-)
-def write(
-    file: File,
-    run: Run,
-    /,
-    *,
-    project: Number = None,
-    save: Annotated[bool, Parameter(help="Save it; else power-off loses it.")] = True,
-    expert: Expert = False,
-) -> Exit:
-    """Write a program into a project, or a backup into all of its projects, verified."""
-    source = read_text(file)
-    backup = Backup.parse(source) if read_toml(source).get("kind") == KIND else None
-    if backup and not save:
-        raise RequestError("a backup is always saved", advice="leave --no-save out; nothing was sent")
-    if backup:
-        chosen = backup.projects if project is None else (project,)
-        programs = [Program(project=replace(backup.project(number), number=number)) for number in chosen]
-    else:
-        program = Program.parse(source)
-        number = project or program.project.number
-        programs = [replace(program, project=replace(program.project, number=number))]
-
-    def action(one: Controller) -> tuple[Written, ...]:
-        if backup:
-            return one.restore(backup, chosen)
-        return (one.write_project(programs[0], save=save, expert=expert),)
-
-    with target.opened(run.bus, run.options, run.output) as bus:
-        one = Controller(bus)
-        changed = [number for wanted in programs if (number := _show_changes(one, wanted, run.output))]
-        rehearsal = dry.DryBus(bus)
-        if run.dry_run:
-            action(Controller(rehearsal))
-            dry.show(rehearsal, run.output)
-            return Exit.OK
-        question = f"write project {', '.join(map(str, changed))}"
-        agreed = run.yes or not changed
-        consent.consent_to(question, run.output, yes=agreed, rehearse=lambda: action(Controller(rehearsal)))
-        results = action(one)
-    return run.show({"projects": [written(one) for one in results]}, "\n".join(map(str, results)))
-
-
-def _show_changes(one: Controller, wanted: Program, output: Output) -> int:
-    """Show what a write would change; return the number of the project, 0 if nothing changes."""
-    number = wanted.project.number
-    if wanted.project.is_cleared:
-        is_filled = not one.read_project(number).project.is_cleared
-        output.text(f"project {number}: to be cleared" if is_filled else f"project {number}: is cleared")
-        return number if is_filled else 0
-    rows = [(name, old, new) for name, (old, new) in one.difference(wanted).items()]
-    if rows:
-        output.table(f"project {number}", ("parameter", ">now", ">new"), rows)
-    return number if rows else 0
-
-
-@command(
-    "read BUS",
-    "Two readings must agree. The result is a program file, or with --all a backup file.",
-    "read stepper:/dev/ttyUSB0 --project 2 > feed.toml",
-    "read stepper:/dev/ttyUSB0 --all > controller.toml",
-    consent="",
-    dry_run=False,
-)
-def read(
-    run: Run,
-    /,
-    *,
-    project: Number = None,
-    all_: Annotated[bool, Parameter(name="--all", negative="", help="A backup of all projects.")] = False,
-) -> Exit:
-    """Read a project as a program file, project 1 by default, or all of them as a backup file."""
-    with target.opened(run.bus, run.options, run.output) as bus:
-        one = Controller(bus)
-        source = f"# read from {run.bus}{' (simulated)' if bus.simulated else ''}\n"
-        text = one.backup().text() if all_ else one.read_project(project or 1).text()
-    text = source + text
-    return run.show({"text": text}, text.rstrip("\n"))
-
-
-# -- run -----------------------------------------------------------------------------------------------
-
-_ERRORS: Final[Mapping[Outcome, type[MotorbusError]]] = {
+ERRORS: Final[dict[Outcome, type[MotorbusError]]] = {
     Outcome.STOPPED: Interrupted,
     Outcome.TIMEOUT: NoReply,
     Outcome.UNKNOWN: OutcomeUnknown,
 }
+FAR: Final = pi  # rad; a longer way needs consent
+Number = Annotated[int | None, Parameter(help="Project 1 to 4.")]
 
 
-@command(
-    "run BUS",
-    "Exit code 0 if its notice came, 5 if none came in time, 10 if it was stopped, 1 if\n"
-    "unknown. Ctrl-C ends the wait, not the project: `motorbus stop` does.",
-    "run stepper:/dev/ttyUSB0 --project 2 --watch 1,2",
-    "run stepper:sim --project 1 --yes",
-    consent="a way of more than 180 degrees",
-)
-def run(
-    run: Run,
+class StepPlan(Struct, frozen=True):
+    """A step: how often, its movement, the time of the motion and of the pause, its inputs and output."""
+
+    step: int
+    times: int
+    units: int
+    pulses: int
+    frequency: float
+    motion: float
+    pause: float
+    output: str
+    wait: int | None
+    stop: int | None
+
+
+class Finding(Struct, frozen=True):
+    """A mistake of a program."""
+
+    level: str
+    rule: str
+    step: int
+    text: str
+
+
+class Checked(Struct, frozen=True, tag="checked"):
+    """The steps of a program, its findings, and the estimated time."""
+
+    steps: list[StepPlan]
+    findings: list[Finding]
+    estimate: str
+
+
+class Difference(Struct, frozen=True):
+    """A parameter of a project: in the controller, in the file."""
+
+    parameter: str
+    now: Any
+    new: Any
+
+
+class Result(Struct, frozen=True, tag="project"):
+    """What was done with a project."""
+
+    project: int
+    outcome: str
+    detail: str = ""
+    seconds: float | None = None
+
+
+class Text(Struct, frozen=True, tag="program"):
+    """A project as a program file."""
+
+    project: int
+    text: str
+
+
+class Ports(Struct, frozen=True, tag="ports"):
+    """Inputs as read, or outputs as last commanded: True is active, None unknown."""
+
+    inputs: dict[str, bool | None] = {}
+    outputs: dict[str, bool | None] = {}
+
+
+def _controller(devices: list[Target]) -> Target:
+    """The only device, a stepper controller. Raises RequestError."""
+    if len(devices) != 1 or not isinstance(devices[0].device, Controller):
+        names = ", ".join(f"{one.family.name} {one.name}" for one in devices)
+        raise RequestError(f"{names}: one stepper controller is needed", expected="as stepper:/dev/ttyUSB0")
+    return devices[0]
+
+
+# -- programs ------------------------------------------------------------------------------------------------------
+
+
+@app.command
+def check(file: Path, /, *, common: Common = Common()) -> int:
+    """Show steps, duration and mistakes of a program file; opens no port.
+
+    Examples:
+
+        motorbus stepper check examples/pick_and_place.toml
+        motorbus stepper check feed.toml
+        motorbus stepper check feed.toml --json
+
+    Exit code 1 if a finding is an error.
+    """
+    program = Program.load(str(file))
+    steps = [_step(program, number) for number in estimate.numbers(program.project)]
+    found = [Finding(one.level, one.rule, one.step, one.text) for one in program.lint()]
+    checked = Checked(steps, found, str(program.estimate()))
+    if common.json:
+        emit(checked, common)
+    else:
+        emit(steps, common)
+        for one in program.lint():
+            print(one)
+        print(checked.estimate)
+    return Exit.FAILURE if any(one.level == "error" for one in found) else Exit.OK
+
+
+def _step(program: Program, number: int) -> StepPlan:
+    project, step = program.project, program.project.step(number)
+    return StepPlan(
+        step=number,
+        times=sequence.times(project, number),
+        units=step.sign * step.distance,
+        pulses=ramp.pulses_of(project, step),
+        frequency=ramp.ramp_of(project, step).run,
+        motion=estimate.step_seconds(project, step),
+        pause=step.delay / 1000,
+        output=PARAMETERS["output"].choices[step.output] if step.output else "",
+        wait=step.start_input or None,
+        stop=step.stop_input or None,
+    )
+
+
+@app.command
+def write(
+    file: Path,
+    device: str,
     /,
     *,
-    project: Annotated[int, Parameter(help="Project 1 to 4.")],
-    timeout: Annotated[str, Parameter(help="Longest wait, as 90s; else by its estimate.")] = "",
-    watch: Annotated[str, Parameter(help="Inputs to read meanwhile, as 1,2.")] = "",
-    endless: Endless = False,
-    expert: Expert = False,
-) -> Exit:
-    """Start a project and wait for its end."""
-    seconds = units.parse(timeout, "time") if timeout else None
-    ports = [int(port) if port.isdigit() else 0 for port in watch.split(",")] if watch else []
-    common: dict[str, Any] = {"endless": endless, "expert": expert}
-    with target.opened(run.bus, run.options, run.output) as bus:
-        one, rehearsal = Controller(bus), dry.DryBus(bus)
-        start = partial(Controller(rehearsal).start_project, project, **common)
-        if run.dry_run:
-            start()
-            dry.show(rehearsal, run.output)
-            return Exit.OK
-        question = _far(one.read_project(project))
-        consent.consent_to(
-            f"start project {project}, {question}", run.output, yes=run.yes or not question, rehearse=start
+    project: Number = None,
+    writing: Writing = Writing(),
+    common: Common = Common(),
+) -> None:
+    """Write a program into a project, save it and read it back; only what differs is sent.
+
+    Examples:
+
+        motorbus stepper write feed.toml stepper:/dev/ttyUSB0 --project 3
+        motorbus stepper write examples/pick_and_place.toml stepper:sim --dry-run
+        motorbus stepper write feed.toml lift --yes
+
+    --dry-run shows what differs.
+    """
+    program = Program.load(str(file))
+    number = project or program.project.number
+    wanted = replace(program, project=replace(program.project, number=number))
+    with open_devices(common, (device,)) as devices:
+        target = _controller(devices)
+        changes = target.device.difference(wanted)
+        rows = [Difference(name, old, new) for name, (old, new) in changes.items()]
+        if writing.dry_run:
+            emit(rows, common)
+            return
+        if rows and not writing.yes:
+            if not common.json:
+                emit(rows, common)
+            confirm(f"write {len(rows)} parameters to project {number} of {target.name}", writing)
+        written = target.device.write_project(wanted)
+        emit(Result(number, written.proof, f"parameters changed: {len(written.changes)}"), common)
+
+
+@app.command
+def read(
+    device: str,
+    /,
+    *,
+    project: Number = 1,
+    to: Annotated[Path | None, Parameter(help="New file; without it the text is printed.")] = None,
+    common: Common = Common(),
+) -> None:
+    """Read a project as a program file.
+
+    Examples:
+
+        motorbus stepper read stepper:/dev/ttyUSB0 --project 2 --to feed.toml
+        motorbus stepper read stepper:/dev/ttyUSB0 > feed.toml
+        motorbus stepper read lift --json
+    """
+    with open_devices(common, (device,)) as devices:
+        target = _controller(devices)
+        number = project or 1
+        text = target.device.read_project(number).text()
+    if to is not None:
+        with to.open("x", encoding="utf-8") as stream:
+            stream.write(text)
+        emit(Result(number, "read", str(to)), common)
+    elif common.json:
+        emit(Text(number, text), common)
+    else:
+        print(text, end="")
+
+
+# -- run -----------------------------------------------------------------------------------------------------------
+
+
+@app.command
+def run(
+    device: str,
+    project: Annotated[int, Parameter(name="N")],
+    /,
+    *,
+    timeout: Annotated[str, Parameter(help="Longest wait, as 90s; by default from its estimate.")] = "",
+    writing: Writing = Writing(),
+    common: Common = Common(),
+) -> None:
+    """Start project N and wait for its end. A project without end needs --timeout.
+
+    Examples:
+
+        motorbus stepper run stepper:/dev/ttyUSB0 2
+        motorbus stepper run stepper:sim 1 --yes
+        motorbus stepper run lift 2 --timeout 90s
+
+    Exit code 0 if its notice came, 5 if none came in time, 10 if it was stopped.
+    Ctrl-C ends the wait only: `motorbus stop` ends the project.
+    """
+    seconds = parse_quantity(timeout, "time") if timeout else None
+    endless = seconds is not None
+    with open_devices(common, (device,)) as devices:
+        target = _controller(devices)
+        way = _way(target.device.read_project(project))
+        question = f"start project {project} of {target.name}, {way}" if way else ""
+
+        def start(one: Any) -> None:
+            one.start_project(project, endless=endless)
+
+        if writing.dry_run:
+            carry_out(writing, target, start)
+            return
+        if question:
+            confirm(question, writing)
+        procedure = Controller.run.function(target.device, project, timeout=seconds, endless=endless)
+        try:
+            ran: Ran = target.bus.run(procedure, report=_report)
+        except (KeyboardInterrupt, SystemExit):
+            note(f"project {project} may still run: `motorbus stop {device}` ends it")
+            raise
+    emit(Result(project, ran.outcome.value, f"{ran.why}; estimate: {ran.predicted}", ran.seconds), common)
+    if error := ERRORS.get(ran.outcome):
+        advice = (
+            "" if ran.outcome is Outcome.STOPPED else f"it may still run: `motorbus stop {device}` ends it"
         )
-        procedure = Controller.run.function(one, project, timeout=seconds, watch=ports, **common)
-        with run.output.progress(f"project {project}") as bar:
-            try:
-                ran: Ran = bus.run(procedure, report=partial(_report, run.output, bar))
-            except (KeyboardInterrupt, SystemExit):
-                run.output.note(f"project {project} may still run: `motorbus stop {run.bus}` ends it")
-                raise
-    took = "" if ran.seconds is None else f" in {ran.seconds:.3f} s"
-    facts = {"project": project, "outcome": ran.outcome.value, "seconds": ran.seconds, "why": ran.why}
-    run.show(facts, f"project {project} {ran.outcome.value}{took}: {ran.why}\nestimate: {ran.predicted}")
-    if error := _ERRORS.get(ran.outcome):
-        advice = "" if ran.outcome is Outcome.STOPPED else "it may still run: `motorbus stop` ends it"
         raise error(f"project {project}: {ran.outcome.value}: {ran.why}", advice=advice)
-    return Exit.OK
 
 
-def _far(program: Program) -> str:
-    """Why a start needs consent; "" if it does not."""
+def _way(program: Program) -> str:
+    """Why a start needs consent; "" if it needs none."""
     project = program.project
     if project.is_endless:
         return "which has no end"
-    farthest = max(map(abs, estimate.reach(project)))
-    angle = farthest * tau / (project.turn_distance or 1)
-    return f"which turns by up to {units.show(angle, 'position')}" if angle > consent.FAR else ""
+    angle = max(map(abs, estimate.reach(project))) * tau / (project.turn_distance or 1)
+    return f"which turns by up to {units.show(angle, 'position')}" if angle > FAR else ""
 
 
-def _report(output: Output, bar: Bar, event: object) -> None:
-    """Show the progress of a run, and changes of inputs."""
-    if isinstance(event, Progress):
-        bar.advance(event.done, event.total, event.what)
-    elif isinstance(event, InputChanged):
-        output.document("motorbus.stepper.input/1", event._asdict())
-        output.text(f"{event.at:.3f} s: input {event.port} {WORDS[event.active]}")
+def _report(event: object) -> None:
+    if isinstance(event, InputChanged):
+        note(f"{event.at:.3f} s: input {event.port} {'active' if event.active else 'inactive'}")
+    elif isinstance(event, Progress) and event.what:
+        note(f"{event.what}")
 
 
-# -- inputs and outputs --------------------------------------------------------------------------------
+# -- inputs and outputs --------------------------------------------------------------------------------------------
 
 
-@command(
-    "io BUS [PORT=LEVEL...]",
-    "Without PORT=LEVEL it reads the inputs, each by two equal readings; `motorbus monitor`\n"
-    "watches them. Outputs cannot be read; what is connected to one may move.",
-    "io stepper:/dev/ttyUSB0",
-    "io stepper:sim 1=on leds=off",
-    consent="",
-)
+@app.command
 def io(
-    run: Run,
+    device: str,
     /,
-    *levels: Annotated[str, Parameter(name="PORT=LEVEL", help="1, 2, 3, all or leds; on or off.")],
-) -> Exit:
-    """Read the inputs, or set outputs."""
-    wanted = [_level(text) for text in levels]
+    *levels: Annotated[str, Parameter(name="OUT=LEVEL")],
+    watch: Annotated[str, Parameter(help="Watch the inputs for this time, as 10s.")] = "",
+    common: Common = Common(),
+) -> None:
+    """Read the inputs, or set outputs: 1, 2, 3, all or leds, on or off.
 
-    def set_all(one: Controller) -> dict[int, bool | None]:
+    Examples:
+
+        motorbus stepper io stepper:/dev/ttyUSB0
+        motorbus stepper io stepper:sim 1=on leds=off
+        motorbus stepper io lift --watch 10s
+
+    What is connected to an output may move. Outputs cannot be read.
+    """
+    wanted = [_level(text) for text in levels]
+    seconds = parse_quantity(watch, "time") if watch else 0.0
+    if wanted and watch:
+        raise RequestError("outputs and --watch", expected="one of them")
+    with open_devices(common, (device,)) as devices:
+        target = _controller(devices)
+        one: Any = target.device
         for port, active in wanted:
             one.set_output(port, active)
-        return dict(one.last_commanded)
-
-    name = "last_commanded" if wanted else "inputs"
-    found = run.write(set_all) if wanted else run.read(lambda one: one.inputs())
-    shown = {f"{'output' if wanted else 'input'} {port}": WORDS[active] for port, active in found.items()}
-    return run.show({name: {str(port): active for port, active in found.items()}}, **shown)
+        if wanted:
+            emit(Ports(outputs={str(port): level for port, level in one.last_commanded.items()}), common)
+            return
+        if watch:
+            procedure = partial(Controller.watch_inputs.function, one)(seconds=seconds)
+            found = target.bus.run(procedure, report=_report).levels
+        else:
+            found = one.inputs()
+        emit(Ports(inputs={str(port): active for port, active in found.items()}), common)
 
 
 def _level(text: str) -> tuple[int, bool]:
     port, _, level = text.partition("=")
     if port not in PORTS or level not in LEVELS:
-        raise RequestError(f"{text} is no PORT=LEVEL", expected="1, 2, 3, all or leds, = on or off")
+        raise RequestError(f"{text!r} is not OUT=LEVEL", expected="1, 2, 3, all or leds, = on or off")
     return PORTS[port], LEVELS[level]
-
-
-# -- what the commands of all families use of this family ----------------------------------------------
-
-COMMANDS: Final = {
-    "write_project()": "`motorbus stepper write`",
-    "backup()": "`motorbus stepper read --all`",
-    "restore()": "`motorbus stepper write`",
-    "run()": "`motorbus stepper run`",
-    "jog()": "`motorbus jog`",
-    "move_by()": "`motorbus move BUS#1+=ANGLE`",
-    "home()": "`motorbus home`",
-    "set_output()": "`motorbus stepper io BUS PORT=LEVEL`",
-    "inputs()": "`motorbus stepper io BUS`",
-    "expert=True": "--expert",
-    "endless=True": "--endless",
-}
-"""A call in an error text -> the command that does the same."""
-KEPT: Final = "the stored project"
-
-
-def written(result: Written) -> dict[str, object]:
-    """For `motorbus write`: the result as plain data."""
-    changes = {name: list(pair) for name, pair in result.changes.items()}
-    return {"project": result.project, "proof": result.proof, "changes": changes}
-
-
-def sample(one: Controller) -> dict[str, object]:
-    """For `motorbus monitor`: the levels of the inputs, the only live state of the controller."""
-    return {f"input_{port}": active for port, active in one.inputs().items()}
-
-
-def as_written(driver: Any, read: Mapping[Any, Any], withheld: list[bytes], request: Any) -> bytes | None:
-    """For a dry run: the reply to a request after the frames that were withheld; None if it is unknown."""
-    asked = decode_request(request)
-    if asked is None or asked[0].name != "read_project":
-        return None
-    images = {number: read.get(encode("read_project", project=number)) for number in range(1, PROJECTS + 1)}
-    stored = {number: dump[REPLY_LENGTH:] for number, dump in images.items() if dump}
-    selected, working = 0, b""
-    for frame in withheld:
-        decoded = decode_request(frame)
-        if decoded is None:
-            continue
-        row, values = decoded
-        if row.name == "select_project":
-            selected, working = values["project"], stored.get(values["project"], b"")
-        if row.is_edit and working:
-            project = edited(decode_image(working, driver.order), row.name, values)
-            working = encode_image(project, driver.order, over=working)
-        elif row.name == "save_project":
-            stored[values["project"]] = working
-        elif row.name == "clear_project":
-            stored[values["project"]] = BLANK
-            working = BLANK if values["project"] == selected else working
-    number = asked[1]["project"]
-    image = working if number == selected else stored.get(number)
-    return encode_reply(request, image=image) if image else None
