@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 import pytest
 
 from motorbus.cli import main
+from motorbus.core.can_frame import CanFrame
 from motorbus.link.memory import MemoryLink
 
 MACHINE: Final = """format = 1
@@ -93,8 +94,8 @@ def shell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captur
     made = Shell(capsys)
     write = MemoryLink.write
 
-    def record(link: MemoryLink, data: bytes) -> None:
-        made.frames.append(bytes(data))
+    def record(link: MemoryLink, data: bytes | CanFrame) -> None:
+        made.frames.append(data.flat() if isinstance(data, CanFrame) else bytes(data))
         write(link, data)
 
     monkeypatch.setattr(MemoryLink, "write", record)

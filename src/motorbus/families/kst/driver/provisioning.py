@@ -41,6 +41,14 @@ class PowerCycleNeeded(NamedTuple):
     new_id: int
     new_rate: int
 
+    @property
+    def text(self) -> str:
+        """What the user must do now."""
+        return (
+            f"servo 0x{self.node:02X}: switch its supply off and on now; "
+            f"it returns with id 0x{self.new_id:02X} at {self.new_rate} bit/s"
+        )
+
 
 class Provisioned(NamedTuple):
     """A servo that has this id and rate (bit/s) after its restart; `resumed`: it had them before the call."""
