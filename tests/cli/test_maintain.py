@@ -89,6 +89,39 @@ def test_restore_refuses_another_file(shell: Shell, tmp_path: Path, text: str) -
         assert shell.writes() == []
 
 
+@pytest.mark.parametrize("name", ["id", "phase", "goal_position", "nothing"])
+def test_restore_refuses_what_is_no_setting(shell: Shell, tmp_path: Path, name: str) -> None:
+    with motorbus.simulate("feetech", ids="1", name="care"):
+        assert shell(f"backup {BUS}#1 saved.json").code == 0
+        saved = json.loads((tmp_path / "saved.json").read_text("utf-8"))
+        assert name not in saved["values"]
+        saved["values"][name] = 1
+        (tmp_path / "edited.json").write_text(json.dumps(saved), "utf-8")
+        ran = shell(f"restore edited.json {BUS}#1 --yes")
+        assert ran.code == 2, ran.err
+        check_error(ran)
+        assert shell.writes() == []
+
+
+def test_each_saved_setting_can_be_restored(shell: Shell, tmp_path: Path) -> None:
+    with motorbus.simulate("kst", ids="5", name="care", profile="kst-ext") as simulation:
+        device = f"{simulation.url}#5"
+        assert shell(f"backup {device} saved.json").code == 0
+        saved = json.loads((tmp_path / "saved.json").read_text("utf-8"))
+        assert set(saved["values"]) == {"negative_limit", "positive_limit"}
+        saved["values"] = {"negative_limit": -900, "positive_limit": 900}
+        (tmp_path / "edited.json").write_text(json.dumps(saved), "utf-8")
+        ran = shell(f"restore edited.json {device} --yes --json")
+        assert json.loads(ran.out)["settings"] == ["negative_limit", "positive_limit"], ran.err
+
+
+def test_a_kst_servo_returns_after_the_power_cycle(shell: Shell) -> None:
+    with motorbus.simulate("kst", ids="5", name="care", faults="at 10 s: power-cycle 5"):
+        ran = shell("set-id kst:sim:care#5 6 --yes --json")
+        assert ran.code == 0, ran.err
+        assert json.loads(ran.out)["devices"] == [6]
+
+
 def test_a_kst_servo_asks_for_the_power_cycle(shell: Shell) -> None:
     with motorbus.simulate("kst", ids="5", name="care"):
         ran = shell("set-id kst:sim:care#5 6 --yes")

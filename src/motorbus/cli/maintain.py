@@ -291,7 +291,7 @@ def backup(device: str, file: Path, /, *, common: Common = Common()) -> None:
         motorbus backup shoulder shoulder.json
         motorbus backup stepper:/dev/ttyUSB0 projects.toml
 
-    The file has each EEPROM register but id and rate; of a stepper controller all projects.
+    The file has each EEPROM register that `write` can write, not id and rate; of a stepper controller all projects.
     """
     with open_devices(common, (device,)) as devices:
         target = _one(devices, "read", "settings")
@@ -301,7 +301,14 @@ def backup(device: str, file: Path, /, *, common: Common = Common()) -> None:
         else:
             values = _read_settings(target)
             names = tuple(values)
-            head = {"format": FORMAT, "family": target.family.name, "map": map_of(target).name}
+            identity = target.device.identify()
+            head = {
+                "format": FORMAT,
+                "family": target.family.name,
+                "model": identity.model,
+                "firmware": identity.firmware,
+                "map": map_of(target).name,
+            }
             text = json.dumps({**head, "values": values}, indent=2) + "\n"
     with file.open("x", encoding="utf-8") as stream:
         stream.write(text)
@@ -309,13 +316,14 @@ def backup(device: str, file: Path, /, *, common: Common = Common()) -> None:
 
 
 def _read_settings(target: Target) -> dict[str, int]:
-    """The raw values of the EEPROM registers of a device, by name."""
+    """The raw values of the EEPROM registers that `write` can write, by name."""
     rows = [
         row.name
         for row in map_of(target).values()
         if row.storage is Storage.EEPROM
         and row.writable
         and row.readable
+        and not row.protected
         and row.effect is not Effect.IDENTITY
     ]
     if not rows:
@@ -344,6 +352,9 @@ def restore(file: Path, device: str, /, *, writing: Writing = Writing(), common:
             return
         values = _parse_settings(text, file, target)
         now = _read_settings(target)
+        unknown = [name for name in values if name not in now]
+        if unknown:
+            raise RequestError(f"{file}: {unknown[0]!r} is not a setting of {target.name}")
         table = map_of(target)
         changed = {name: raw for name, raw in values.items() if now[name] != raw}
         if not changed:
@@ -373,7 +384,4 @@ def _parse_settings(text: str, file: Path, target: Target) -> dict[str, int]:
             f"{file} is of a {family} device with map {table}",
             expected=f"{target.family.name}, map {known.name}",
         )
-    unknown = [name for name in values if name not in known]
-    if unknown:
-        raise RequestError(f"{file}: no register {unknown[0]!r} in map {table}")
     return values
