@@ -172,7 +172,7 @@ def test_version_imports_no_part_of_motorbus(tmp_path: Path) -> None:
     )
     version, modules = done.stdout.splitlines()
     assert version.startswith("motorbus ")
-    assert set(modules.split()) <= {"motorbus", "motorbus.errors", "motorbus.cli", "motorbus.cli.main"}
+    assert set(modules.split()) <= {"motorbus", "motorbus.errors", "motorbus.cli", "motorbus.cli.program"}
 
 
 def test_read_imports_a_part_of_motorbus(served: Simulator) -> None:

@@ -14,7 +14,7 @@ from contextlib import ExitStack
 import pytest
 
 import motorbus
-from motorbus.cli.main import build
+from motorbus.cli.program import build
 from motorbus.link.memory import MemoryLink
 from tests.cli.rows import NAMES, ROWS, Row
 from tests.cli.shell import Shell, check_error, check_json_error, shell

@@ -19,10 +19,7 @@ def main(argv: "Sequence[str] | None" = None) -> int:
     if words == ["--version"]:
         sys.stdout.write(f"motorbus {__version__}\n")
         return 0
-    from motorbus.cli.main import run
+    from motorbus.cli.program import run
 
     globals()["main"] = _main  # importing the module `main` has put it there
     return run(words, last=argv is None)
-
-
-_main = main

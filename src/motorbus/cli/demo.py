@@ -92,10 +92,10 @@ def _track(states: Sequence[RobotState], name: str, unit: str) -> plot.Track:
     """An axis over time in its display unit."""
     quantity = "length" if unit in units.SCALES["length"] else "position"
     scale = units.SCALES[quantity][unit]
-    known = [(state.at, state.axes[name]) for state in states if state.axes[name].target is not None]
+    known = [(state.at, state.axes[name]) for state in states if state.axes[name].position is not None]
     begin = states[0].at if states else 0.0
     return plot.Track(
-        [(one.target or 0.0) / scale for _, one in known],
+        [((one.position or 0.0) if one.target is None else one.target) / scale for _, one in known],
         [None if one.position is None else one.position / scale for _, one in known],
         unit,
         any(one.estimated for _, one in known),
