@@ -21,5 +21,4 @@ def main(argv: "Sequence[str] | None" = None) -> int:
         return 0
     from motorbus.cli.program import run
 
-    globals()["main"] = _main  # importing the module `main` has put it there
     return run(words, last=argv is None)
