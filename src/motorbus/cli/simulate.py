@@ -36,7 +36,7 @@ class Simulated(Struct, frozen=True, tag="simulate"):
 
 
 def simulate(
-    family: str,
+    family: Annotated[str, Parameter(group="Parameters")],
     /,
     *,
     ids: Annotated[str, Parameter(help="Ids, as 1-6 or 1,4,7.")] = "1",
