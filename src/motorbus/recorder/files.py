@@ -19,6 +19,7 @@ TEXT: Final = (".hex", ".txt")
 _SHOWN: Final = 60
 _OFFSET: Final = re.compile(r"\s*([0-9A-Fa-f]{4,8})(:?)\s+(.*)")
 _TIME: Final = re.compile(r"^\s*\[?(\d+:)?\d+:\d+[.,]\d+\]?\s+|^\s*\(?\d+\.\d{3,}\)?\s+")
+_LABEL: Final = re.compile(r"^\s*([0-9]+|[RrTt][Xx]):\s+")
 _BETWEEN: Final = re.compile(r"[\s,;:{}]+|\\x|0[xX]")
 _LIST: Final = re.compile(r"\[\s*\d+(\s*,\s*\d+)*\s*,?\s*\]")
 
@@ -61,6 +62,8 @@ def _from_line(line: str, number: int, count: int) -> bytes:
         text = _without_ascii(dump[3])
     elif re.fullmatch(r"[0-9A-Fa-f]{7,8}", text) and int(text, 16) == count:
         return b""  # the last line of hexdump: the length
+    else:
+        text = _LABEL.sub("", text)  # a time or a direction; a colon between bytes has no space behind it
     found = bytearray()
     for word in filter(None, _BETWEEN.split(text)):
         if not re.fullmatch(r"([0-9A-Fa-f]{2})+", word):
