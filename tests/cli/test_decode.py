@@ -34,6 +34,7 @@ def _frames(shown: str) -> list[dict[str, object]]:
         (f"TX: {READ}\nRX: {STATUS}", [READ, STATUS]),
         ("ff:ff:01:04:02:38:02:be", [READ]),
         ("00000000: ffff 0104 0238 02be                      .....8..", [READ]),
+        (f"0000000 {READ.lower()} {STATUS.lower()}\n0000020 {READ.lower()}\n0000030", [READ, STATUS, READ]),
         ("byte p[] = { 0xFF, 0xFF, 0x01, 0x04, 0x02, 0x38, 0x02, 0xBE }; // read", [READ]),
         ("[255, 255, 1, 4, 0, 24, 5, 221]", [STATUS]),
     ],
@@ -49,7 +50,7 @@ def test_bytes_of_a_file(
     assert not any(one["fault"] for one in found)
 
 
-@pytest.mark.parametrize("text", ["FF F", "FF F F", "12.5 volts", "[1, 256]", "0xF"])
+@pytest.mark.parametrize("text", ["FF F", "FF F F", "12.5 volts", "[1, 256]", f"[{'9' * 5000}]", "0xF"])
 def test_a_line_that_cannot_be_read_is_named(
     text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -82,6 +83,14 @@ def test_a_damaged_asc_line_is_named_without_words_of_python(
     assert "line 7" in shown
     assert "invalid literal" not in shown
     assert "non-hexadecimal" not in shown
+
+
+def test_a_can_fd_frame_is_shown_with_its_data(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "screen.log"
+    file.write_text("can0  5A5  [08]  60 03 60 00 00 00 00 00\n")
+    assert main(["decode", "--family", "kst", "--file", str(file), "--json"]) == 1
+    (found,) = _frames(capsys.readouterr().out)
+    assert (found["title"], found["channel"]) == ("CAN frame 5A5##6003600000000000", "can0")
 
 
 def test_summary_counts_frames(capsys: pytest.CaptureFixture[str]) -> None:

@@ -306,7 +306,9 @@ def _from_screen(found: re.Match[str]) -> Logged:
     data = found["data"]
     text = f"{found['id']}#{data.replace(' ', '')}"
     if found["fd"] or int(found["length"]) > MOST:
-        return _logged(f"{found['id']}##", None, at, _WAYS.get(found["way"], ""), found["channel"])
+        return _logged(
+            f"{found['id']}##{data.replace(' ', '')}", None, at, _WAYS.get(found["way"], ""), found["channel"]
+        )
     word = f"{found['id']}#R" if data.startswith("remote") else text.partition("ERRORFRAME")[0]
     frame = parse_word(word)
     if frame is not None and not frame.id & REMOTE_FLAG and len(frame.data) != int(found["length"]):
