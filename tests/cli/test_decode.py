@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from motorbus.cli import main
+from motorbus.cli.main import run
 
 READ = "FF FF 01 04 02 38 02 BE"
 STATUS = "FF FF 01 04 00 18 05 DD"
@@ -44,7 +44,7 @@ def test_bytes_of_a_file(
 ) -> None:
     file = tmp_path / "capture.txt"
     file.write_text(text)
-    assert main(["decode", "--family", "feetech", "--file", str(file), "--json"]) == 0
+    assert run(["decode", "--family", "feetech", "--file", str(file), "--json"], last=False) == 0
     found = _frames(capsys.readouterr().out)
     assert [one["data"] for one in found] == frames
     assert not any(one["fault"] for one in found)
@@ -56,7 +56,7 @@ def test_a_line_that_cannot_be_read_is_named(
 ) -> None:
     file = tmp_path / "capture.txt"
     file.write_text(f"{READ}\n{text}\n")
-    assert main(["decode", "--family", "feetech", "--file", str(file)]) == 2
+    assert run(["decode", "--family", "feetech", "--file", str(file)], last=False) == 2
     shown = capsys.readouterr()
     assert not shown.out
     assert "line 2" in shown.err
@@ -67,7 +67,7 @@ def test_events_and_channels_of_an_asc_log(tmp_path: Path, capsys: pytest.Captur
     pytest.importorskip("can")
     file = tmp_path / "trace.asc"
     file.write_text(ASC)
-    assert main(["decode", "--family", "kst", "--file", str(file), "--json"]) == 0
+    assert run(["decode", "--family", "kst", "--file", str(file), "--json"], last=False) == 0
     (found,) = _frames(capsys.readouterr().out)
     assert (found["data"], found["channel"], found["direction"]) == ("625#2203600084030000", "1", "tx")
 
@@ -78,7 +78,7 @@ def test_a_damaged_asc_line_is_named_without_words_of_python(
     pytest.importorskip("can")
     file = tmp_path / "trace.asc"
     file.write_text(ASC + "   0.030000 1  625   Tx   d 8 22 zz 60 00 84 03 00 00\n")
-    assert main(["decode", "--family", "kst", "--file", str(file)]) == 1
+    assert run(["decode", "--family", "kst", "--file", str(file)], last=False) == 1
     shown = capsys.readouterr().out
     assert "line 7" in shown
     assert "invalid literal" not in shown
@@ -88,12 +88,18 @@ def test_a_damaged_asc_line_is_named_without_words_of_python(
 def test_a_can_fd_frame_is_shown_with_its_data(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "screen.log"
     file.write_text("can0  5A5  [08]  60 03 60 00 00 00 00 00\n")
-    assert main(["decode", "--family", "kst", "--file", str(file), "--json"]) == 1
+    assert run(["decode", "--family", "kst", "--file", str(file), "--json"], last=False) == 1
     (found,) = _frames(capsys.readouterr().out)
     assert (found["title"], found["channel"]) == ("CAN frame 5A5##6003600000000000", "can0")
 
 
 def test_summary_counts_frames(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["decode", "--family", "feetech", "--summary", "--json", *READ.split(), *STATUS.split()]) == 0
+    assert (
+        run(
+            ["decode", "--family", "feetech", "--summary", "--json", *READ.split(), *STATUS.split()],
+            last=False,
+        )
+        == 0
+    )
     found = json.loads(capsys.readouterr().out)
     assert (found["packets"], found["noise_bytes"]) == (2, 0)
