@@ -87,7 +87,7 @@ def decode(
 
         motorbus decode --family feetech FF FF 01 04 02 38 02 BE
         motorbus decode --family kst --file trace.asc --summary
-        candump -L can0 | motorbus decode --family kst --json
+        motorbus decode --family kst --json < candump.log
 
     CAN frames are ID#DATA; CAN logs are candump, ASC, BLF, TRC. Exit code 1: noise.
     """
