@@ -52,6 +52,7 @@ class Frame(Struct, frozen=True, tag="frame"):
     fields: list[Field]
     time: float | None = None  # s, since 1970 if it is above 1e8
     direction: str = ""
+    channel: str = ""  # as in the log
 
 
 class Group(Struct, frozen=True):
@@ -86,7 +87,7 @@ def decode(
 
         motorbus decode --family feetech FF FF 01 04 02 38 02 BE
         motorbus decode --family kst --file trace.asc --summary
-        candump -L can0 | motorbus decode --family kst --json
+        motorbus decode --family kst --json < candump.log
 
     CAN frames are ID#DATA; CAN logs are candump, ASC, BLF, TRC. Exit code 1: noise.
     """
@@ -143,7 +144,8 @@ def _explain(driver: BusDriver, source: bytes | Iterator[Logged], common: Common
         ]
         shown = _shown(one.data, driver.family)
         direction = "" if noted is None else noted.direction
-        frame = Frame(start, shown, one.title, one.fault, fields, time, direction)
+        channel = "" if noted is None else noted.channel
+        frame = Frame(start, shown, one.title, one.fault, fields, time, direction, channel)
         if common.json:
             emit(frame, common)
         else:
@@ -183,7 +185,7 @@ def _shown(data: bytes, family: Family) -> str:
 
 def _print(frame: Frame) -> None:
     when = _when(frame.time) if frame.time is not None else f"at {frame.start}"
-    print(" ".join(filter(None, (when, frame.direction, escape(frame.data)))))
+    print(" ".join(filter(None, (when, escape(frame.channel), frame.direction, escape(frame.data)))))
     print(f"{escape(frame.title)}: {f'BAD: {frame.fault}' if frame.fault else 'good'}")
     for field in frame.fields:
         print(f"  {field.start:3}  {field.data:<12} {field.name:<14} {escape(field.meaning)}")

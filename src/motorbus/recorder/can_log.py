@@ -35,6 +35,8 @@ _LIKE_A_FRAME: Final = {
 }
 """By ending: what begins as a frame does, by a time, a channel and an identifier or so much of that as there is, or by
 a number and a time, without the word of a status behind them; or has a direction in its place."""
+_EVENT: Final = re.compile(r"\s*\d+\.\d+\s+CANFD\s+(?!Rx\b|Tx\b)[A-Z]", re.I)
+"""A line of ASC about the measurement, where a frame has a channel; python-can's reader takes it for a frame."""
 _BY_PYTHON_CAN: Final = (".asc", ".blf", ".trc")
 _TEXT: Final = (".log", ".txt", ".candump", "")
 _HIGHEST: Final = {3: 0x7FF, 8: 0x1FFFFFFF}
@@ -177,7 +179,7 @@ def _by_python_can(path: Path) -> Iterator[Logged]:
 
 def _until_broken(path: Path, file: Any, reader: Any) -> Iterator[Logged]:
     try:
-        yield from map(_from_message, reader(file))
+        yield from (_from_message(message, 1) for message in reader(file))
     except OSError:
         raise
     except Exception as error:  # what its readers raise for a broken file is theirs to choose
@@ -192,7 +194,7 @@ def _line_by_line(path: Path, lines: _Lines, reader: Any) -> Iterator[Logged]:
         try:
             for message in messages:
                 yield from lines.passed_over(but_last=True)
-                found = _from_message(message)
+                found = _from_message(message, int(path.suffix.lower() == ".asc"))
                 short = found.frame is not None and _is_short(message)
                 yield (
                     _damaged(lines.last, lines.number, "more data bytes are announced than stand there")
@@ -207,9 +209,8 @@ def _line_by_line(path: Path, lines: _Lines, reader: Any) -> Iterator[Logged]:
             if lines.number == begun:  # it is not the line that it cannot read
                 raise _unreadable(path, error) from error
             yield from lines.passed_over(but_last=True)
-            yield _damaged(
-                lines.last, lines.number, f"{lines.last.strip()[:_SHOWN]!r} cannot be read: {error}"
-            )
+            if not _EVENT.match(lines.last):
+                yield _damaged(lines.last, lines.number, f"{lines.last.strip()[:_SHOWN]!r} cannot be read")
         begun = lines.number
         lines.again()
 
@@ -220,7 +221,9 @@ def _is_short(message: Any) -> bool:
 
 
 def _unreadable(path: Path, error: Exception) -> RequestError:
-    return RequestError(f"{path}: cannot be read as {path.suffix}: {error}")
+    return RequestError(
+        f"{path}: cannot be read as {path.suffix}", cause="it is damaged or of another format"
+    )
 
 
 class _Lines:
@@ -278,11 +281,14 @@ def _damaged(line: str, number: int, why: str) -> Logged:
     return Logged(line.strip()[:_SHOWN], None, fault=why, line=number)
 
 
-def _from_message(message: Any) -> Logged:
+def _from_message(message: Any, first: int) -> Logged:
+    """`first` is the lowest channel in the file; python-can's readers of ASC and BLF call it 0."""
     identifier = message.arbitration_id
     word = f"{identifier:0{8 if message.is_extended_id else 3}X}#{bytes(message.data or b'').hex().upper()}"
     direction = "rx" if message.is_rx else "tx"
     channel = "" if message.channel is None else str(message.channel)
+    if isinstance(message.channel, int):
+        channel = str(message.channel + first)
     if message.is_fd:
         return _logged(word.replace("#", "##"), None, message.timestamp, direction, channel)
     if message.is_error_frame:
@@ -300,7 +306,9 @@ def _from_screen(found: re.Match[str]) -> Logged:
     data = found["data"]
     text = f"{found['id']}#{data.replace(' ', '')}"
     if found["fd"] or int(found["length"]) > MOST:
-        return _logged(f"{found['id']}##", None, at, _WAYS.get(found["way"], ""), found["channel"])
+        return _logged(
+            f"{found['id']}##{data.replace(' ', '')}", None, at, _WAYS.get(found["way"], ""), found["channel"]
+        )
     word = f"{found['id']}#R" if data.startswith("remote") else text.partition("ERRORFRAME")[0]
     frame = parse_word(word)
     if frame is not None and not frame.id & REMOTE_FLAG and len(frame.data) != int(found["length"]):

@@ -19,8 +19,9 @@ TEXT: Final = (".hex", ".txt")
 _SHOWN: Final = 60
 _OFFSET: Final = re.compile(r"\s*([0-9A-Fa-f]{4,8})(:?)\s+(.*)")
 _TIME: Final = re.compile(r"^\s*\[?(\d+:)?\d+:\d+[.,]\d+\]?\s+|^\s*\(?\d+\.\d{3,}\)?\s+")
+_LABEL: Final = re.compile(r"^\s*([0-9]+|[RrTt][Xx]):\s+")
 _BETWEEN: Final = re.compile(r"[\s,;:{}]+|\\x|0[xX]")
-_LIST: Final = re.compile(r"\[\s*\d+(\s*,\s*\d+)*\s*,?\s*\]")
+_LIST: Final = re.compile(r"\[\s*[0-9]{1,3}(\s*,\s*[0-9]{1,3})*\s*,?\s*\]")
 
 
 def read_bytes(path: Path) -> bytes:
@@ -57,16 +58,24 @@ def _from_line(line: str, number: int, count: int) -> bytes:
     text = _TIME.sub("", line).strip().strip("\"'")
     text = re.sub(r"^b[\"']", "", text)
     dump = _OFFSET.fullmatch(text)
-    if dump is not None and (dump[2] or int(dump[1], 16) == count):
+    if dump is not None and (dump[2] or _is_offset(dump[1], count)):
         text = _without_ascii(dump[3])
-    elif re.fullmatch(r"[0-9A-Fa-f]{7,8}", text) and int(text, 16) == count:
-        return b""  # the last line of hexdump: the length
+    elif re.fullmatch(r"[0-9A-Fa-f]{7,8}", text) and _is_offset(text, count):
+        return b""  # the last line of hexdump or od: the length
+    else:
+        text = _LABEL.sub("", text)  # a time or a direction; a colon between bytes has no space behind it
     found = bytearray()
     for word in filter(None, _BETWEEN.split(text)):
         if not re.fullmatch(r"([0-9A-Fa-f]{2})+", word):
             raise _unreadable(word, line, number)
         found += bytes.fromhex(word)
     return bytes(found)
+
+
+def _is_offset(digits: str, count: int) -> bool:
+    """In hexadecimal, or with 7 digits in octal as od writes it."""
+    octal = len(digits) == 7 and digits == f"{count:07o}"
+    return octal or int(digits, 16) == count
 
 
 def _without_ascii(text: str) -> str:
