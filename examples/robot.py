@@ -17,10 +17,11 @@ def main(path: str | Path = HERE) -> None:
         print(f"{machine.name}: {len(machine.axes)} axes{', simulated' if simulated else ''}")
         for name, axis in machine.axes.items():
             print(f"{name}: {axis.model}, {', '.join(axis.commands)}")
-        moved = robot.move({"shoulder": -0.3, "pan": 0.2}, duration=1.0)
+        robot.set_position("slide", 0.0)  # it reports no position: a person has seen it there, or home it
+        moved = robot.move({"shoulder": -0.3, "pan": 0.2, "slide": 0.02}, duration=1.0)
         print(moved)
-        for name, position in robot.positions(["shoulder", "pan"]).items():
-            print(f"{name} at {position:.3f}")
+        for name, axis in moved.axes.items():
+            print(f"{name} at {axis.position:.3f}{', estimated' if axis.estimated else ''}")
 
 
 if __name__ == "__main__":

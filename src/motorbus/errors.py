@@ -19,7 +19,7 @@
     │   │   └── LimitExceeded    the goal lies outside the limits, or the limits are unknown
     │   ├── NotHomed         the reference is not known
     │   ├── Stalled          it stopped moving before it was there
-    │   ├── Faulted          its device let go by itself or has restarted: `reason`; it stays so until cleared
+    │   ├── Faulted          its device lost its torque or restarted: `reason`; until it is cleared
     │   ├── Overloaded       it pushes too hard for too long, or is too hot: `reason`
     │   └── Interrupted      a stop or a cancellation came in between
     ├── VerificationFailed   written, read back, and different
@@ -190,10 +190,9 @@ class Stalled(MotionError):
 
 
 class Faulted(MotionError):
-    """Its device has lost what it was told, or let go, without having been told to: `reason` is one word for programs.
+    """The device of an axis has restarted or lost its torque; the axis gets no motion until the fault is cleared.
 
-    "restart" (its supply dipped, or it started anew) or "let go" (its own protection, or nobody knows). From then on it
-    is at fault: nothing of it moves or gets torque until that is cleared.
+    `reason`: "restart" (its supply dipped) or "torque_lost" (its own protection, or another program).
     """
 
     def __init__(self, summary: str, *, reason: str = "", **parts: object) -> None:

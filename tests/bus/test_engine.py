@@ -729,17 +729,6 @@ def test_a_motion_order_that_is_lost_is_not_repeated_behind_a_torque_off(engine:
     assert write_frame(1, GOAL, 1) not in engine.sent()
 
 
-def test_a_stop_counts_as_accepted_when_its_node_acknowledges_it(engine: Engine) -> None:
-    known(engine, 1, 2)
-    engine.wire.answer = servos = Servos()
-    servos.silent = {2}
-    engine.run(torque_off(1))
-    with pytest.raises(MotorbusError):
-        engine.run(torque_off(2))
-    found = engine.bus.engine.nodes
-    assert [found.accepted_count(node) for node in (1, 2)] == [1, 0]
-
-
 def test_a_stop_ends_the_motion_orders_of_nodes_that_it_does_not_know(can: Engine) -> None:
     can.submit("read", can_read(9))
     can.submit("move", can_move(9))

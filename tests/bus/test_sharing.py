@@ -14,16 +14,19 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus import feetech
+from motorbus import feetech, stepper
 from motorbus.bus.blocking import exchange_on
 from motorbus.bus.running import run_on
 from motorbus.core.request import Request
-from motorbus.core.steps import Sleep
+from motorbus.core.steps import Exclusive, Sleep, catch, gather
 from motorbus.errors import Interrupted, LinkLost
 from motorbus.families.feetech.driver.group import disable_torque_everyone
+from motorbus.link.memory import MemoryLink
 from tests.bus.test_batches import Arm
+from tests.support.subjects import FAMILIES
+from tests.support.world import make_bus
 
-LIMIT = 20.0
+LIMIT = 8.0
 """s after which a call counts as blocked."""
 
 
@@ -73,6 +76,53 @@ def test_a_bus_whose_procedure_has_ended_is_free_while_others_run(arms: list[Arm
     assert time.monotonic() - begun < 1.0
     assert work.is_alive()
     work.join(LIMIT)
+
+
+@pytest.mark.parametrize("family", sorted(FAMILIES))
+def test_a_stop_of_another_thread_goes_between_the_steps_of_an_exclusive_procedure(family: str) -> None:
+    kind = FAMILIES[family]
+    link = MemoryLink(kind.simulator((1,)), rate=kind.link.rate, virtual=False)
+    with make_bus(link, kind.open()) as bus:
+        begun, ended, is_read = (threading.Event() for _ in range(3))
+        order: list[str] = []
+
+        async def motion() -> None:
+            begun.set()
+            while not ended.is_set():
+                await Sleep(0.01)
+            order.append("motion")
+
+        def read() -> None:
+            bus.run(bus.driver.probe(1, 0))
+            order.append("read")
+            is_read.set()
+
+        threads = [started(lambda: bus.run(Exclusive(motion())))]
+        assert begun.wait(LIMIT)
+        threads.append(started(read))
+        stops = started(lambda: bus.run(gather(*bus.driver.stop({1: None}).requests)))
+        stops.join(LIMIT)
+        assert not stops.is_alive()
+        assert not is_read.is_set()  # any other request waits for the end of the procedure
+        ended.set()
+        for thread in threads:
+            thread.join(LIMIT)
+        assert order == ["motion", "read"]
+
+
+def test_a_stepper_that_jogs_is_stopped_by_another_thread() -> None:
+    with motorbus.simulate("stepper", clock="real") as sim, motorbus.open(sim.url) as bus:
+        motor = stepper.Controller(bus)
+        simulator: Any = sim.simulator
+        machine = simulator.controller.machine
+        before = machine.position(bus.now())
+        jog = started(lambda: bus.run(catch(stepper.Controller.jog.function(motor, 1.0, 2 * LIMIT))))
+        while machine.position(bus.now()) == before:
+            assert jog.is_alive()
+            time.sleep(0.01)
+        begun = time.monotonic()
+        motor.stop()
+        assert time.monotonic() - begun < LIMIT / 4
 
 
 @pytest.mark.parametrize("stop", ["torque off", "batch"])

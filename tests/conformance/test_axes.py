@@ -34,7 +34,6 @@ DOCUMENTED: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "set_velocity": (("device", "velocity"), ()),
     "max_velocity": (("device",), ()),
     "plan_move": (("device", "angle"), ("velocity", "acceleration")),
-    "keep_time": (("device", "angle", "timing"), ("velocity", "acceleration")),
 }
 """By capability: what it is called with in order, and what by name."""
 TOLD = ("position", "velocity", "load", "current", "voltage", "temperature")

@@ -224,12 +224,12 @@ def test_a_servo_that_was_made_limp_meanwhile_stays_limp() -> None:
         assert servo.read("torque_enable") == {"torque_enable": False}
 
 
-def test_a_step_cannot_be_stopped_and_says_so() -> None:
+def test_an_interrupted_step_ends_with_torque_off() -> None:
+    """A servo in step mode cannot be stopped: it finishes its steps as long as it has torque."""
     with opened(KINDS[0]) as (sim, servo, _):
         servo.set_mode("step")
         sim.line = Line(interrupt, at=sim.now + 0.4)
         with pytest.raises(KeyboardInterrupt) as caught:
             servo.step(1.0, velocity=0.6)
-        said = notes(caught.value)
-        assert said.startswith("#1 may still be moving: node 1 is in step mode")
-        assert "use disable_torque()" in said
+        assert notes(caught.value).startswith("#1: torque off accepted")
+        assert servo.read("torque_enable") == {"torque_enable": False}

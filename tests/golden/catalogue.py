@@ -143,7 +143,7 @@ FEETECH_GROUP: list[tuple[Call, str]] = [
     (grouped("write", "goal_position", values=(2.5, 2.6, 2.7)), "group"),
     (grouped("write", "goal_position", "goal_velocity", values=[(2.5, 1.0)] * 3), "group_two"),
     (shared("reg_write_all", {1: {"goal_position": 2.5}, 2: {"goal_position": 2.6}}), ""),
-    (shared("action_all"), ""),
+    (shared("action_all", DEVICES), ""),
     (shared("disable_torque_all", (1, 2, 3)), ""),
 ]
 """On three prepared servos."""

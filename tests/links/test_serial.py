@@ -60,7 +60,7 @@ def test_other_files_are_no_serial_ports(path: str, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(PortNotFound, match="is not a serial port") as caught:
         SerialLink(str(tmp_path / path), rate=1_000_000)
-    assert "`motorbus ports`" in caught.value.advice
+    assert "`motorbus scan`" in caught.value.advice
 
 
 FORBIDDEN = """

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import random
 from dataclasses import replace
-from itertools import islice
-from math import inf, nan, pi
+from math import inf, nan
 from typing import Any
 
 import pytest
@@ -14,13 +12,10 @@ from motorbus.core.family import IdChanged
 from motorbus.core.request import EVERY_LANE, Effect, Priority, Request
 from motorbus.core.setpoint import Deferred, Setpoint, Stays
 from motorbus.errors import LimitExceeded, MotorbusError, NotHomed, Refused
-from motorbus.families.feetech import Servo
 from motorbus.motion.gate import SafetyGate, check_owned
 from motorbus.motion.lease import Lease
 from motorbus.motion.machine import AxisConfig, Position, Step, Velocity
-from motorbus.motion.robot import Robot
 from motorbus.motion.status import AxisStatus
-from tests.support.machines import Recorded, listen, machine
 
 NOW = 100.0
 
@@ -234,83 +229,3 @@ def test_a_stop_in_motion_loses_an_estimate() -> None:
     assert axis.estimate is None
     with pytest.raises(NotHomed):
         gate.check(goal(0.1, "relative"), NOW)
-
-
-# -- random calls ----------------------------------------------------------------------------------------------
-
-
-def goals_in(data: bytes) -> list[tuple[int, int]]:
-    """Node and raw goal position of each WRITE, REG WRITE or SYNC WRITE of registers that hold it."""
-    found = []
-    while len(data) > 6 and data[:2] == b"\xff\xff":
-        frame, data = data[: data[3] + 4], data[data[3] + 4 :]
-        start, offset = frame[5], 42 - frame[5]
-        if frame[4] in (3, 4) and start <= 42 < start + frame[3] - 3:
-            found.append((frame[2], frame[6 + offset] | frame[7 + offset] << 8))
-        if frame[4] == 0x83 and start <= 42 < start + frame[6]:
-            starts = range(7, len(frame) - 1, frame[6] + 1)
-            found += [(frame[at], frame[at + 1 + offset] | frame[at + 2 + offset] << 8) for at in starts]
-    return found
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_no_goal_outside_the_limits_leaves(seed: int) -> None:
-    draw = random.Random(seed)
-    keys: dict[str, Any] = {
-        "low": "-60 deg",
-        "high": "60 deg",
-        "max_velocity": "120 deg/s",
-        "max_step": "200 deg",
-    }
-    sent = accepted = 0
-    with machine("1-3", **keys) as (config, sims), Robot(config) as robot:
-        listen(sims)
-        line = sims["arm"].line
-        assert isinstance(line, Recorded)
-        for _ in range(60):
-            before = {node: sims["arm"][node].memory["present_position"] for node in (1, 2, 3)}
-            try:
-                random_call(draw, robot, sims)
-                accepted += 1
-            except (MotorbusError, ValueError):
-                pass
-            for data in line.sent:
-                for node, raw in goals_in(data) if isinstance(data, bytes) else ():
-                    sent += 1
-                    inside = abs(raw * 360 / 4096 - 180) <= 60.2
-                    assert inside or abs(raw - before[node]) <= 2, (node, raw)
-            line.sent.clear()
-    assert sent > 300
-    assert accepted > 15
-
-
-def random_call(draw: random.Random, robot: Robot, sims: Any) -> None:
-    """One call with a value that may be anything."""
-    node = draw.randint(1, 3)
-    name = f"a{node}"
-    odd = [draw.uniform(-1.2, 1.2), draw.uniform(-5, 5), nan, inf, 1e9, -0.0]
-    value = draw.choice([draw.uniform(-1.0, 1.0)] * 8 + odd)
-    servo = Servo(robot.buses["arm"], node)
-    kind = draw.randrange(9)
-    if kind < 3:
-        goals = {name: value, f"a{node % 3 + 1}": draw.uniform(-1, 1)}
-        robot.move(goals, speed=draw.choice([1, 0.3, 2]), relative=draw.random() < 0.3)
-    elif kind == 3:
-        servo.move(value + pi, velocity=draw.choice([0.5, 1.5, 9]), wait=False)
-    elif kind == 4:
-        servo.write(goal_position=value + pi)
-    elif kind == 5:
-        policy: Any = draw.choice(["clamp", "reject"])
-        with robot.loop(100, name, policy=policy, direct=draw.random() < 0.3) as loop:
-            for _ in islice(loop, draw.randint(1, 20)):
-                loop.set_target(name, value)
-    elif kind == 6:
-        calls: list[Any] = [robot.stop, lambda: robot.enable_torque(), lambda: robot.disable_torque(name)]
-        draw.choice(calls)()
-    elif kind == 7:
-        robot.jog(name, draw.choice([1.0, -2.0, 0.3]), 0.3)
-    elif draw.random() < 0.2:
-        sims["arm"][node].power_cycle()
-        robot.clear_fault()
-    else:
-        robot.states()

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from math import cos, pi
+from itertools import pairwise
+from math import cos, pi, radians, sin
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from motorbus.core.request import Data
 from motorbus.errors import LimitExceeded, RequestError, Stalled
+from motorbus.link.base import Delivery, Side
 from motorbus.motion.commands import Follow, Replay, Teach
 from motorbus.motion.robot import Robot
 from motorbus.motion.trajectory import Trajectory
+from tests.safety.decoders import COUNT, FeetechWitness
 from tests.support.machines import listen, machine, orders
 
 TIMES = [index * pi / 60 for index in range(121)]
@@ -53,6 +57,33 @@ def test_nothing_moves_when_a_goal_on_the_way_is_illegal() -> None:
         with pytest.raises(RequestError):
             robot.replay(WAVE, speed=0)
         assert not orders(sims)
+
+
+class Deaf(FeetechWitness):
+    """Loses the replies of servo 1 while the host sends its goals of these numbers."""
+
+    def __init__(self, first: int, last: int) -> None:
+        super().__init__()
+        self.gap = range(first, last)
+
+    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
+        found = super().carry(sender, data, at)
+        goals = sum(target.node == 2 for target in self.targets)
+        is_lost = goals in self.gap and sender is Side.DEVICE and data[2] == 1
+        return [] if is_lost else found
+
+
+def test_an_axis_that_was_silent_in_a_replay_returns_within_its_limits() -> None:
+    times = [number * 0.5 for number in range(13)]
+    swing = [0.5 * sin(at) for at in times]
+    with machine("1-2", max_velocity="60 deg/s") as (config, sims), Robot(config) as robot:
+        line = sims["arm"].line = Deaf(100, 103)
+        result = robot.replay(Trajectory(times, {"a1": swing, "a2": swing}), rate=50)
+        goals = [target.to for target in line.targets if target.node == 1]
+        assert len(goals) < sum(target.node == 2 for target in line.targets), "it got no goals meanwhile"
+        longest = max(abs(after - before) for before, after in pairwise(goals))
+        assert longest <= radians(60) / 50 * 1.1 + 2 * COUNT
+        assert result.positions["a1"] == pytest.approx(swing[-1], abs=0.02)
 
 
 def test_a_blocked_shaft_ends_a_replay() -> None:

@@ -1,24 +1,20 @@
-"""A servo that loses its supply in mid-motion, over a real port: at fault, and silence about torque and motion.
-
-The simulator is a process of its own behind a pseudo-terminal, its supply is cut through its control socket, and what
-left the host is read from the trace of the bus.
-"""
+"""A servo on a real port that loses its supply in the middle of a move: its axis is at fault and gets no torque."""
 
 from __future__ import annotations
 
 import socket
 from collections.abc import Iterator
 from pathlib import Path
+from threading import Event, Thread
 from typing import Any, NamedTuple
 
 import pytest
-from motorbus.motion.safety.restarts import FaultNoted
-from motorbus.session.robot import Robot
-from tests.safety.test_restarts import moving_or_giving_torque
 
+from motorbus import Robot
+from motorbus.core.request import Data
 from motorbus.errors import Faulted, Refused
-from tests.safety.decoders import READ
-from tests.support.machines import described
+from motorbus.motion.commands import Move, Torque
+from tests.support.machines import file_text
 from tests.support.processes import Simulated
 
 
@@ -45,39 +41,41 @@ def served(
     control, file = tmp_path / "a.sock", tmp_path / "motorbus.toml"
     switches: dict[str, Any] = {"control": str(control), "model": str(request.param), "servo-baud": "1000000"}
     with Simulated("feetech", ids="1-3", link=tmp_path / "arm", **switches) as arm:
-        file.write_text(described({"arm": arm.bus}, "1-3", "", False, {}, {}), encoding="utf-8")
+        file.write_text(file_text({"arm": arm.bus}, "1-3"), encoding="utf-8")
         yield Served(file, control)
 
 
-def test_a_servo_that_loses_its_supply_in_mid_motion_is_at_fault_and_is_told_nothing_more(
-    served: Served,
-) -> None:
-    seen: list[float] = []
-    cut: list[float] = []
+def test_a_servo_that_loses_its_supply_is_at_fault_and_gets_no_torque(served: Served) -> None:
+    with Robot.load(served.file) as robot:
+        bus = robot.buses["arm"]
+        sent = bus.trace.subscribe(limit=1_000_000)
 
-    def report(event: object) -> None:
-        now = robot.buses["arm"].link.now()
-        if isinstance(event, FaultNoted):
-            seen.append(now)
-        elif not cut and now > began + 0.8:  # progress of the movement
+        def cut_supply() -> None:
+            while (robot.axes["a2"].status.known_position or 0.0) < 0.1:
+                Event().wait(0.01)
             served.cut_supply(2)
-            cut.append(robot.buses["arm"].link.now())
 
-    with Robot.load(served.file, report=report) as robot:
-        sent = robot.buses["arm"].trace.subscribe(limit=1_000_000)
-        began = robot.buses["arm"].link.now()
-        with pytest.raises(Faulted, match="a2 is at fault: arm#2 has restarted") as told:
+        cutter = Thread(target=cut_supply)
+        cutter.start()
+        with pytest.raises(Faulted, match="a2: arm#2 has restarted") as caught:
             robot.move({"a1": 0.3, "a2": 0.3, "a3": -0.3}, duration=4.0)  # slow, for time is real
-        assert told.value.reason == "restart"
+        moment = bus.link.now()
+        cutter.join()
+        assert caught.value.reason == "restart"
         assert set(robot.faults) == {"a2"}
-        for order in (lambda: robot.move({"a2": 0.0}), lambda: robot.enable_torque("a2")):
+        for command in (Move({"a2": 0.0}), Torque(on=True, names=("a2",))):
             with pytest.raises(Refused, match="a2 is at fault"):
-                order()
+                robot.execute(command)
         robot.move({"a1": 0.0, "a3": 0.0}, duration=3.0)
-    (moment,), (lost,) = seen, cut
     frames = [record for record in sent if record.direction == "tx"]
-    assert any(moving_or_giving_torque(record.data, 2) for record in frames if record.at < lost)
-    heard = [record.data for record in frames if lost < record.at <= moment]
-    looks = [data for data in heard if isinstance(data, bytes) and data[2:7] == bytes((2, 4, READ, 40, 31))]
-    assert 1 <= len(looks) <= 2
-    assert [one for one in frames if one.at > moment and moving_or_giving_torque(one.data, 2)] == []
+    assert any(moves_or_gives_torque(record.data, 2) for record in frames if record.at < moment)
+    assert [one for one in frames if one.at > moment and moves_or_gives_torque(one.data, 2)] == []
+
+
+def moves_or_gives_torque(data: Data, node: int) -> bool:
+    """A write of torque, goal position or goal velocity of this servo, alone or in a SYNC WRITE."""
+    if not isinstance(data, bytes) or data[4] not in (3, 4, 0x83) or data[5] not in range(40, 48):
+        return False
+    if data[4] != 0x83:
+        return data[2] == node and not (data[5] == 40 and data[6] == 0)
+    return node in data[7 : -1 : data[6] + 1]

@@ -1,7 +1,7 @@
-"""Nobody is skipped: a stop, and letting go, visit every axis, whatever happens to some of them on the way.
+"""A stop, a torque-off and the end of a robot visit every axis, whatever fails on the way.
 
-For each axis it is drawn whether it answers as it should, sets an alarm, is dead, or has a driver that fails behind its
-last word; on all families at once. That each was visited is seen by what left for it on the wire.
+For each axis it is drawn whether it answers, has an alarm, is dead, or has a driver that fails. That each axis was
+visited is seen by what left for it on the wire, on all families at once.
 """
 
 from __future__ import annotations
@@ -21,37 +21,39 @@ from motorbus.core.request import Data
 from motorbus.core.steps import catch
 from motorbus.errors import MotorbusError
 from motorbus.families.feetech import disable_torque_all
-from tests.support.machines import Heard, listened, machine
+from tests.support.machines import listen, machine, sent
 
 SERVOS = {f"a{node}": node for node in (1, 2, 3, 4)}
 CANS = {"c1": 0x25, "c2": 0x26}
 NAMES = (*SERVOS, *CANS, "lift")
 FATES = ("well", "well", "alarm", "dead", "raises")
-VERBS = ("stop", "stopped", "disable_torque", "stop group", "let go", "exit", "estop")
+VERBS = ("stop", "verify", "disable_torque", "stop group", "broadcast", "exit", "estop")
 FAILS = "a driver that fails"
 Fates = dict[str, str]
 
 
 def drawn(random: Random) -> Fates:
-    """What befalls each; the alarm of whoever cannot have one is that he is dead."""
+    """A fate for each axis; only a servo can have an alarm."""
     found = {name: random.choice(FATES) for name in NAMES}
     return {name: "dead" if fate == "alarm" and name not in SERVOS else fate for name, fate in found.items()}
 
 
-def befall(robot: Any, sims: Any, fates: Fates) -> None:
-    """Let it happen, when everything has been recognised and has its torque."""
+def inflict(robot: Any, sims: Any, fates: Fates) -> None:
+    """Let it happen to axes that have torque and move."""
     for name, fate in fates.items():
-        axis = robot[name]
-        axis.engaged = axis.under_way = True
-        bus, _, node = axis.spec.device.partition("#")
+        axis = robot.axes[name]
+        axis.status.engaged = axis.status.moving = True
+        device = sims[axis.config.bus][axis.config.node]
         if fate == "dead":
-            sims[bus][int(node, 0)].unplug()
+            device.unplug()
         elif fate == "alarm":
-            sims[bus][int(node, 0)].alarm = 0x20
+            device.alarm = 0x20
         elif fate == "raises":
-            broken = axis.able.names & {"stop", "disable_torque"}
-            axis.able = replace(axis.able, **{name: breaking(getattr(axis.able, name)) for name in broken})
-    listened(sims)
+            broken = axis.driver.names & {"stop", "disable_torque"}
+            axis.driver = replace(
+                axis.driver, **{name: breaking(getattr(axis.driver, name)) for name in broken}
+            )
+    listen(sims)
 
 
 def breaking(inner: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -63,13 +65,8 @@ def breaking(inner: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 def visited(sims: Any) -> set[str]:
-    """For whom something left; what is for everyone counts for nobody."""
-    found: set[str] = set()
-    for bus in ("arm", "can", "stage"):
-        line = sims[bus].line
-        assert isinstance(line, Heard)
-        found |= {name for data in line.sent for name in named(bus, data)}
-    return found
+    """The axes for which something left; a broadcast counts for none."""
+    return {name for bus in sims for data in sent({bus: sims[bus]}) for name in named(bus, data)}
 
 
 def named(bus: str, data: Data) -> list[str]:
@@ -81,19 +78,19 @@ def named(bus: str, data: Data) -> list[str]:
 
 
 def limp(sims: Any, fates: Fates) -> None:
-    """Whoever is not dead has let go."""
+    """Each servo that is not dead has no torque."""
     alive = [node for name, node in SERVOS.items() if fates[name] != "dead"]
     assert [sims["arm"][node].memory["torque_enable"] for node in alive] == [0] * len(alive)
 
 
 def checked(verb: str, sims: Any, fates: Fates, error: BaseException | None) -> None:
-    """Everyone was visited, those who can let go have, and whoever failed is named."""
-    without = {"disable_torque": {*CANS, "lift"}, "let go": {*CANS, "lift"}, "stop group": {"lift"}}
+    """Every axis was visited, those that can are without torque, and each that failed is named."""
+    without = {"disable_torque": {*CANS, "lift"}, "broadcast": {*CANS, "lift"}, "stop group": {"lift"}}
     wanted = set(NAMES) - without.get(verb, set())
     assert visited(sims) >= wanted, (fates, wanted - visited(sims))
-    if verb in ("disable_torque", "let go", "estop", "exit"):
+    if verb in ("disable_torque", "broadcast", "estop", "exit"):
         limp(sims, fates)
-    if verb in ("let go", "estop"):
+    if verb in ("broadcast", "estop"):
         return
     failed = {name for name in wanted if fates[name] in ("dead", "raises")}
     text = f"{error}{getattr(error, '__notes__', '')}"
@@ -112,17 +109,17 @@ MACHINE: dict[str, Any] = {
 
 def blocking(verb: str, fates: Fates) -> None:
     error: BaseException | None = None
-    with machine(**MACHINE) as (made, sims), suppress(MotorbusError):
-        robot = Robot.of(made)
+    with machine(**MACHINE) as (config, sims), suppress(MotorbusError):
+        robot = Robot(config)
         try:
             robot.enable_torque()
-            befall(robot, sims, fates)
+            inflict(robot, sims, fates)
             acts: dict[str, Callable[[], object]] = {
                 "stop": robot.stop,
-                "stopped": lambda: robot.stopped(patience=0.1),
+                "verify": lambda: robot.stop(verify=True),
                 "disable_torque": robot.disable_torque,
                 "stop group": lambda: robot.stop("led"),
-                "let go": lambda: robot.buses["arm"].run(disable_torque_all(SERVOS.values())),  # type: ignore[attr-defined]
+                "broadcast": lambda: robot.buses["arm"].run(disable_torque_all(SERVOS.values())),
                 "exit": robot.close,
                 "estop": robot.estop,
             }
@@ -138,17 +135,17 @@ def blocking(verb: str, fates: Fates) -> None:
 def awaited(verb: str, fates: Fates) -> None:
     async def main() -> None:
         error: BaseException | None = None
-        with machine(**MACHINE) as (made, sims), suppress(MotorbusError):
-            async with AsyncRobot.of(made) as robot:
+        with machine(**MACHINE) as (config, sims), suppress(MotorbusError):
+            async with AsyncRobot(config) as robot:
                 await robot.enable_torque()
-                befall(robot, sims, fates)
+                inflict(robot, sims, fates)
                 acts: dict[str, Callable[[], Awaitable[object]]] = {
                     "stop": robot.stop,
-                    "stopped": lambda: robot.stopped(patience=0.1),
+                    "verify": lambda: robot.stop(verify=True),
                     "disable_torque": robot.disable_torque,
                     "stop group": lambda: robot.stop("led"),
-                    "let go": lambda: robot.buses["arm"].run(disable_torque_all(SERVOS.values())),  # type: ignore[attr-defined]
-                    "exit": robot.close,
+                    "broadcast": lambda: robot.buses["arm"].run(disable_torque_all(SERVOS.values())),
+                    "exit": lambda: robot.__aexit__(None, None, None),
                     "estop": lambda: asyncio.to_thread(robot.estop),
                 }
                 try:
@@ -162,7 +159,7 @@ def awaited(verb: str, fates: Fates) -> None:
 
 @pytest.mark.parametrize("verb", VERBS)
 @pytest.mark.parametrize("face", [blocking, awaited], ids=["blocking", "async"])
-def test_08_nobody_is_skipped_whoever_fails(
+def test_08_every_axis_is_visited_whatever_fails(
     face: Callable[[str, Fates], None], verb: str, rounds: Callable[[int], int]
 ) -> None:
     random = Random(VERBS.index(verb))
@@ -173,7 +170,7 @@ def test_08_nobody_is_skipped_whoever_fails(
 @pytest.mark.parametrize("face", [blocking, awaited], ids=["blocking", "async"])
 @pytest.mark.parametrize("fate", ["alarm", "dead", "raises"])
 @pytest.mark.parametrize("verb", VERBS)
-def test_08_nobody_is_skipped_when_all_fail_at_once(
+def test_08_every_axis_is_visited_when_all_fail(
     face: Callable[[str, Fates], None], verb: str, fate: str
 ) -> None:
     face(verb, {name: "dead" if fate == "alarm" and name not in SERVOS else fate for name in NAMES})

@@ -1,9 +1,8 @@
-"""A program that is killed in the midst of a movement: what it led goes on by no more than its last small goal.
+"""A program that is killed in the middle of a move: its axes go no farther than the last bounded goal.
 
-Real processes on real ports: a simulator for each bus, and the program, which SIGKILL ends: by its own hand as an order
-is about to leave, or from outside at any moment. Before each order the program writes down where each device was by its
-last reply and where the order sends it, both decoded from the bytes on the port.
-What the motors do is asked of the simulators. Whoever connects afterwards changes nothing.
+Real processes on real ports: a simulator for each bus, and the program, which SIGKILL ends as a goal is about to leave,
+or from outside at any moment. Before each goal the program writes where each device was by its last reply and where the
+goal is, both decoded from the bytes on the port. Who connects afterwards writes nothing.
 """
 
 from __future__ import annotations
@@ -21,10 +20,10 @@ from threading import Timer
 from typing import Any, NamedTuple
 
 import pytest
-from motorbus.session.robot import Robot
 
+from motorbus import Robot
 from tests.conftest import Rounds
-from tests.support.machines import described
+from tests.support.machines import file_text
 from tests.support.processes import Simulated
 
 PROGRAM = """
@@ -122,7 +121,7 @@ def served(tmp_path: Path, unhurried: None, monkeypatch: pytest.MonkeyPatch) -> 
     ):
         file = tmp_path / "motorbus.toml"
         addresses = {"arm": arm.bus, "can": can.bus}
-        file.write_text(described(addresses, "1-3", "0x25", False, {}, {}), encoding="utf-8")
+        file.write_text(file_text(addresses, "1-3", "0x25"), encoding="utf-8")
         yield Served(control, file)
 
 
@@ -168,12 +167,10 @@ def at_rest(served: Served) -> dict[Spot, tuple[float, float, bool]]:
 
 
 @pytest.mark.timeout(0)
-def test_d15_what_was_led_goes_no_farther_than_its_last_goal_and_connecting_changes_nothing(
-    served: Served, rounds: Rounds
-) -> None:
+def test_a_killed_program_moves_nothing_beyond_its_last_goal(served: Served, rounds: Rounds) -> None:
     chance = Random(8)
     caught = 0
-    for seed in range(rounds(100_000, 5_000) // 500):
+    for seed in range(rounds(100_000, 3_000) // 500):
         stood = served.places()  # who was not heard before the first order was not sent anywhere yet
         own = seed % 2 == 0  # the other half is killed from outside
         last = killed(

@@ -1,7 +1,4 @@
-"""An emergency stop stays in force until somebody says otherwise, whoever asks, by whatever spelling, on every bus.
-
-Nothing that moves or gives torque leaves: what is sent after it is looked at on the wire.
-"""
+"""An emergency stop is latched on every bus until `reset`: no spelling of a motion or torque request leaves."""
 
 from __future__ import annotations
 
@@ -17,14 +14,14 @@ from threading import Thread
 from typing import Any
 
 import pytest
-from tests.safety.points import asks, sent
 
 from motorbus import AsyncRobot, Interrupted, Robot, feetech, kst
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Data, Effect, Request
 from motorbus.core.setpoint import Setpoint
-from motorbus.errors import MotorbusError
-from tests.support.machines import listened, machine
+from motorbus.errors import MotorbusError, RequestError
+from motorbus.motion.commands import Move, Torque, WriteRegisters
+from tests.support.machines import asks, listen, machine, sent
 
 ROOT = Path(__file__).parents[2]
 
@@ -49,34 +46,28 @@ def raw(bus: Any, node: int) -> object:
 
 
 FACES: dict[str, Callable[[Robot], object]] = {
-    "axis move": lambda robot: robot["a1"].move(0.1),
-    "axis move_by": lambda robot: robot["c1"].move_by(0.1),
-    "axis jog": lambda robot: robot["a2"].jog(0.2, 0.5),
-    "axis torque": lambda robot: robot["a1"].enable_torque(),
-    "axis hold": lambda robot: robot["a1"].hold(),
-    "lift jog": lambda robot: robot["lift"].jog(0.01, 0.5),
-    "lift move": lambda robot: robot["lift"].move(0.05),
-    "lift home": lambda robot: robot["lift"].home(deadline=1.0),
-    "lift program": lambda robot: robot["lift"].run(1),
-    "robot move": lambda robot: robot.move({"a1": 0.1, "c1": 0.1, "lift": 0.05}),
-    "robot torque": lambda robot: robot.enable_torque(),
-    "robot hold": lambda robot: robot.hold("arm"),
-    "robot home": lambda robot: robot.home(deadline=1.0),
-    "robot park": lambda robot: robot.park("a1"),
-    "robot pose": lambda robot: robot.pose("ready"),
-    "robot loop": lambda robot: _loop(robot),
+    "move": lambda robot: robot.move({"a1": 0.1, "c1": 0.1}),
+    "relative": lambda robot: robot.move({"c1": 0.1}, relative=True),
+    "pose": lambda robot: robot.pose("ready"),
+    "jog": lambda robot: robot.jog("a2", 0.2, 0.5),
+    "torque": lambda robot: robot.enable_torque(),
+    "lift jog": lambda robot: robot.jog("lift", 0.01, 0.5),
+    "lift home": lambda robot: robot.home("lift", timeout=1.0),
+    "lift program": lambda robot: robot.run("lift", 1),
+    "loop": lambda robot: _loop(robot),
+    "command": lambda robot: robot.execute(Torque(on=True)),
+    "register": lambda robot: robot.execute(WriteRegisters("a1", {"goal_position": 3.0})),
     "servo move": lambda robot: robot["a1"].device.move(3.0, velocity=0.5),
     "servo torque": lambda robot: robot["a1"].device.enable_torque(),
     "servo write": lambda robot: robot["a1"].device.write(goal_position=3.0),
     "servo reg_write": lambda robot: robot["a1"].device.reg_write(goal_position=3.0),
     "servo action": lambda robot: robot["a1"].device.action(),
-    "servo velocity": lambda robot: robot["a1"].device.set_velocity(0.1),
     "can move": lambda robot: robot["c1"].device.move(0.1),
     "sync write": lambda robot: _on(
-        robot, "arm", feetech.ServoGroup([_known(robot)]).write("goal_position")([3.14])
+        robot, "arm", feetech.ServoGroup([robot["a1"].device]).write("goal_position")([3.14])
     ),
     "reg write all": lambda robot: _on(
-        robot, "arm", feetech.reg_write_all({_known(robot): {"goal_position": 3.1}})
+        robot, "arm", feetech.reg_write_all({robot["a1"].device: {"goal_position": 3.1}})
     ),
     "action all": lambda robot: _on(robot, "arm", feetech.action_all([robot["a1"].device])),
     "broadcast": lambda robot: _on(
@@ -89,85 +80,74 @@ FACES: dict[str, Callable[[Robot], object]] = {
 
 
 def _on(robot: Robot, bus: str, operation: Any) -> object:
-    return robot.buses[bus].run(operation)  # type: ignore[attr-defined]
-
-
-def _known(robot: Robot) -> Any:
-    robot["a1"].device.prepare() if hasattr(robot["a1"].device, "prepare") else None
-    return robot["a1"].device
+    return robot.buses[bus].run(operation)
 
 
 def _loop(robot: Robot) -> None:
-    with robot.loop(rate=50) as loop:
-        for number, _ in enumerate(loop):
-            loop.goal["a1"] = 0.1
-            if number > 5:
+    with robot.loop(50, "a1") as loop:
+        loop.set_target("a1", 0.1)
+        for state in loop:
+            if state.number > 5:
                 break
 
 
-READY = '[pose.ready]\na1 = "0.1 rad"\nc1 = "0.1 rad"\n'
 PARTS: dict[str, Any] = {
     "arm": "1-2",
     "can": "0x25",
     "lift": True,
-    "extra": READY,
-    "axes": {"a1": {"park": "10 deg"}},
+    "extra": {"pose": {"ready": {"a1": "0.1 rad", "c1": "0.1 rad"}}},
 }
 
 
 @pytest.mark.parametrize("face", FACES)
-def test_06_nothing_moves_while_it_is_in_force_from_no_face(face: str) -> None:
-    with machine(**PARTS) as (made, sims), Robot.of(made) as robot:
+def test_06_nothing_leaves_while_it_is_latched(face: str) -> None:
+    with machine(**PARTS) as (config, sims), Robot(config) as robot:
         with robot.attended():
-            robot["lift"].declare(0.02)
+            robot.set_position("lift", 0.02)
             robot.enable_torque()
             robot.estop()
-            listened(sims)
+            listen(sims)
             with pytest.raises(MotorbusError):
                 FACES[face](robot)
             assert [data for data in sent(sims) if moves(data)] == []
         assert [data for data in sent(sims) if moves(data)] == []
 
 
-@pytest.mark.parametrize(
-    "face", ["axis move", "lift jog", "servo move", "sync write", "start project", "raw"]
-)
-def test_06_each_of_these_would_have_moved_something(face: str) -> None:
-    with machine(**PARTS) as (made, sims), Robot.of(made) as robot, robot.attended():
-        robot["lift"].declare(0.02)
+@pytest.mark.parametrize("face", ["move", "lift jog", "servo move", "sync write", "start project", "raw"])
+def test_06_each_of_these_moves_after_a_reset(face: str) -> None:
+    with machine(**PARTS) as (config, sims), Robot(config) as robot, robot.attended():
+        robot.set_position("lift", 0.02)
         robot.enable_torque()
         robot.estop()
         robot.reset()
-        listened(sims)
+        listen(sims)
         with suppress(MotorbusError):
             FACES[face](robot)
         assert [data for data in sent(sims) if moves(data)]
 
 
-def test_06_it_outlives_the_machine_being_closed_and_opened_again() -> None:
-    async def main() -> None:
-        with machine(arm="1-2", can="0x25") as (made, sims):
-            robot = AsyncRobot.of(made)
+def test_06_an_async_robot_stays_latched_until_reset() -> None:
+    async def run() -> None:
+        with machine(arm="1-2", can="0x25") as (config, sims):
+            robot = AsyncRobot(config)
             async with robot:
                 await robot.enable_torque()
                 robot.estop()
-            async with robot:
-                assert all(bus.latched for bus in robot.buses.values())
-                listened(sims)
-                for act in (robot.enable_torque, lambda: robot.move({"c1": 0.1})):
+                listen(sims)
+                for command in (Torque(on=True), Move({"c1": 0.1})):
                     with pytest.raises(Interrupted):
-                        await act()
+                        await robot.execute(command)
                 assert [data for data in sent(sims) if not asks(data)] == []
                 robot.reset()
                 await robot.enable_torque()
-            async with robot:
-                assert not any(bus.latched for bus in robot.buses.values())
+            with pytest.raises(RequestError, match="closed"):
+                await robot.__aenter__()
 
-    asyncio.run(main())
+    asyncio.run(run())
 
 
-def test_06_once_more_is_as_good_as_once_and_from_several_threads() -> None:
-    with machine(arm="1-3", can="0x25", lift=True, options=_real()) as (made, sims), Robot.of(made) as robot:
+def test_06_from_several_threads() -> None:
+    with machine(arm="1-3", can="0x25", lift=True, options=_real()) as (config, sims), Robot(config) as robot:
         robot.enable_torque()
         found: list[Any] = []
         threads = [Thread(target=lambda: found.append(robot.estop())) for _ in range(4)]
@@ -186,8 +166,8 @@ def _real() -> dict[str, dict[str, str]]:
     return {bus: {"clock": "real"} for bus in ("arm", "can", "stage")}
 
 
-def test_06_without_a_thread_to_be_had_every_bus_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
-    with machine(arm="1-2", can="0x25") as (made, sims), Robot.of(made) as robot:
+def test_06_without_threads_every_bus_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    with machine(arm="1-2", can="0x25") as (config, sims), Robot(config) as robot:
         robot.enable_torque()
 
         def exhausted(self: Thread) -> None:
@@ -204,13 +184,12 @@ def test_06_without_a_thread_to_be_had_every_bus_is_stopped(monkeypatch: pytest.
 PROGRAM = """
 import signal, sys
 from motorbus import Interrupted, Robot
-from tests.support.machines import machine
+from tests.support.machines import asks, listen, machine, sent
 
 real = {"arm": {"clock": "real"}, "can": {"clock": "real"}}
-with machine(arm="1-2", can="0x25", options=real) as (made, sims), Robot.of(made) as robot:
+with machine(arm="1-2", can="0x25", options=real) as (config, sims), Robot(config) as robot:
     signal.signal(signal.SIGUSR1, lambda *_: robot.trigger_estop())
     robot.enable_torque()
-    robot.hold()
     print("ready", flush=True)
     try:
         robot.move({"a1": 2.0, "c1": 0.8}, duration=60.0)
@@ -225,7 +204,7 @@ with machine(arm="1-2", can="0x25", options=real) as (made, sims), Robot.of(made
 """
 
 
-def test_06_a_signal_handler_may_ask_for_it_in_the_middle_of_a_movement() -> None:
+def test_06_from_a_signal_handler_in_the_middle_of_a_move() -> None:
     with subprocess.Popen(
         [sys.executable, "-c", PROGRAM],
         env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "src")])},

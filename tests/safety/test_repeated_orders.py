@@ -8,12 +8,11 @@ from math import pi
 from typing import Any
 
 import pytest
-from motorbus.session.robot import Robot
-from tests.safety.points import known, sent
 
+from motorbus import Robot
 from motorbus.errors import LimitExceeded
 from motorbus.families.feetech import ServoGroup
-from tests.support.machines import listened, machine
+from tests.support.machines import listen, machine, sent
 
 AXES = {name: {"low": "-60 deg", "high": "60 deg", "max_step": "15 deg"} for name in ("a1", "a2")}
 SYNC_WRITE = 0x83
@@ -35,12 +34,12 @@ def goals(sims: Any) -> int:
 @contextmanager
 def ordered() -> Iterator[tuple[Any, Any, Any, Any]]:
     """Two servos whose loop has sent one order: bus, nodes, writer of orders, simulations."""
-    with machine(arm="1-2", axes=AXES) as (made, sims), Robot.of(made) as robot:
-        listened(sims)
-        nodes = [known(robot["a1"]), known(robot["a2"])]
+    with machine(arm="1-2", axes=AXES) as (config, sims), Robot(config) as robot:
+        listen(sims)
+        nodes = [robot["a1"].device, robot["a2"].device]
         writer = ServoGroup(nodes).write("goal_position")
         robot.positions()
-        robot.buses["arm"].run(writer([pi, pi]))  # type: ignore[attr-defined]
+        robot.buses["arm"].run(writer([pi, pi]))
         robot.positions()
         yield robot.buses["arm"], nodes, writer, sims
 
@@ -70,11 +69,11 @@ def test_old_positions_are_read_again_before_the_goal_is_sent(way: Any) -> None:
 
 def test_a_limit_of_the_device_inside_that_of_the_axis_counts() -> None:
     axes = {"a1": {"low": "-60 deg", "high": "60 deg", "max_step": "60 deg"}}
-    with machine(arm="1", axes=axes) as (made, sims):
+    with machine(arm="1", axes=axes) as (config, sims):
         sims["arm"][1].memory["max_position_limit"] = 2248  # 0.307 rad above the middle
-        with Robot.of(made) as robot:
+        with Robot(config) as robot:
             bus: Any = robot.buses["arm"]
-            device = known(robot["a1"])
+            device = robot["a1"].device
             robot.positions()
             bus.run(ServoGroup([device]).write("goal_position")([pi + 0.02]))
             robot.positions()

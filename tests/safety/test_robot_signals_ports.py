@@ -1,4 +1,4 @@
-"""A program on real ports, each served by a process of its own, that is told to end in the midst of its movements."""
+"""A program on a real port of each family that gets signals in the middle of a motion."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from tests.support.machines import described
+from tests.support.machines import file_text
 from tests.support.processes import Simulated
 
 PROGRAM = """
@@ -23,12 +23,14 @@ from motorbus.link import usb_adapters
 usb_adapters.TERMINAL_LATENCY = 1.0  # whoever answers may have to wait for a processor
 with Robot.load(sys.argv[1]) as robot:
     if "lift" in robot.axes:
-        robot["lift"].declare(0.0)
-    if "a1" in robot.axes:
+        robot.set_position("lift", 0.0)
+        print("ready", flush=True)
+        robot.jog("lift", 0.003, 60.0)
+    else:
         robot.enable_torque()
-    print("ready", flush=True)
-    ways = {"a1": 2.0, "a2": -2.0, "c1": 0.8, "lift": 0.2}
-    robot.move({name: ways[name] for name in robot.axes}, duration=60.0)
+        print("ready", flush=True)
+        ways = {"a1": 2.0, "a2": -2.0, "c1": 0.8}
+        robot.move({name: ways[name] for name in robot.axes}, duration=60.0)
 """
 LOOKS = 100_000
 
@@ -84,12 +86,10 @@ def test_it_leaves_its_machine_as_the_file_says(
         file = tmp_path / "motorbus.toml"
         there = {"arm": "", "can": "", **({bus: ids[bus]} if bus in ids else {})}
         axes = {"a1": {"exit": "torque_off"}, "a2": {"exit": "hold"}}
-        file.write_text(
-            described(
-                {bus: simulated.bus}, there["arm"], there["can"], bus == "stage", axes, {"exit": "hold"}
-            ),
-            encoding="utf-8",
+        text = file_text(
+            {bus: simulated.bus}, there["arm"], there["can"], bus == "stage", axes=axes, exit="hold"
         )
+        file.write_text(text, encoding="utf-8")
         assert ended(file, *signals) == code
         for _ in range(LOOKS):
             found = status(control)

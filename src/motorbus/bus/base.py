@@ -371,13 +371,6 @@ class BaseBus:
         self.watches.remove(tree)
         tree.drop()
 
-    def attach(self, gate: Any) -> None:
-        """Let the gate see positions and stops of this bus, and ask it which reads a request requires first."""
-        nodes = self.engine.nodes
-        gate.watch(nodes, self.link.now, nodes.last_stop, nodes.accepted_count)
-        self.interlock = gate
-        self.on_reconnect(gate.forget)
-
     def expect_echo(self, test: Request[Any]) -> None:
         """Let the next reply to this request show whether the adapter echoes."""
         self.engine.echo.test = test

@@ -148,7 +148,7 @@ class Bus(BaseBus):
                 return PENDING
         self.hand_over()
         assert attempt.accepted is not None
-        return decode(engine, request, attempt.accepted)
+        return decode(request, attempt.accepted)
 
     def _rest_of(self, attempt: Attempt, chunks: list[Any]) -> bytes:
         """The whole reply, which comes in pieces."""

@@ -6,12 +6,11 @@ node has left since: a goal at an old position would be an order to move back.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Final, Protocol
 
 from motorbus.core.family import BusDriver, Stop
-from motorbus.core.request import ANY, Effect, Expected, Priority, Request, Response
+from motorbus.core.request import ANY, Effect, Priority, Request, Response
 from motorbus.core.setpoint import Setpoint, Stays
 
 FRESH: Final = 0.02
@@ -49,8 +48,6 @@ class Nodes(Mapping[int, Reading]):
         """By node, the epoch of its last stop; `stopped_all` is that of the last stop of all."""
         self.sources: dict[int, Source] = {}
         self._ordered: dict[tuple[int, ...], int] = {}  # by the nodes that an order was for (empty: all)
-        self._accepted: Counter[int] = Counter()
-        self._stop_replies: dict[int, set[Expected]] = {}  # of a stop that takes several requests
 
     # -- positions ---------------------------------------------------------------------------------------------
 
@@ -85,7 +82,7 @@ class Nodes(Mapping[int, Reading]):
     # -- orders and stops --------------------------------------------------------------------------------------
 
     def ordered(self, request: Request[Any]) -> None:
-        """An order leaves: positions read and stops acknowledged before it count no longer for its nodes."""
+        """An order leaves: positions read before it count no longer for its nodes."""
         nodes = tuple(request.setpoint_nodes)
         if not self.known.issuperset(nodes):
             self.known = self.known.union(nodes)
@@ -94,8 +91,6 @@ class Nodes(Mapping[int, Reading]):
                 nodes = tuple(addressed(request))
             self.orders += 1
             self._ordered[nodes] = self.orders
-            for node in (nodes or self.known) if self._stop_replies else ():
-                self._stop_replies.pop(node, None)
 
     def stopped(self, request: Request[Any]) -> None:
         """A stop leaves: motion of its nodes that waits to be sent is withdrawn."""
@@ -116,53 +111,17 @@ class Nodes(Mapping[int, Reading]):
         return self.stopped_all > since or any(self.stops.get(node, 0) > since for node in nodes)
 
     def forget(self) -> None:
-        """The devices may have restarted: no position or acknowledgement counts any more."""
+        """The devices may have restarted: no position counts any more."""
         self.sources.clear()
-        self._stop_replies.clear()
 
-    # -- acknowledged stops ------------------------------------------------------------------------------------
-
-    def stop_requests(self, now: float) -> Stop:
-        """Requests that stop all known nodes; without positions where the family fails to use them."""
+    def stop_requests(self, now: float, nodes: Iterable[int]) -> Stop:
+        """Requests that stop these nodes; without positions where the family fails to use them."""
+        fresh = self.fresh(now)
+        wanted = {node: fresh.get(node) for node in sorted(nodes)}
         try:
-            return self.driver.stop(self.fresh(now))
+            return self.driver.stop(wanted)
         except Exception:  # the stop must go out
-            return self.driver.stop(dict.fromkeys(sorted(self.known)))
-
-    def forget_stop_replies(self) -> None:
-        """A new stop begins: replies to an earlier one do not count for it."""
-        self._stop_replies.clear()
-
-    def acknowledge(self, request: Request[Any], answer: Response) -> None:
-        """This request was answered and not refused: nodes that it stops have accepted a stop."""
-        if request.effect not in GATED or request.expected is ANY:
-            return
-        answered = [due for due in request.expected if due.node not in answer.missing]
-        if request.priority is Priority.STOP:
-            for due in answered:
-                replies = self._stop_replies.setdefault(due.node, set())
-                replies.add(due)
-                if len(replies) >= self._stop_reply_count(due.node):
-                    self._accept(due.node)
-        elif request.deferred is None:
-            resting = {goal.node for goal in request.setpoints if rests(goal)}
-            for due in answered:
-                if due.node in resting:
-                    self._accept(due.node)
-
-    def _accept(self, node: int) -> None:
-        self._stop_replies.pop(node, None)
-        self._accepted[node] += 1
-
-    def accepted_count(self, node: int) -> int:
-        """Number of stops that this node has acknowledged."""
-        return self._accepted[node]
-
-    def _stop_reply_count(self, node: int) -> int:
-        """Number of different replies that this node gives to the requests of a stop."""
-        requests = self.driver.stop(dict.fromkeys(sorted(self.known))).requests
-        gated = [one.expected for one in requests if one.effect in GATED and one.expected is not ANY]
-        return max(1, len({due for expected in gated for due in expected if due.node == node}))
+            return self.driver.stop(dict.fromkeys(wanted))
 
 
 def rests(goal: Setpoint) -> bool:
@@ -174,7 +133,7 @@ def moves(request: Request[Any]) -> bool:
     """The request moves something or switches torque on."""
     if request.effect not in GATED or request.priority is Priority.STOP:
         return False
-    return request.prechecked or not request.setpoints or not all(map(rests, request.setpoints))
+    return not request.setpoints or not all(map(rests, request.setpoints))
 
 
 def addressed(request: Request[Any]) -> set[int]:

@@ -125,19 +125,18 @@ class Part:
 
     @property
     def is_idle(self) -> bool:
-        """Nothing of it is in flight or waits to be sent."""
-        return not self.bus.engine.in_flight and not any(tree.sending for tree in self._stepped)
+        """Nothing is in flight, and nothing of it may be sent: it sleeps, or another thread has exclusive use."""
+        return not self.bus.engine.in_flight and self.sends_at == inf
 
     def release_turn(self) -> None:
-        """Release the turn if all has ended, a stop waits for it, or the bus is idle and not exclusive.
+        """Release the turn if all has ended, a stop waits for it, or the bus is idle.
 
         A tree that waits for a notice keeps it until another thread wants it.
         """
         if not self.holds_turn:
             return
-        engine = self.bus.engine
-        waits = engine.exclusive is not None or (engine.notification_handlers and not self.bus.turn.wanted)
-        if self.finished or self.bus.waits_for_stop or (not waits and self.is_idle):
+        listens = self.bus.engine.notification_handlers and not self.bus.turn.wanted
+        if self.finished or self.bus.waits_for_stop or (not listens and self.is_idle):
             self.holds_turn = False
             self.bus.turn.release()
 
@@ -146,13 +145,18 @@ class Part:
         return min(self.sends_at, *[tree.next_moment() for tree in self._stepped])
 
     def wait(self) -> None:
-        """Wait for data, a deadline, or the next moment of a tree; without the turn sleep for at most `IDLE`."""
+        """Wait for data, a deadline, or the next moment of a tree; without the turn sleep."""
         bus, moment = self.bus, self.next_moment()
         if self.holds_turn:
             listens = self.is_idle and bus.engine.notification_handlers and not bus.link.virtual
             bus.receive(min(moment, bus.link.now() + LISTEN_TIME) if listens else moment, self._stepped)
         elif not bus.waits_for_stop:
-            self._sleep(min(moment - bus.link.now(), IDLE))
+            self._sleep(min(moment - bus.link.now(), self.longest_sleep))
+
+    @property
+    def longest_sleep(self) -> float:
+        """s after which it looks at the bus again; the end of exclusive use wakes no thread."""
+        return IDLE if self.bus.engine.exclusive is None else LISTEN_TIME
 
     def _sleep(self, seconds: float) -> None:
         """Sleep this long, or until something that a tree waits for has ended."""
@@ -233,7 +237,7 @@ def wait_for(parts: Sequence[Part]) -> None:
 
 def _poll(parts: Sequence[Part]) -> None:
     """One wait on the descriptors of all links, then take what has come."""
-    descriptors, seconds = [], IDLE
+    descriptors, seconds = [], min(part.longest_sleep for part in parts)
     for part in parts:
         descriptor = part.bus.link.fileno()
         if part.blocked or (part.holds_turn and descriptor is None):

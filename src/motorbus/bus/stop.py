@@ -16,24 +16,79 @@ import os
 import select
 import socket
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from threading import Lock, Thread, current_thread
 from typing import Any, Final, Protocol
 from weakref import ref
 
 from motorbus.bus.engine import Engine
-from motorbus.bus.stop_rounds import stop_in_rounds
+from motorbus.bus.nodes import GATED
 from motorbus.bus.stop_socket import LONGEST, STOP_TIMEOUT, StopOutcome, asked_by, client_name, open_socket
 from motorbus.bus.tasks import Tree
 from motorbus.bus.turn import Turn
-from motorbus.core.request import Priority, Request
+from motorbus.core.request import ANY, Priority, Request
+from motorbus.core.steps import Sleep, catch, gather
 from motorbus.errors import LinkError, LinkFull, LinkLost
 from motorbus.link.base import Link
 
 ROUNDS_TIME: Final = 3.0
 """s for all rounds of a stop, less than `STOP_TIMEOUT`."""
+ROUNDS: Final = 5
+SHORTEST_ROUND: Final = 0.05
+"""s of a round in which an acknowledgement is missing: a port that was full may have room after it."""
 STOP, END = b"!", b"."
+
+
+async def stop_nodes(engine: Engine, now: Callable[[], float]) -> StopOutcome:
+    """Stop all known nodes, in at most five rounds: each until it has acknowledged. The engine is latched."""
+    nodes = engine.nodes
+    acknowledged: set[int] = set()
+    rounds, promise = 0, "nothing: the bus only listens"
+    while rounds < ROUNDS and not engine.listening:
+        begun = now()
+        requests, promise = nodes.stop_requests(begun, nodes.known - acknowledged)
+        work: dict[int, list[Request[Any]]] = {}
+        for one in requests:
+            if node_of(one) not in acknowledged:
+                work.setdefault(node_of(one), []).append(one)
+        if not work:
+            break
+        rounds += 1
+        found = await gather(*[_stop_node(engine, node, work[node], now) for node in work])
+        acknowledged.update(node for node, is_stopped in zip(work, found, strict=True) if is_stopped)
+        if acknowledged and acknowledged >= nodes.known:
+            break
+        await catch(Sleep(begun + SHORTEST_ROUND - now()))
+    silent = tuple(sorted(nodes.known - acknowledged))
+    return StopOutcome(tuple(sorted(acknowledged)), silent, rounds, promise)
+
+
+async def _stop_node(
+    engine: Engine, node: int, requests: Sequence[Request[Any]], now: Callable[[], float]
+) -> bool:
+    """Send each of these; True if the node has acknowledged. If one reads a position, hold the node there."""
+    accepted = []
+    for request in requests:
+        try:
+            await request
+        except Exception:  # also of the driver: the rest is sent all the same
+            accepted.append(False)
+            continue
+        if not request.expected:
+            continue
+        if request.effect in GATED:
+            accepted.append(True)
+            continue
+        holds, _ = engine.nodes.stop_requests(now(), (node,))
+        holds = tuple(one for one in holds if one.effect in GATED and node_of(one) == node)
+        accepted.append(bool(holds) and await _stop_node(engine, node, holds, now))
+    return bool(accepted) and all(accepted)
+
+
+def node_of(request: Request[Any]) -> int:
+    """The node that answers this request, -1 for none."""
+    return -1 if not request.expected or request.expected is ANY else request.expected[0].node
 
 
 class StoppableBus(Protocol):
@@ -127,7 +182,7 @@ class EmergencyStop:
         bus, engine = self.bus, self.bus.engine
         if bus.turn.acquire(Priority.STOP, engine.stop_delay(bus.now())):
             return self._stop_with_turn(by)
-        stop = engine.nodes.stop_requests(bus.now())
+        stop = engine.nodes.stop_requests(bus.now(), engine.nodes.known)
         disturbs_no_reply = [request for request in stop.requests if not request.expected]
         for request in disturbs_no_reply or stop.requests:
             engine.note_stop(request)
@@ -156,7 +211,7 @@ class EmergencyStop:
         try:
             engine.latch(bus.now(), by)
             self._restore_rate()
-            tree = Tree(engine, stop_in_rounds(engine, bus.now), now=bus.now)
+            tree = Tree(engine, stop_nodes(engine, bus.now), now=bus.now)
             tree.deadline = bus.now() + ROUNDS_TIME
             while not tree.advance():
                 moment = bus.send((tree,))

@@ -289,7 +289,7 @@ class Tree(Generic[T]):
 
     def _decode(self, task: Task, request: Request[Any], answer: Response) -> None:
         try:
-            value = decode(self.engine, request, answer)
+            value = decode(request, answer)
         except Exception as error:  # a refusal of the device, or an error of the driver
             self.ready.append((task, None, error))
         else:
@@ -586,12 +586,9 @@ class Tree(Generic[T]):
         return [task, *(leaf for child in task.children for leaf in self._waiting(child))]
 
 
-def decode(engine: Engine, request: Request[Any], answer: Response) -> Any:
-    """The value of an answered request; the stop that it acknowledges is noted if it is no refusal."""
-    value = answer if request.decode is None else request.decode(answer)
-    if request.effect in GATED and request.expected:
-        engine.nodes.acknowledge(request, answer)
-    return value
+def decode(request: Request[Any], answer: Response) -> Any:
+    """The value of an answered request."""
+    return answer if request.decode is None else request.decode(answer)
 
 
 def in_order(trees: Sequence[Tree[Any]]) -> list[Attempt | Pause]:

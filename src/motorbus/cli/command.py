@@ -11,10 +11,11 @@ from typing import Any
 
 from msgspec import Struct
 
+from motorbus.cli.common import Common, Target, Writing
 from motorbus.cli.dryrun import carry_out
 from motorbus.cli.output import emit
 from motorbus.cli.registers import assignments, map_of, parse_value
-from motorbus.cli.target import Common, Target, Writing, bus_address, open_devices
+from motorbus.cli.target import bus_address, open_devices
 from motorbus.core import units
 from motorbus.errors import RequestError
 

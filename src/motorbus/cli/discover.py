@@ -11,10 +11,10 @@ from typing import Annotated, Any, Final
 from cyclopts import Parameter
 from msgspec import Meta, Struct
 
-from motorbus.cli.main import Partial
+from motorbus.cli.common import Common, Partial, Target
 from motorbus.cli.output import emit, note, progress
 from motorbus.cli.registers import Value, read_values
-from motorbus.cli.target import Common, Target, load_machine, open_bus, open_devices
+from motorbus.cli.target import load_machine, open_bus, open_devices
 from motorbus.core import units
 from motorbus.core.family import AxisDriver, Found
 from motorbus.core.steps import Progress

@@ -17,7 +17,7 @@ from motorbus.errors import MotorbusError
 
 if TYPE_CHECKING:
     from motorbus.bus.blocking import Bus
-    from motorbus.cli.target import Target, Writing
+    from motorbus.cli.common import Target, Writing
     from motorbus.core.family import Explanation
     from motorbus.motion.profile import Kind
     from motorbus.motion.robot import Robot

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Final
 from cyclopts import Parameter
 from msgspec import Struct
 
-from motorbus.cli.main import Partial
+from motorbus.cli.common import Common, Partial
 from motorbus.cli.motion import with_others
 from motorbus.cli.output import emit, note
-from motorbus.cli.target import Common, bus_address, is_address, load_machine, open_bus
+from motorbus.cli.target import bus_address, is_address, load_machine, open_bus
 from motorbus.core.steps import catch, gather
 from motorbus.errors import LinkError, MotorbusError, NoReply, PortNotFound, RequestError
 from motorbus.session import lock_name, parse_address
@@ -50,9 +50,9 @@ def estop(
 
     Examples:
 
-    motorbus estop
-    motorbus estop feetech:/dev/ttyACM0#1-6
-    motorbus estop arm --all
+      motorbus estop
+      motorbus estop feetech:/dev/ttyACM0#1-6
+      motorbus estop arm --all
     """
     from motorbus.link.lock import holders, is_simulated, real_name
 
@@ -163,7 +163,7 @@ def _judge(stops: list[StoppedBus], errors: list[MotorbusError]) -> None:
         nothing = RequestError(
             "no bus is open on a real port, and none was named", expected="BUS, as feetech:/dev/ttyACM0"
         )
-        raise with_others([*errors, nothing])
+        raise with_others([*errors] or [nothing])
     heard = [one for one in stops if one.acknowledged]
     silent = [
         f"{one.bus}: no acknowledgement from {_list(one)}"

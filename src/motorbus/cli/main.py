@@ -9,37 +9,13 @@ import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from enum import IntEnum
 from typing import TYPE_CHECKING, Any, Final
 
 from motorbus import __version__, errors
+from motorbus.cli.common import Exit, NeedsConsent, Partial
 
 if TYPE_CHECKING:
     from cyclopts import App
-
-
-class Exit(IntEnum):
-    """Exit codes of the program."""
-
-    OK = 0
-    FAILURE = 1
-    USAGE = 2
-    PORT_NOT_FOUND = 3
-    PORT_BUSY = 4
-    NO_REPLY = 5
-    PARTIAL = 6
-    DEVICE_REFUSED = 7
-    UNSAFE = 8
-    VERIFICATION_FAILED = 9
-    CANCELLED = 10
-
-
-class NeedsConsent(errors.MotorbusError):
-    """The action needs --yes. Nothing was changed."""
-
-
-class Partial(errors.MotorbusError):
-    """Some devices did it, others did not."""
 
 
 CODES: Final[Mapping[type[BaseException], Exit]] = {

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import nullcontext
 from inspect import signature
+from math import inf
 from os import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -13,21 +13,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 from msgspec import Struct
 
-from motorbus.cli.dryrun import carry_out
-from motorbus.cli.main import Partial
-from motorbus.cli.output import emit, note
-from motorbus.cli.target import (
-    Common,
-    Target,
-    Writing,
-    is_address,
-    load_machine,
-    open_bus,
-    open_devices,
-    open_robot,
-    parse_quantity,
-)
+from motorbus.cli.common import Common, Partial, Target, Writing
+from motorbus.cli.dryrun import FAR, carry_out, execute
+from motorbus.cli.output import confirm, emit, note, print_table
+from motorbus.cli.target import is_address, load_machine, open_bus, open_devices, open_robot, parse_quantity
 from motorbus.errors import LinkError, MotorbusError, RequestError, VerificationFailed
+from motorbus.motion.commands import LoopResult, Move, MoveResult, Pose, StopResult, StopState
 from motorbus.session.address import parse_address
 
 if TYPE_CHECKING:
@@ -116,6 +107,42 @@ def until_enter() -> Callable[[], bool]:
     return pressed
 
 
+class Planned(Struct, frozen=True, tag="planned"):
+    """What a dry run would have done; nothing was sent."""
+
+    would: str
+
+
+def agree(action: str, writing: Writing, common: Common, *, ask: bool = True) -> bool:
+    """Whether an action is carried out: --dry-run only shows it, else the user is asked."""
+    if writing.dry_run:
+        emit(Planned(action), common)
+        return False
+    if ask:
+        confirm(action, writing)
+    return True
+
+
+def report(robot: Robot, result: Any, common: Common) -> None:
+    """Print the result of a motion: positions in the display units, in JSON in rad (m)."""
+    if common.json or not isinstance(result, MoveResult | LoopResult):
+        emit(result, common)
+        return
+    if isinstance(result, MoveResult):
+        places = {name: one.position for name, one in result.axes.items()}
+        text = f"{result.duration:.2f} s, limited by {result.limited_by or 'nothing'}"
+    else:
+        places = dict(result.positions)
+        text = f"{result.duration:.2f} s, {result.cycles} cycles"
+    for name, place in places.items():
+        shown = "position not known" if place is None else robot.config.axes[name].show(place)
+        is_estimated = robot.axes[name].status.position is None and place is not None
+        print(f"{name}: {shown}{' (estimated)' if is_estimated else ''}")
+    print(text, flush=True)
+    for text in getattr(result, "notes", ()):
+        note(f"note: {text}")
+
+
 # -- move, jog, home -------------------------------------------------------------------------------------------
 
 
@@ -135,12 +162,10 @@ def move(
 
     Examples:
 
-    motorbus move shoulder=30deg elbow=-10deg
-    motorbus move lift+=5mm --speed 0.5
-    motorbus move feetech:/dev/ttyACM0#3=30deg --velocity 20deg/s
+      motorbus move shoulder=30deg elbow=-10deg
+      motorbus move lift+=5mm --speed 0.5
+      motorbus move feetech:/dev/ttyACM0#3=30deg --velocity 20deg/s
     """
-    from motorbus.motion.commands import Move
-
     if not goals:
         raise RequestError("no goal", expected="AXIS=POSITION, as shoulder=30deg")
     words, relative = [], set()
@@ -153,7 +178,7 @@ def move(
     if len(relative) > 1:
         raise RequestError("positions and distances in one command", advice="use two commands")
     seconds = parse_time(duration)
-    with open_robot(common, _joined([word for word, _ in words])) as robot:
+    with open_robot(common, join_addresses([word for word, _ in words]), velocity) as robot:
         found: dict[str, float] = {}
         fastest = None
         for word, text in words:
@@ -170,10 +195,10 @@ def move(
             _send_goals(robot, found, speed, fastest, writing)
             return
         command = Move(found, seconds, speed, kind, relative == {True}, fastest)
-        _emit(writing.execute(robot, command), common)
+        report(robot, execute(writing, robot, command), common)
 
 
-def _joined(words: Sequence[str]) -> list[str]:
+def join_addresses(words: Sequence[str]) -> list[str]:
     """The words; addresses of one bus as one address."""
     addresses = [word for word in dict.fromkeys(words) if is_address(word)]
     buses = {word.partition("#")[0] for word in addresses}
@@ -198,7 +223,7 @@ def _send_goals(
         if "velocity" in signature(function.function).parameters:
             highest = min(axis.config.max_velocity * speed, fastest or axis.config.max_velocity)
             arguments["velocity"] = highest * abs(axis.config.ratio)
-        writing.execute(robot, DeviceCommand(name, "move", arguments))
+        execute(writing, robot, DeviceCommand(name, "move", arguments))
 
 
 def jog(
@@ -216,33 +241,29 @@ def jog(
 
     Examples:
 
-    motorbus jog shoulder 10deg/s --for 1s
-    motorbus jog lift -5mm/s
-    motorbus jog stepper:/dev/ttyUSB0#1 -60rpm --for 500ms
+      motorbus jog shoulder 10deg/s --for 1s
+      motorbus jog lift -5mm/s
+      motorbus jog stepper:/dev/ttyUSB0#1 -60rpm --for 500ms
     """
-    from motorbus.motion.commands import Jog
-
     seconds = parse_time(for_)
-    if seconds is None and writing.dry_run:
-        raise RequestError("--dry-run needs a time", expected="--for, as --for 1s")
-    pressed = until_enter() if seconds is None else None
-    with open_robot(common, [axis]) as robot:
+    pressed = None if seconds is not None or writing.dry_run else until_enter()
+    with open_robot(common, [axis], velocity) as robot:
         names = axes_of(robot, axis)
         if len(names) != 1:
             raise RequestError(f"{axis} is {len(names)} axes", expected="one axis")
-        speed = parse_velocity(robot.config.axes[names[0]], velocity, named=not is_address(axis))
-        if seconds is not None:
-            with robot.attended():
-                result = writing.execute(robot, Jog(names[0], speed, seconds))
-        else:
-            with robot.attended(LEASE) as lease:
+        config = robot.config.axes[names[0]]
+        speed = parse_velocity(config, velocity, named=not is_address(axis))
+        is_far = abs(speed * (seconds or 0.0) * config.ratio) > FAR
+        action = f"jog {names[0]} at {config.show(speed)}/s for {for_ or 'the time until Enter'}"
+        if not agree(action, writing, common, ask=is_far):
+            return
+        with robot.attended(inf if pressed is None else LEASE) as lease:
 
-                def ended() -> bool:
-                    lease.beat()
-                    return pressed is not None and pressed()
+            def ended() -> bool:
+                lease.beat()
+                return pressed is not None and pressed()
 
-                result = robot.jog(names[0], speed, until=ended)
-        _emit(result, common)
+            report(robot, robot.jog(names[0], speed, seconds, ended), common)
 
 
 def home(
@@ -258,30 +279,22 @@ def home(
 
     Examples:
 
-    motorbus home
-    motorbus home lift --timeout 20s
-    motorbus home stepper:/dev/ttyUSB0#1 --velocity 60rpm --yes
+      motorbus home
+      motorbus home lift --timeout 20s
+      motorbus home stepper:/dev/ttyUSB0#1 --velocity 60rpm --yes
     """
-    from motorbus.motion.commands import Home
-
     limit = parse_time(timeout) or 30.0
-    with open_robot(common, axes) as robot:
+    with open_robot(common, axes, velocity) as robot:
         names = tuple(name for word in axes for name in axes_of(robot, word)) or None
         speed = None
         if velocity:
             for name in names or robot.axes:
                 speed = parse_velocity(robot.config.axes[name], velocity, named=name[0] != "#")
-        with nullcontext() if writing.dry_run else robot.attended():
-            found = writing.execute(robot, Home(names, limit, speed))
-        _emit(None if found is None else HomeResult(found), common)
-
-
-def _emit(result: Any, common: Common) -> None:
-    """Print a result; a dry run has none."""
-    if result is not None:
-        emit(result, common)
-    for text in getattr(result, "notes", ()):
-        note(f"note: {text}")
+        moved = names or [name for name, one in robot.axes.items() if "home" in one.driver]
+        action = f"move {', '.join(moved) or 'no axis'} until the reference switch is active"
+        if agree(action, writing, common, ask=bool(moved)):
+            with robot.attended():
+                emit(HomeResult(robot.home(names, timeout=limit, velocity=speed)), common)
 
 
 # -- pose ------------------------------------------------------------------------------------------------------
@@ -302,12 +315,10 @@ def pose(
 
     Examples:
 
-    motorbus pose
-    motorbus pose ready --speed 0.5
-    motorbus pose --save ready
+      motorbus pose
+      motorbus pose ready --speed 0.5
+      motorbus pose --save ready
     """
-    from motorbus.motion.commands import Pose
-
     machine = load_machine(common)
     if machine is None:
         raise RequestError(f"no machine file {common.machine}", advice="`motorbus init NAME=BUS` writes one")
@@ -320,7 +331,7 @@ def pose(
             known = ", ".join(machine.poses) or "none; `motorbus pose --save NAME` adds one"
             raise RequestError(f"no pose {name!r}", expected=f"one of {known}")
         with open_robot(common, tuple(machine.poses[name])) as robot:
-            _emit(writing.execute(robot, Pose(name, speed=speed)), common)
+            report(robot, execute(writing, robot, Pose(name, speed=speed)), common)
     else:
         _list_poses(machine, common)
 
@@ -337,14 +348,13 @@ def _list_poses(machine: MachineConfig, common: Common) -> None:
 
 
 def _save_pose(machine: MachineConfig, name: str, writing: Writing, common: Common) -> None:
-    from motorbus.cli.output import confirm
     from motorbus.motion.machine_edit import edit, pose_change
 
     file = Path(machine.path)
     if name in machine.poses and not writing.dry_run:
         confirm(f"replace the pose {name} of {file}", writing)
     with open_robot(common) as robot:
-        places = {axis: place for axis, place in robot.positions().items() if place is not None}
+        places = {axis: round(place, 5) for axis, place in robot.positions().items() if place is not None}
         unknown = [axis for axis in robot.axes if axis not in places]
         change = pose_change(robot.config, name, places)
     if unknown:
@@ -376,18 +386,17 @@ def torque(
 
     Examples:
 
-    motorbus torque on shoulder elbow
-    motorbus torque off arm
-    motorbus torque off feetech:/dev/ttyACM0
+      motorbus torque on shoulder elbow
+      motorbus torque off arm
+      motorbus torque off feetech:/dev/ttyACM0
     """
-    from motorbus.motion.commands import Torque
-
     writing = Writing(yes=True, dry_run=dry_run)
     if switch == "on":
         with open_robot(common, targets) as robot:
             names = tuple(name for word in targets for name in axes_of(robot, word)) or None
-            found = writing.execute(robot, Torque(True, names))
-        _emit(None if found is None else TorqueResult(True, found), common)
+            action = f"switch torque on of {', '.join(names or robot.axes)}, which hold where they are"
+            if agree(action, writing, common):
+                emit(TorqueResult(True, robot.enable_torque(names)), common)
         return
     reached = tuple(word for word in targets if _release_bus(common, word, writing))
     done, errors = _visit(
@@ -426,12 +435,10 @@ def stop(
 
     Examples:
 
-    motorbus stop
-    motorbus stop shoulder elbow --verify
-    motorbus stop feetech:/dev/ttyACM0
+      motorbus stop
+      motorbus stop shoulder elbow --verify
+      motorbus stop feetech:/dev/ttyACM0
     """
-    from motorbus.motion.commands import StopResult, StopState
-
     done, errors = _visit(common, targets, "stop", lambda target: target.device.stop())
     states = {name: StopState(getattr(promise, "value", str(promise))) for name, promise in done.items()}
     moving = []
@@ -445,8 +452,15 @@ def stop(
             else:
                 states |= seen
                 moving += [name for name, state in seen.items() if state.at_rest is False]
-    if states:
+    if states and common.json:
         emit(StopResult(states), common)
+    elif states:
+        print_table(
+            [
+                [name, one.promise if one.at_rest is None else "at rest" if one.at_rest else "not at rest"]
+                for name, one in states.items()
+            ]
+        )
     if moving:
         errors.insert(0, VerificationFailed(f"{', '.join(moving)}: not seen at rest within 1 s"))
         raise with_others(errors)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, get_type_hints
 from motorbus.errors import MotorbusError
 
 if TYPE_CHECKING:
-    from motorbus.cli.target import Common, Writing
+    from motorbus.cli.common import Common, Writing
 
 LONGEST: Final = 300  # characters of one part of a message
 _CONTROL: Final = re.compile(r"[\x00-\x1f\x7f-\x9f]")
@@ -212,7 +212,7 @@ def progress(what: str) -> Iterator[Callable[..., None]]:
 
 def confirm(question: str, writing: Writing) -> None:
     """Ask on a terminal unless --yes. Raises NeedsConsent without consent."""
-    from motorbus.cli.main import NeedsConsent
+    from motorbus.cli.common import NeedsConsent
 
     if writing.yes:
         return

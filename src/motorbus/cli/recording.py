@@ -7,9 +7,11 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from motorbus.cli.motion import For, axes_of, parse_time, until_enter
-from motorbus.cli.output import confirm, emit, note
-from motorbus.cli.target import Common, Writing, open_robot
+from motorbus.cli.common import Common, Writing
+from motorbus.cli.dryrun import FAR
+from motorbus.cli.motion import For, agree, axes_of, join_addresses, parse_time, report, until_enter
+from motorbus.cli.output import note
+from motorbus.cli.target import load_machine, open_robot
 from motorbus.errors import RequestError
 
 Rate = Annotated[float, Parameter(help="Cycles per s.")]
@@ -31,9 +33,9 @@ def teach(
 
     Examples:
 
-    motorbus teach wave.csv arm
-    motorbus teach wave.csv shoulder elbow --for 10s --rate 100
-    motorbus teach wave.csv --keep-torque --for 3s
+      motorbus teach wave.csv arm
+      motorbus teach wave.csv shoulder elbow --for 10s --rate 100
+      motorbus teach wave.csv --keep-torque --for 3s
     """
     from motorbus.motion.teach import teach_file
 
@@ -50,7 +52,7 @@ def teach(
                 robot, file, names=names, seconds=seconds, until=pressed, rate=rate, keep_torque=keep_torque
             )
         )
-        emit(result, common)
+        report(robot, result, common)
 
 
 def replay(
@@ -70,12 +72,10 @@ def replay(
 
     Examples:
 
-    motorbus replay wave.csv
-    motorbus replay wave.csv --dry-run
-    motorbus replay wave.csv --smooth 5 --speed 0.5 --repeat 3
+      motorbus replay wave.csv
+      motorbus replay wave.csv --dry-run
+      motorbus replay wave.csv --smooth 5 --speed 0.5 --repeat 3
     """
-    from motorbus.cli.target import load_machine
-    from motorbus.motion.commands import Replay
     from motorbus.motion.trajectory import Trajectory
 
     machine = load_machine(common)
@@ -83,9 +83,19 @@ def replay(
         raise RequestError(f"no machine file {common.machine}", advice="`motorbus init NAME=BUS` writes one")
     trajectory = Trajectory.load(file, machine.axes)
     with open_robot(common, tuple(trajectory.axes)) as robot:
-        result = writing.execute(robot, Replay(file, speed, smooth, repeat))
-        if result is not None:
-            emit(result, common)
+        places = robot.positions()
+        far = [
+            f"{name} by {config.show(start - place)}"
+            for name, start in trajectory.positions(0.0).items()
+            for config, place in [(robot.config.axes[name], places[name])]
+            if place is not None and abs((start - place) * config.ratio) > FAR
+        ]
+        action = f"move {', '.join(far)} to the start" if far else f"play {trajectory.duration / speed:.2f} s"
+        if writing.dry_run:
+            trajectory.check(robot.config.axes)
+        if agree(action, writing, common, ask=bool(far)):
+            options = {"speed": speed, "smooth": smooth, "repeat": repeat}
+            report(robot, robot.replay(trajectory, **options), common)
 
 
 def follow(
@@ -105,17 +115,13 @@ def follow(
 
     Examples:
 
-    motorbus follow left right
-    motorbus follow shoulder elbow --for 10s
-    motorbus follow left right --rate 200 --yes
+      motorbus follow left right
+      motorbus follow shoulder elbow --for 10s
+      motorbus follow left right --rate 200 --yes
     """
-    from motorbus.motion.commands import Follow
-
     seconds = parse_time(for_)
-    if seconds is None and writing.dry_run:
-        raise RequestError("--dry-run needs a time", expected="--for, as --for 1s")
-    pressed = until_enter() if seconds is None else None
-    with open_robot(common, (leader, follower)) as robot:
+    pressed = None if seconds is not None or writing.dry_run else until_enter()
+    with open_robot(common, join_addresses((leader, follower))) as robot:
         leaders, followers = axes_of(robot, leader), axes_of(robot, follower)
         if len(leaders) != len(followers):
             raise RequestError(
@@ -124,11 +130,6 @@ def follow(
                 advice="make a [group.NAME] of each side",
             )
         pairs = dict(zip(leaders, followers, strict=True))
-        if not writing.dry_run:
-            confirm(f"switch torque of {', '.join(leaders)} off, and move {', '.join(followers)}", writing)
-        if seconds is not None:
-            result = writing.execute(robot, Follow(pairs, seconds, rate))
-        else:
-            result = robot.follow(pairs, until=pressed, rate=rate)
-        if result is not None:
-            emit(result, common)
+        action = f"switch torque of {', '.join(leaders)} off, and move {', '.join(followers)}"
+        if agree(action, writing, common):
+            report(robot, robot.follow(pairs, seconds=seconds, until=pressed, rate=rate), common)

@@ -12,19 +12,10 @@ from typing import Annotated, Any, Final
 from cyclopts import Parameter
 from msgspec import Struct
 
+from motorbus.cli.common import Common, Partial, Target, Writing
 from motorbus.cli.dryrun import carry_out
-from motorbus.cli.main import Partial
 from motorbus.cli.output import emit, escape, redraw, table_lines
-from motorbus.cli.target import (
-    Common,
-    Target,
-    Writing,
-    bus_address,
-    load_machine,
-    open_bus,
-    open_devices,
-    parse_quantity,
-)
+from motorbus.cli.target import bus_address, load_machine, open_bus, open_devices, parse_quantity
 from motorbus.core import units
 from motorbus.core.family import AxisDriver, Identity
 from motorbus.core.register import Register, RegisterMap, Storage

@@ -6,64 +6,18 @@ import logging
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
-from cyclopts import Parameter
-
+from motorbus.cli.common import FILE, Common, Target
 from motorbus.cli.output import note, note_once
 from motorbus.errors import NoReply, RequestError
 
 if TYPE_CHECKING:
     from motorbus.bus.blocking import Bus
-    from motorbus.core.family import Family
-    from motorbus.motion.commands import RobotCommand
     from motorbus.motion.machine import MachineConfig
     from motorbus.motion.robot import Robot
 
-FILE: Final = "motorbus.toml"
 LOG: Final = logging.getLogger("motorbus.cli")
-
-
-@Parameter(name="*")
-@dataclass
-class Common:
-    """Options of every command."""
-
-    json: Annotated[bool, Parameter(help="Print JSON.")] = False
-    machine: Annotated[
-        str, Parameter(env_var="MOTORBUS_MACHINE", show_env_var=False, help="Machine file.")
-    ] = FILE
-    bus: Annotated[str, Parameter(env_var="MOTORBUS_BUS", show_env_var=False, help="Default bus.")] = ""
-    option: Annotated[
-        list[str], Parameter(name="-o", metavar="KEY=VALUE", help="Option of the bus; repeatable.")
-    ] = field(default_factory=list)
-    verbose: Annotated[int, Parameter(name="-v", count=True, help="Log; -vv logs each frame.")] = 0
-
-
-@Parameter(name="*")
-@dataclass
-class Writing:
-    """Options of commands that write."""
-
-    yes: Annotated[bool, Parameter(name=["--yes", "-y"], help="Do not ask.")] = False
-    dry_run: Annotated[bool, Parameter(help="Show what would be sent; write nothing.")] = False
-
-    def execute(self, robot: Robot, command: RobotCommand) -> Any:
-        """Ask, show the plan (--dry-run), or carry out a command of a robot; gives what to print."""
-        from motorbus.cli.dryrun import execute
-
-        return execute(self, robot, command)
-
-
-class Target(NamedTuple):
-    """A device of an open bus. `name` is an axis, or `#ID`; `device` has the methods of its family."""
-
-    name: str
-    bus: Bus
-    node: int
-    family: Family
-    device: Any
 
 
 # -- machine file --------------------------------------------------------------------------------------------------
@@ -91,7 +45,8 @@ def _unknown(word: str, common: Common) -> RequestError:
     )
 
 
-def _options(common: Common) -> dict[str, str]:
+def key_values(common: Common) -> dict[str, str]:
+    """The options of -o. Raises RequestError."""
     found = {}
     for text in common.option:
         name, equals, value = text.partition("=")
@@ -103,7 +58,7 @@ def _options(common: Common) -> dict[str, str]:
 
 def _with_options(address: str, common: Common) -> str:
     bus, hash_, ids = address.partition("#")
-    return bus + "".join(f",{name}={value}" for name, value in _options(common).items()) + hash_ + ids
+    return bus + "".join(f",{name}={value}" for name, value in key_values(common).items()) + hash_ + ids
 
 
 def bus_address(word: str, common: Common) -> str:
@@ -212,8 +167,10 @@ def _scan(bus: Bus) -> tuple[int, ...]:
 
 
 @contextmanager
-def open_robot(common: Common, words: Sequence[str] = ()) -> Iterator[Robot]:
+def open_robot(common: Common, words: Sequence[str] = (), velocity: str = "") -> Iterator[Robot]:
     """Open the axes of these words: names of the machine file, or addresses; () means all axes, else those of --bus.
+
+    `velocity` is the highest of the axes of an address; "": that of `Robot.at`.
 
     After success each axis stays as the command left it; after an error it ends as its `exit` says.
     """
@@ -223,7 +180,8 @@ def open_robot(common: Common, words: Sequence[str] = ()) -> Iterator[Robot]:
     words = tuple(words) or ((common.bus,) if common.bus and load_machine(common) is None else ())
     addresses = [word for word in words if is_address(word)]
     if len(addresses) == 1 == len(words):
-        robot = Robot.at(_with_ids(_with_options(addresses[0], common), common))
+        limit = {"max_velocity": abs(parse_quantity(velocity, "velocity"))} if velocity else {}
+        robot = Robot.at(_with_ids(_with_options(addresses[0], common), common), **limit)
     elif addresses:
         raise RequestError("several addresses in one command", expected="one, as feetech:/dev/ttyACM0#1-3")
     else:

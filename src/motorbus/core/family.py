@@ -156,6 +156,7 @@ class SelfTimedMove(Protocol):
     """A move that a device makes by a profile of its own, in one order; made by `AxisDriver.plan_move`.
 
     The device reports no position while it moves: all values are estimates. Nothing is written before `prepare` runs.
+    An angle of 0 (less than a step of the device) is neither prepared nor started.
     """
 
     @property
@@ -167,7 +168,7 @@ class SelfTimedMove(Protocol):
         """The shortest duration (s) within its velocity and acceleration."""
 
     def fit(self, duration: float) -> float:
-        """The nearest possible duration (s) that is not shorter than `duration`."""
+        """The nearest possible duration (s) that is not shorter than `duration`; the longest if all are shorter."""
 
     def prepare(self, duration: float) -> Procedure[None]:
         """Write what the move needs, for a duration that `fit` gave."""
@@ -180,7 +181,11 @@ class SelfTimedMove(Protocol):
         """The angle (rad) done `elapsed` s after the start."""
 
     def finish(self) -> Procedure[None]:
-        """Wait for the end, unless it was stopped or not started, and give back what `prepare` borrowed."""
+        """Wait for the end, unless it was stopped or not started, and give back what `prepare` borrowed.
+
+        Called once more after each failure, of `prepare` or of another axis too; then it may have nothing to do. Raises
+        Interrupted after a stop.
+        """
 
 
 class Stop(NamedTuple):
@@ -347,10 +352,6 @@ class AxisDriver:
     plan_move: Callable[..., Runnable[SelfTimedMove]] = unsupported
     """plan_move(device, angle, *, velocity, acceleration): a move by `angle` (rad) with its own profile, at most at
     `velocity` (rad/s) and `acceleration` (rad/s²)."""
-    keep_time: Callable[..., Runnable[Any]] = unsupported
-    """keep_time(device, angle, timing, *, velocity, acceleration) -> Turned: turn by `angle` (rad) with its own
-    profile, begin and end with the other devices of `timing`; at most `velocity` (rad/s) and `acceleration` (rad/s²)
-    where the device supports that."""
 
     @cached_property
     def names(self) -> frozenset[str]:

@@ -48,6 +48,14 @@ class MoveLogic(Generic[D]):
         """Its position (rad)."""
         return _position(await self.sample(device))
 
+    def tolerance_of(self, device: D) -> float:
+        """rad within which this device is in position."""
+        return self.tolerance
+
+    def stall_time_of(self, device: D) -> float:
+        """s without progress after which this device counts as stalled."""
+        return self.stall_time
+
     def timeout(self, distance: float) -> float:
         """s after which a move over this distance (rad) is late."""
         return 1.0 + 2.0 * distance / self.slowest
@@ -89,7 +97,7 @@ async def move(
                 f"{name} {shown(value)} is not a finite number above 0", expected=f"a number in {unit}"
             )
     checked = [(device, await logic.check(device, to)) for device, to in goals.items()]
-    arrive = partial(wait_in_position, logic, tolerance=tolerance or logic.tolerance, timeout=timeout)
+    arrive = partial(wait_in_position, logic, tolerance=tolerance, timeout=timeout)
 
     async def send() -> None:
         for device, goal in checked:
@@ -111,28 +119,29 @@ async def move(
 
 
 async def wait_in_position(
-    logic: MoveLogic[D], device: D, goal: float, *, tolerance: float, timeout: float | None
+    logic: MoveLogic[D], device: D, goal: float, *, tolerance: float | None, timeout: float | None
 ) -> None:
     """Return when the device is in position; see `move`."""
     state = await logic.sample(device)
     here = mark = _position(state)
+    within = tolerance or logic.tolerance_of(device)
     begun = progressed = state.at
     longest = logic.timeout(abs(here - goal)) if timeout is None else timeout
     looks = 0
     while True:
-        near = abs(here - goal) <= tolerance
+        near = abs(here - goal) <= within
         looks = looks + 1 if near else 0
         if near and (not state.moving if state.moving is not None else looks >= 2):
             return
         if abs(here - mark) >= PROGRESS:
             mark, progressed = here, state.at
-        elif state.at - progressed > logic.stall_time and not looks:
+        elif state.at - progressed > logic.stall_time_of(device) and not looks:
             raise logic.stalled(device, state, goal)
         if state.at - begun > longest:
             raise MotionError(
                 f"node {device.node} is not in position after {longest:.3g} s: it is at {here:.4g} rad on its way to "
                 f"{goal:.4g} rad",
-                expected=f"within {tolerance:.4g} rad",
+                expected=f"within {within:.4g} rad",
                 cause="the velocity is low for this distance, or the device oscillates about its goal",
                 advice="give a longer timeout; it is still moving: stop() ends that",
                 node=device.node,

@@ -9,7 +9,7 @@ from typing import Any
 from motorbus.bus.base import BaseBus
 from motorbus.core.family import AxisDriver
 from motorbus.core.steps import Runnable, catch, gather
-from motorbus.errors import RequestError
+from motorbus.errors import LinkError, MotorbusError, RequestError
 from motorbus.motion.machine import AxisConfig
 from motorbus.motion.program import OnBuses
 from motorbus.motion.status import AxisStatus
@@ -66,7 +66,10 @@ def by_bus(axes: Sequence[Axis]) -> dict[BaseBus, list[Axis]]:
 
 
 async def on_axes(axes: Sequence[Axis], visit: Callable[[Axis], Runnable[Any]]) -> dict[str, Any]:
-    """Program: run `visit(axis)` for each axis, all at the same time; gives the value or error of each by name."""
+    """Program: run `visit(axis)` for each axis, all at the same time; gives the value or error of each by name.
+
+    The error of a device names its axis.
+    """
 
     async def visit_all(members: list[Axis]) -> tuple[Any, ...]:
         results: tuple[Any, ...] = await gather(*[catch(visit(axis)) for axis in members])
@@ -76,9 +79,20 @@ async def on_axes(axes: Sequence[Axis], visit: Callable[[Axis], Runnable[Any]]) 
     values = await OnBuses({bus: visit_all(members) for bus, members in groups.items()}) if axes else {}
     found: dict[str, Any] = {}
     for bus, members in groups.items():
-        results = values[bus] if isinstance(values[bus], tuple) else [values[bus]] * len(members)
-        found |= {axis.name: result for axis, result in zip(members, results, strict=True)}
+        if not isinstance(values[bus], tuple):  # one cause for the whole bus
+            found |= {axis.name: values[bus] for axis in members}
+            continue
+        for axis, result in zip(members, values[bus], strict=True):
+            if isinstance(result, MotorbusError) and result.node in (None, axis.config.node):
+                name_axis(axis, result)
+            found[axis.name] = result
     return found
+
+
+def name_axis(axis: Axis, error: MotorbusError) -> None:
+    """Let an error of the device of an axis name the axis."""
+    if not isinstance(error, LinkError) and not error.summary.startswith(axis.name):
+        error.summary = f"{axis.name}: {error.summary}"
 
 
 async def read_state(axis: Axis) -> None:

@@ -28,13 +28,8 @@ Check = Callable[["SafetyGate", AxisStatus, Setpoint, float], "MotorbusError | N
 
 def not_faulted(gate: SafetyGate, axis: AxisStatus, setpoint: Setpoint, now: float) -> MotorbusError | None:
     """An axis at fault gets no motion and no torque."""
-    if not axis.fault:
-        return None
-    return Refused(
-        f"{axis.name} is at fault: {axis.fault}",
-        reason="fault",
-        advice=f'find the cause, then robot.clear_fault("{axis.name}")',
-    )
+    axis.check_fault()
+    return None
 
 
 def lease_held(gate: SafetyGate, axis: AxisStatus, setpoint: Setpoint, now: float) -> MotorbusError | None:
@@ -119,7 +114,7 @@ def within_velocity(
     return LimitExceeded(
         f"{axis.name}: {abs(setpoint.value):.4g} rad/s of the device is above {most:.4g} rad/s",
         reason="velocity",
-        advice="name a velocity; the default of a device is its own maximum",
+        advice="give velocity=…; the default of a device is its own maximum",
     )
 
 

@@ -68,8 +68,8 @@ class LoopAxis:
     """
 
     __slots__ = (
-        "axis", "claimed", "config", "generator", "high", "low", "missed", "name", "owner", "position", "sent",
-        "silent_since", "status", "target",
+        "axis", "behind", "claimed", "config", "generator", "high", "low", "missed", "name", "owner", "position",
+        "sent", "silent_since", "status", "target",
     )  # fmt: skip
 
     def __init__(self, axis: Axis) -> None:
@@ -88,6 +88,7 @@ class LoopAxis:
         self.position = self.sent = 0.0
         self.missed = 0
         self.silent_since = 0.0
+        self.behind = False  # of the targets of a direct loop, after a silence
 
     def allows(self, target: float) -> bool:
         """Whether a target is inside the limits, or leads back towards them; never NaN."""
@@ -370,7 +371,10 @@ class ControlLoop:
         for node, axis in group.axes.items():
             if axis.owner is None or axis.target is None or axis.missed > MAX_MISSED or axis.config.is_wheel:
                 continue
-            if self.direct:
+            if self.direct and axis.behind:
+                one_cycle = axis.config.max_velocity / self.rate
+                axis.behind = abs(axis.target - axis.sent) > one_cycle
+            if self.direct and not axis.behind:
                 axis.sent = axis.target
             else:
                 if periods > CATCH_UP:
@@ -413,6 +417,7 @@ class ControlLoop:
                     axis.position = axis.config.from_device(angle)
                     if axis.missed > MAX_MISSED and axis.owner is not None:
                         axis.restart()
+                        axis.behind = True
                     axis.missed = 0
                     continue
                 counts = self.statistics.lost if angle is None else self.statistics.suspect
@@ -430,6 +435,8 @@ class ControlLoop:
             axis.release()
         if stopped:
             raise Interrupted(f"{', '.join(axis.name for axis in stopped)}: stopped before the first goal")
+        for axis in fresh:
+            axis.status.check_fault()
         groups = by_bus([axis.axis for axis in fresh])
         raise_first(
             await OnBuses({bus: start_axes(bus, axes, self.machine.health) for bus, axes in groups.items()})

@@ -204,7 +204,7 @@ def _struct_schema(kind: type[Struct]) -> dict[str, Any]:
     return _object(properties, required)
 
 
-def _annotated(hint: Any) -> tuple[Any, tuple[Meta, ...]]:
+def split_hint(hint: Any) -> tuple[Any, tuple[Meta, ...]]:
     """The type of a key without None, and its annotations."""
     found: tuple[Meta, ...] = ()
     while get_origin(hint) in (Annotated, Union, UnionType):
@@ -218,11 +218,11 @@ def _annotated(hint: Any) -> tuple[Any, tuple[Meta, ...]]:
 
 def description_of(hint: Any) -> str:
     """What a key means."""
-    return next((meta.description for meta in _annotated(hint)[1] if meta.description), "")
+    return next((meta.description for meta in split_hint(hint)[1] if meta.description), "")
 
 
 def _type_schema(hint: Any) -> dict[str, Any]:
-    kind, metas = _annotated(hint)
+    kind, metas = split_hint(hint)
     if get_origin(kind) is Literal:
         return {"enum": list(get_args(kind))}
     if issubclass(kind, Quantity):

@@ -10,7 +10,15 @@ from motorbus.bus.base import BaseBus
 from motorbus.core.family import SelfTimedMove
 from motorbus.core.request import Request
 from motorbus.core.steps import Guard, Sleep, catch
-from motorbus.errors import LimitExceeded, MotionError, MotorbusError, NotHomed, RequestError, Stalled
+from motorbus.errors import (
+    Interrupted,
+    LimitExceeded,
+    MotionError,
+    MotorbusError,
+    NotHomed,
+    RequestError,
+    Stalled,
+)
 from motorbus.motion.axis import Axis, by_bus, on_axes
 from motorbus.motion.commands import AxisResult, LoopResult, MoveResult, StopResult, StopState
 from motorbus.motion.loop import ControlLoop, LoopState, start_axes
@@ -71,9 +79,9 @@ async def move(
     """Move axes to these goals (rad, m), or by these distances; all start and end together.
 
     All goals are checked before anything is sent. `speed` is a share of the velocity and acceleration of each axis,
-    `velocity` (rad/s, m/s) the highest of each, `tolerance` in rad of the device; each axis must be in position within `timeout` s after the end. Raises
-    RequestError, LimitExceeded, NotHomed before anything moves; Stalled, NoReply, Faulted, Overloaded, Interrupted when
-    a stop was sent to all.
+    `velocity` (rad/s, m/s) the highest of each, `tolerance` in rad of the device; each axis must be in position within
+    `timeout` s after the end. Raises RequestError, LimitExceeded, NotHomed before anything moves; Stalled, NoReply,
+    Faulted, Overloaded, Interrupted when a stop was sent to all.
     """
     axes = [machine.axis(name) for name in goals]
     if not (isfinite(speed) and 0 < speed <= 1):
@@ -85,13 +93,12 @@ async def move(
     led = [axis for axis in axes if axis.follows_setpoints]
     timed = [axis for axis in axes if axis not in led]
     loop = ControlLoop(machine, [axis.name for axis in led], direct=True) if led else None
-    async with StopsIfInterrupted(axes):
+    mover = _Mover(machine, loop, timed, goals, relative)
+    async with mover, StopsIfInterrupted(axes):
         try:
             if loop is not None:
                 await loop.enter()
-            return await _Mover(machine, loop, timed, goals, relative).run(
-                duration, speed, velocity or inf, kind, tolerance, timeout
-            )
+            return await mover.run(duration, speed, velocity or inf, kind, tolerance, timeout)
         finally:
             if loop is not None:
                 loop.close()
@@ -107,6 +114,7 @@ async def pose(machine: OpenMachine, name: str, **options: Any) -> MoveResult:
 
 def _check_goal(axis: Axis, goal: float, *, relative: bool) -> None:
     config = axis.config
+    axis.status.check_fault()
     if config.is_wheel:
         raise RequestError(f"{axis.name}: a wheel has no position", advice="jog it", node=config.node)
     if not axis.follows_setpoints:
@@ -129,8 +137,11 @@ def check_reach(axis: Axis, goal: float) -> None:
         )
 
 
-class _Mover:
-    """One move: axes of a loop, and self-timed axes that start in a slot of that loop."""
+class _Mover(Guard):
+    """One move: axes of a loop, and self-timed axes that start in a slot of that loop.
+
+    After an error each self-timed axis, which was stopped then, gives back what it borrowed.
+    """
 
     def __init__(
         self,
@@ -158,25 +169,34 @@ class _Mover:
         machine = self._machine
         begun = machine.now()
         profile = await self._plan(duration, speed, highest, kind)
-        async with _Finishes(self._timed, self._plans):
-            raise_first(
-                await on_axes(self._timed, lambda axis: self._plans[axis.name].prepare(profile.duration))
-            )
-            starts = {axis.bus: [self._plans[axis.name].start] for axis in self._timed}
-            if self._loop is None:
-                begun = machine.now()
-                for values in (await Exchange(starts)).values():
-                    raise_first(dict(enumerate(values)) if isinstance(values, list) else {0: values})
-            else:
-                peaks = {name: one.peak for name, one in profile.profiles.items()}
-                course = Course(profile.duration, profile.positions, peaks, self._goals)
-                begun = await lead(self._loop, course, starts, tolerance, timeout)
+        raise_first(await on_axes(self._timed, lambda axis: self._plans[axis.name].prepare(profile.duration)))
+        starts = {axis.bus: [self._plans[axis.name].start] for axis in self._timed}
+        if self._loop is None and starts:
+            begun = machine.now()
+            for values in (await Exchange(starts)).values():
+                raise_first(dict(enumerate(values)) if isinstance(values, list) else {0: values})
+        elif self._loop is not None:
+            peaks = {name: one.peak for name, one in profile.profiles.items()}
+            course = Course(profile.duration, profile.positions, peaks, self._goals)
+            begun = await lead(self._loop, course, starts, tolerance, timeout)
+        raise_first(await self._finish())
         for axis in self._timed:
             start = self._starts[axis.name]
             axis.status.estimate = None if start is None else start + self._plans[axis.name].angle
             axis.status.moving = False
         axes = {name: self._result(name, goal) for name, goal in self._goals.items()}
         return MoveResult(axes, profile.duration, machine.now() - begun, profile.limited_by)
+
+    async def _finish(self) -> dict[str, Any]:
+        planned = [axis for axis in self._timed if axis.name in self._plans]
+        return await on_axes(planned, lambda axis: self._plans[axis.name].finish())
+
+    async def leave(self, error: BaseException | None) -> None:
+        if error is None:
+            return
+        for name, result in (await self._finish()).items():
+            if isinstance(result, MotorbusError) and not isinstance(result, Interrupted):
+                error.add_note(f"{name}: {result.summary}")
 
     def _result(self, name: str, goal: float) -> AxisResult:
         position = self._machine.axes[name].status.known_position
@@ -210,28 +230,16 @@ class _Mover:
                 axis.device, angle, velocity=abs(velocity * ratio), acceleration=abs(acceleration * ratio)
             )
 
-        self._plans = await on_axes(self._timed, plan)
-        raise_first(self._plans)
+        plans = await on_axes(self._timed, plan)
+        raise_first(plans)
+        self._plans = plans
+        self._timed = [axis for axis in self._timed if plans[axis.name].angle]
         shortest = max((one.shortest for one in self._plans.values()), default=0.0)
         profile = synchronize(moves, kind=kind, duration=duration, shortest=shortest)
         longest = max((one.fit(profile.duration) for one in self._plans.values()), default=profile.duration)
         if longest > profile.duration:
             profile = synchronize(moves, kind=kind, duration=longest, shortest=shortest)
         return profile
-
-
-class _Finishes(Guard):
-    """Self-timed moves are waited for; each gives back what it borrowed, also after an error."""
-
-    def __init__(self, axes: list[Axis], plans: Mapping[str, SelfTimedMove]) -> None:
-        self._axes, self._plans = axes, plans
-
-    async def leave(self, error: BaseException | None) -> None:
-        if error is not None:
-            await stop_axes([axis for axis in self._axes if axis.status.moving])
-        results = await on_axes(self._axes, lambda axis: self._plans[axis.name].finish())
-        if error is None:
-            raise_first(results)
 
 
 class Course(NamedTuple):
@@ -323,7 +331,8 @@ async def jog(
     config = axis.config
     if not 0 < abs(velocity) <= config.max_velocity:
         raise LimitExceeded(
-            f"{name}: {velocity} is not a velocity", expected=f"at most {config.max_velocity:g}"
+            f"{name}: velocity {config.show(velocity)}/s",
+            expected=f"at most {config.show(config.max_velocity)}/s",
         )
     check_seconds(seconds)
     if not axis.follows_setpoints:
@@ -481,6 +490,8 @@ async def switch_torque(machine: OpenMachine, on: bool, names: Names = None) -> 
         raise RequestError(f"{others}: torque cannot be switched {'on' if on else 'off'}")
     groups = by_bus(able)
     if on:
+        for axis in able:
+            axis.status.check_fault()
         raise_first(
             await OnBuses({bus: start_axes(bus, members, machine.health) for bus, members in groups.items()})
         )

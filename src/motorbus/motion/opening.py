@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from math import tau
+from math import isfinite, tau
 from typing import Any, Final
 
 from msgspec import structs
@@ -29,14 +29,16 @@ USUAL_VELOCITY: Final = tau / 4  # rad/s of an axis that an address gives
 UNTRUSTED: Final = "unfinished change: "
 
 
-def machine_at(address: str) -> MachineConfig:
+def machine_at(address: str, max_velocity: float = USUAL_VELOCITY) -> MachineConfig:
     """A machine of the devices of an address, `FAMILY:PORT#1-6`: axes `#1` …, with the limits of the devices."""
     spot = parse_address(address)
     if not spot.nodes:
         raise RequestError(
             f"{address!r} names no device", expected="ids after #, as feetech:/dev/ttyACM0#1-6"
         )
-    velocity = Velocity(USUAL_VELOCITY, "velocity")
+    if not (isfinite(max_velocity) and max_velocity > 0):
+        raise RequestError(f"velocity {max_velocity}", expected="a finite number above 0")
+    velocity = Velocity(max_velocity, "velocity")
     axes = {f"#{node}": AxisConfig(device=f"bus#{node}", max_velocity=velocity) for node in spot.nodes}
     return MachineConfig(buses={"bus": BusConfig(spot.bus)}, axes=axes)
 

@@ -32,7 +32,7 @@ from motorbus.motion.commands import EStopResult, RobotCommand
 from motorbus.motion.describe import MachineDescription, describe
 from motorbus.motion.loop import ControlLoop, Policy
 from motorbus.motion.machine import MachineConfig, Names
-from motorbus.motion.opening import UNTRUSTED, bus_options, identify, machine_at, select
+from motorbus.motion.opening import UNTRUSTED, USUAL_VELOCITY, bus_options, identify, machine_at, select
 from motorbus.motion.program import Program, drive, drive_async, raise_first, run
 from motorbus.motion.shutdown import Shutdown
 from motorbus.motion.state import OpenMachine, Subscription, poll, read_axes
@@ -62,9 +62,12 @@ class RobotMethods(OpenMachine):
         return cls(MachineConfig.load(path), axes)
 
     @classmethod
-    def at(cls, address: str) -> Self:
-        """The devices of an address, `FAMILY:PORT#1-6`, as axes `#1` … with the limits of the devices."""
-        return cls(machine_at(address))
+    def at(cls, address: str, *, max_velocity: float = USUAL_VELOCITY) -> Self:
+        """The devices of an address, `FAMILY:PORT#1-6`, as axes `#1` … with the limits of the devices.
+
+        `max_velocity` (rad/s) is that of each axis.
+        """
+        return cls(machine_at(address, max_velocity))
 
     @abstractmethod
     def carry_out(self, program: Program[Any]) -> Any:
@@ -274,6 +277,9 @@ class RobotMethods(OpenMachine):
                     error.add_note(note)
         if error is None:
             raise_first(ending.errors)
+        else:
+            for name, action in ending.carried_out():
+                error.add_note(f"{name}: {action}, as its exit says")
 
 
 async def call_device(robot: OpenMachine, name: str, function: str, arguments: Mapping[str, Any]) -> Any:
@@ -396,6 +402,8 @@ class AsyncRobot(RobotMethods):
     async def __aenter__(self) -> Self:
         from motorbus.bus.aio import TaskSignals
 
+        if self._closed.is_set():
+            raise RequestError("this robot is closed", advice="make another one")
         async with AsyncExitStack() as stack:
             stack.callback(TaskSignals().end)
             for name, bus in self.config.buses.items():

@@ -8,6 +8,7 @@ from typing import Final
 
 from motorbus.core.family import State
 from motorbus.core.steps import Runnable
+from motorbus.errors import Refused
 from motorbus.motion.machine import AxisConfig
 
 FRESH: Final = 0.5  # s for which a position may be used to judge a goal
@@ -84,6 +85,16 @@ class AxisStatus:
         self.owner += 1
         self.forget()
         self.engaged = self.moving = self.endless = False
+
+    def check_fault(self) -> None:
+        """Raise Refused if it is at fault."""
+        if self.fault:
+            raise Refused(
+                f"{self.name} is at fault: {self.fault}",
+                reason="fault",
+                advice=f'find the cause, then robot.clear_fault("{self.name}")',
+                node=self.node,
+            )
 
     @property
     def known_position(self) -> float | None:

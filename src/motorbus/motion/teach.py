@@ -222,12 +222,12 @@ async def teach_file(machine: OpenMachine, file: str, **options: Any) -> LoopRes
         try:
             made = await teach(machine, **options)
         except BaseException as error:
-            made = getattr(error, "so_far", None)
-            if made is None:
-                Path(file).unlink()
+            kept = getattr(error, "so_far", None)
+            if isinstance(kept, Trajectory):
+                opened.write(kept.text(machine.config.axes))
+                error.add_note(f"{kept.duration:.2f} s until then are in {file}")
             else:
-                opened.write(made.text(machine.config.axes))
-                error.add_note(f"{made.duration:.2f} s until then are in {file}")
+                Path(file).unlink()
             raise
         opened.write(made.text(machine.config.axes))
     return LoopResult(made.duration, len(made.times), made.positions(made.duration), notes=made.notes)

@@ -16,8 +16,8 @@ import pytest
 
 import motorbus
 from motorbus.errors import MotionError
-from motorbus.families.feetech import FAMILY, Servo
-from motorbus.families.feetech.cli import move_together
+from motorbus.families.feetech import FAMILY, Node, Servo
+from motorbus.families.feetech.driver.motion import Motion, move_all
 from motorbus.families.feetech.registers import TABLES
 from motorbus.families.feetech.traits import TRAITS, Mode
 from tests.conformance.cuts import Call, Command, Cut, Kind, Moment, World
@@ -195,7 +195,7 @@ def test_enable_torque_raises_when_supply_fails_with_it(name: str) -> None:
 
 
 @every_map
-def test_move_together_goes_no_farther_after_power_loss(name: str) -> None:
+def test_a_move_of_two_goes_no_farther_after_power_loss(name: str) -> None:
     for number in count():
         with (
             motorbus.simulate("feetech", ids="1-2", model=MODELS[name], **FORGETFUL) as sim,
@@ -203,7 +203,9 @@ def test_move_together_goes_no_farther_after_power_loss(name: str) -> None:
         ):
             for node in (1, 2):
                 sim[node].raw_position = int(TRAITS[name].turn * 0.7)
-            goals = {node: Servo(bus, node).position() - TURN for node in (1, 2)}
+            goals: dict[Node, float] = {
+                servo: servo.position() - TURN for servo in (Servo(bus, 1), Servo(bus, 2))
+            }
             start = [sim[node].motion.position(bus.link.now()) for node in (1, 2)]
             link: Any = bus.link
             write, sent = link.write, [0]
@@ -217,7 +219,7 @@ def test_move_together_goes_no_farther_after_power_loss(name: str) -> None:
 
             link.write = cut_write
             with suppress(MotionError):  # one that restarted is noticed
-                move_together(bus, goals, wait=False)
+                bus.run(move_all(Motion(), goals, wait=False))
             link.write = write
             link.advance(3.0)
             end = [sim[node].motion.position(bus.link.now()) for node in (1, 2)]

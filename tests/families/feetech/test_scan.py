@@ -11,7 +11,7 @@ from motorbus.core.scan import Skipped
 from motorbus.families.feetech import FAMILY, Node, ScanWarning, Servo, scan
 from motorbus.families.feetech.protocol import Instruction
 from motorbus.families.feetech.registers import TABLES
-from tests.families.feetech.worlds import MODELS, traffic, world
+from tests.families.feetech.worlds import MODELS, later, traffic, world
 
 
 @pytest.mark.parametrize("name", TABLES)
@@ -41,9 +41,34 @@ def test_a_servo_in_another_mode_has_an_axis_of_that_kind(mode: str) -> None:
         servo.set_mode(mode)
         found = servo.identify()
         assert found.details["mode"] == mode
-        names = bus.driver.axis(found).names
-        assert not names & {"move", "limits", "travel", "stream"}
-        assert ("jog" in names) == (mode == "velocity")
+        axis = bus.driver.axis(found)
+        assert not axis.names & {"move", "limits", "travel", "stream"}
+        assert ("jog" in axis) == ("set_velocity" in axis) == (mode == "velocity")
+        assert {"stop", "max_velocity"} <= axis.names
+
+
+def test_the_axis_of_a_wheel_turns_it_and_stops_it() -> None:
+    with world() as (bus, servo, _):
+        servo.set_mode("velocity")
+        axis = bus.driver.axis(servo.identify())
+        bus.run(axis.enable_torque(servo))
+        bus.run(axis.set_velocity(servo, 1.5))
+        later(bus, 0.5)
+        assert servo.velocity() == pytest.approx(1.5, abs=0.01)
+        bus.run(axis.stop(servo))
+        later(bus, 0.5)
+        assert servo.velocity() == 0
+
+
+@pytest.mark.parametrize(
+    ("model", "velocity"), [("sts3215", 5.216), ("sts3250", 7.87), ("scs15", 5.76), ("hls3925", None)]
+)
+def test_the_highest_velocity_is_that_of_the_model_where_a_source_tells_it(
+    model: str, velocity: float | None
+) -> None:
+    with world(model) as (bus, servo, _):
+        axis = bus.driver.axis(servo.identify())
+        assert bus.run(axis.max_velocity(servo)) == (velocity and pytest.approx(velocity, abs=0.01))
 
 
 def test_the_arc_of_an_scs_is_its_models_or_that_of_the_bus() -> None:

@@ -13,9 +13,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from motorbus.cli import main
 
 import motorbus
+from motorbus.cli import main
 from motorbus.families.stepper import Controller
 from tests.support.processes import Simulated
 
@@ -36,7 +36,7 @@ def doomed(self, data):
 SerialLink.write = doomed
 main(sys.argv[1:])
 """
-JOG = "=60rpm --seconds 0.1 --yes"
+JOG = " 60rpm --for 100ms --yes"
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from motorbus.core.setpoint import Setpoint
-from motorbus.core.steps import Progress, Sleep, gather
+from motorbus.core.steps import JournalEntry, Progress, Sleep, gather
 from motorbus.errors import (
     Interrupted,
     LimitExceeded,
@@ -23,6 +23,7 @@ from motorbus.errors import (
 from motorbus.families.stepper import Controller
 from motorbus.families.stepper.driver import manual
 from motorbus.families.stepper.driver import stop as stopping
+from motorbus.families.stepper.driver.plan import PlannedMove, plan_move
 from motorbus.families.stepper.execution.machine import Phase
 from motorbus.families.stepper.parameters import Project, Step
 from tests.families.stepper.bench import STOP_MOTOR, STOP_PROJECT, Bench, bench, made
@@ -331,110 +332,122 @@ def test_glitch_of_the_switch_does_not_end_homing() -> None:
 # -- together with others ----------------------------------------------------------------------------------------------
 
 
-class Others:
-    """Devices that keep time: they need `needs` s, start together, and fail at a step."""
-
-    def __init__(self, needs: float = 0.0, fails: str = "") -> None:
-        self.needs, self._fails = needs, fails
-        self.shortest = self.agreed_on = self.lead = self.moment = 0.0
-        self.errors: list[BaseException] = []
-
-    async def agreed(self, shortest: float, fitted: Callable[[float], float]) -> float:
-        await self._meet("agreed")
-        self.shortest = shortest
-        self.agreed_on = max(self.needs, fitted(max(self.needs, shortest)))
-        return self.agreed_on
-
-    async def start(self, lead: float) -> float:
-        await self._meet("start")
-        self.lead = lead
-        self.moment = await Sleep(0) + lead
-        return self.moment
-
-    def fails(self, error: BaseException) -> None:
-        self.errors.append(error)
-
-    async def _meet(self, where: str) -> None:
-        await Sleep(0.05)
-        if self._fails == where:
-            raise Interrupted("another one cannot take part")
+def planned(one: Bench, angle: float, *, velocity: float = tau, acceleration: float = 100.0) -> PlannedMove:
+    return one.run(plan_move(one.device, angle, velocity=velocity, acceleration=acceleration))
 
 
 @pytest.mark.parametrize("needs", [0.0, 2.0, 7.0])
-def test_pose_begins_and_ends_with_the_others(one: Bench, needs: float) -> None:
-    others = Others(needs)
-    since: list[float] = []
-    one.react = lambda event: (
-        since.append(one.simulated.machine.since)
-        if isinstance(event, Progress) and "moving" in event.what
-        else None
-    )
-    turned = one.run(manual.keep_time(one.device, -3.0, others, velocity=tau, acceleration=100.0))
-    assert turned.angle == pytest.approx(-3.0, abs=tau / 3200)
-    assert one.simulated.position == round(turned.angle / tau * 1600)
-    assert turned.start == pytest.approx(others.moment, abs=0.02)
-    assert turned.duration == pytest.approx(others.agreed_on, rel=1e-6)
-    assert turned.duration >= needs
-    assert turned.duration < needs * 1.1 + 1
-    assert turned.way(-1.0) == 0
-    assert turned.way(turned.duration) == pytest.approx(turned.angle)
+def test_planned_move_lasts_as_long_as_the_others(one: Bench, needs: float) -> None:
+    plan = planned(one, -3.0)
+    duration = plan.fit(needs)
+    assert max(needs, plan.shortest) <= duration < needs * 1.1 + 1
+    assert plan.fit(duration) == duration
+    assert not one.told(JournalEntry)
+    one.run(plan.prepare(duration))
+    assert orders(one) == []
+    one.run(plan.start)
+    begun = one.link.now()
+    turning = one.simulated.machine.motion
+    assert turning is not None
+    assert turning.duration == pytest.approx(duration, rel=1e-6)
+    one.run(plan.finish())
+    assert duration <= one.link.now() - begun
+    assert plan.angle == pytest.approx(-3.0, abs=tau / 3200)
+    assert one.simulated.position == round(plan.angle / tau * 1600)
+    assert [plan.position(at) for at in (0.0, duration)] == pytest.approx([0.0, plan.angle])
     assert one.simulated.store.working == made()
-    assert others.errors == []
-    assert since[0] + others.lead == pytest.approx(turned.start, abs=0.05)
+    one.sent()
+    one.run(plan.finish())
+    assert one.sent() == []
 
 
-def test_pose_keeps_its_limits(one: Bench) -> None:
-    shown = as_step(
-        one,
-        lambda: one.run(manual.keep_time(one.device, 3.0, Others(), velocity=1.99 * tau, acceleration=40.0)),
-    )
-    step = shown.step(1)
+def test_planned_move_keeps_its_limits(one: Bench) -> None:
+    plan = planned(one, 3.0, velocity=1.99 * tau, acceleration=40.0)
+    one.run(plan.prepare(plan.shortest))
+    step = one.simulated.store.working.step(1)
     assert step.speed == 119
     assert step.acceleration * max(1000, 119 * 1600 / 60) <= 40.0 / tau * 1600
+    one.run(plan.finish())
     with pytest.raises(RequestError, match="which is 1 RPM"):
-        one.run(manual.keep_time(one.device, 3.0, Others(), velocity=0.1))
+        planned(one, 3.0, velocity=0.1)
 
 
-def test_pose_of_less_than_a_pulse_takes_part_without_a_motion(one: Bench) -> None:
-    others = Others(2.0)
-    turned = one.run(manual.keep_time(one.device, 1e-3, others, velocity=tau))
-    assert (turned.angle, turned.duration) == (0.0, 0.0)
-    assert (turned.start, others.lead) == (others.moment, 0.0)
-    assert orders(one) == []
-
-
-@pytest.mark.parametrize("where", ["agreed", "start"])
-def test_pose_that_is_called_off_moves_nothing(one: Bench, where: str) -> None:
-    with pytest.raises(Interrupted) as caught:
-        one.run(manual.keep_time(one.device, 3.0, Others(fails=where), velocity=tau))
-    assert where == "agreed" or caught.value.unmoved
-    assert orders(one) == []
+def test_planned_move_of_less_than_a_pulse_cannot_start(one: Bench) -> None:
+    plan = planned(one, 1e-3)
+    assert (plan.angle, plan.shortest) == (0.0, 0.0)
+    with pytest.raises(RequestError, match="less than one pulse"):
+        one.run(plan.prepare(2.0))
+    one.run(plan.finish())
     assert one.simulated.store.working == made()
 
 
-def test_others_learn_of_an_error_before_project_1_is_given_back(one: Bench) -> None:
-    others = Others()
-    seen: list[Project] = []
-    others.fails = lambda error: seen.append(one.simulated.store.working)  # type: ignore[method-assign]
-    one.line.change = lambda data: b"" if data[2:4] == b"\x03\x0c" else data
-    with pytest.raises(OutcomeUnknown):
-        one.run(manual.keep_time(one.device, 3.0, others, velocity=tau))
-    assert seen[0] != made()
+def test_planned_move_that_is_called_off_moves_nothing(one: Bench) -> None:
+    plan = planned(one, 3.0)
+    one.run(plan.finish())
+    assert not one.told(JournalEntry)
+    one.run(plan.prepare(2.0))
+    with pytest.raises(RequestError, match="unfinished"):
+        one.device.jog(tau, 1.0)
+    one.device.stop()
+    with pytest.raises(Interrupted):
+        one.run(plan.start)
+    one.run(plan.finish())
+    assert orders(one) == []
     assert one.simulated.store.working == made()
-    seen.clear()
+    assert one.journal.unfinished() is None
+
+
+def test_planned_move_that_was_not_prepared_has_nothing_to_give_back(one: Bench) -> None:
+    plan = planned(one, 3.0)
     one.device.state.may_run = True
-    one.line.change = lambda data: data
     with pytest.raises(RequestError, match="may still run"):
-        one.run(manual.keep_time(one.device, 3.0, others, velocity=tau))
-    assert seen
+        one.run(plan.prepare(2.0))
+    one.sent()
+    one.run(plan.finish())
+    assert one.sent() == []
     one.device.stop()
     one.simulated.put(2, replace(made(), number=2))
     one.device.write(project=2, save=False, step_1_delay=1.0)
-    seen.clear()
-    one.line.change = lambda data: data
+    plan = planned(one, 3.0)
     with pytest.raises(RequestError, match="not saved"):
-        one.run(manual.keep_time(one.device, 3.0, others, velocity=tau))
-    assert seen
+        one.run(plan.prepare(2.0))
+    one.run(plan.finish())
+    assert one.simulated.store.working.number == 2
+
+
+@pytest.mark.parametrize("is_lost", [True, False])
+def test_planned_move_is_stopped_before_project_1_is_given_back(one: Bench, is_lost: bool) -> None:
+    """Its start is not acknowledged, or a stop comes midway."""
+    plan = planned(one, 30.0)
+    one.run(plan.prepare(2.0))
+    begun = one.link.now()
+    if is_lost:
+        one.line.change = lambda data: b"" if data[2:4] == b"\x03\x0c" else data
+        with pytest.raises(OutcomeUnknown):
+            one.run(plan.start)
+        one.run(plan.finish())
+    else:
+        one.run(plan.start)
+        one.run(Sleep(0.5))
+        one.device.stop()
+        with pytest.raises(Interrupted):
+            one.run(plan.finish())
+    assert one.link.now() - begun < 4
+    assert 0 < one.simulated.position < 30.0 / tau * 1600 / 2
+    assert one.simulated.machine.phase is Phase.IDLE
+    assert one.simulated.store.working == made()
+    assert one.journal.unfinished() is None
+
+
+def test_planned_move_is_recovered_after_a_crash(one: Bench) -> None:
+    plan = planned(one, 30.0)
+    one.run(plan.prepare(2.0))
+    one.run(plan.start)
+    change = one.journal.unfinished()
+    assert change is not None
+    assert one.device.recover(change.verb, change.facts) == "old"
+    assert one.simulated.machine.phase is Phase.IDLE
+    assert one.simulated.store.working == made()
 
 
 def test_a_power_off_between_two_commands_is_no_reason_to_move_farther_than_said(one: Bench) -> None:

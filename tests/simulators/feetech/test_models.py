@@ -77,7 +77,7 @@ def test_motors_with_a_data_sheet() -> None:
     # 60° in 0.133 s; 55 rpm are 330°/s
     assert model("sts3250").drive.top_speed == pytest.approx(4096 / 6 / 0.133)
     assert model("scs15").drive.top_speed * model("scs15").angle == pytest.approx(radians(330))
-    assert model("sts3032").drive is model("sts3215").drive
+    assert model("sts3032").drive == model("sts3215").drive
     assert model("sm85blhv").voltage == 24.0
 
 

@@ -9,6 +9,7 @@ Source: FD 1.9.8.5 configuration, as published by the project FT_SCServo_Debug_Q
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from math import radians, tau
 from types import MappingProxyType
 from typing import Final, NamedTuple, TypeAlias
 
@@ -107,6 +108,14 @@ _ALL: Final = (
 )
 MODELS: Final[Mapping[tuple[int, int], Model]] = MappingProxyType(dict(sorted(_ALL)))
 """(model major, model minor) -> model. It identifies a servo and does not prove a capability."""
+NO_LOAD: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        "STS3215": 3400 * tau / 4096,  # STS3215 memory table V3.6
+        "STS3250": radians(60) / 0.133,  # data sheet A/0, 12 V
+        "SCS15": 55 * tau / 60,  # data sheet, 6 V
+    }
+)
+"""Model -> its velocity (rad/s) without load, where a source tells it."""
 
 
 class Firmware(NamedTuple):

@@ -70,8 +70,9 @@ class Traits:
 
     @property
     def has(self) -> tuple[Mode, ...]:
-        """The modes that servos of this map have."""
-        return tuple(self.modes.values()) or (Mode.POSITION, Mode.PWM)
+        """The modes that servos of this map have, without those whose order has no published register."""
+        modes = tuple(self.modes.values()) or (Mode.POSITION, Mode.PWM)
+        return tuple(mode for mode in modes if self.duty or mode is not Mode.PWM)
 
     def code(self, mode: Mode) -> int | None:
         """The value of `operating_mode` for this mode; None where the map has no such value."""

@@ -17,7 +17,7 @@ from motorbus.errors import MotorbusError, OutcomeUnknown, RequestError
 from motorbus.families.feetech import protocol
 from motorbus.families.feetech.driver import eeprom, goals
 from motorbus.families.feetech.driver.identity import check_map, known, writable
-from motorbus.families.feetech.driver.motion import disable_torque
+from motorbus.families.feetech.driver.motion import calm_without_force, disable_torque
 from motorbus.families.feetech.driver.node import Node, Pending
 from motorbus.families.feetech.driver.requests import (
     Block,
@@ -53,6 +53,7 @@ BY_NAME: Final = {
     for name, table in TABLES.items()
 }
 """The rows as a write by name sees them: a known homing offset may be restored, though it belongs to one servo."""
+ORDERS: Final = frozenset(("goal_position", "goal_velocity"))
 REDEFINES_GOALS: Final = frozenset(("operating_mode", "angular_resolution", "homing_offset"))
 GAP: Final = 8  # bytes between two rows that are cheaper to read than to leave out
 
@@ -112,6 +113,9 @@ async def write(node: Node, /, *, force: bool = False, **values: Value) -> None:
     if limp:
         await disable_torque(node)
         live = sorted((*live, *limp), key=lambda one: one[0].address)
+    for row, raw in live:
+        if raw and _bounds_force(node, row):
+            await calm_without_force(node, row)
     for block in blocks_of(node, live):
         await confirmed(node, block._replace(effect=Effect.NONE) if limp else block)
 
@@ -119,6 +123,13 @@ async def write(node: Node, /, *, force: bool = False, **values: Value) -> None:
 def _needs_limp(row: Register) -> bool:
     """Writing this RAM row moves a servo with torque, and it is no goal that the gate could judge."""
     return row.effect is Effect.MOTION and row.storage is Storage.RAM and not row.name.startswith("goal_")
+
+
+def _bounds_force(node: Node, row: Register) -> bool:
+    """At 0 this row leaves a servo without force: more lets it move to its goal."""
+    if row.name == node.traits.current:
+        return node.known_mode in (Mode.POSITION, Mode.VELOCITY)
+    return row.name == node.traits.limit
 
 
 # -- checks ----------------------------------------------------------------------------------------------------
@@ -160,7 +171,20 @@ def raw_values(node: Node, table: RegisterMap, values: Mapping[str, Value]) -> R
         return raw
 
     raws = writable_values(BY_NAME[table.name], values, to_raw, node=node.node, methods=METHODS)
+    _check_limits(node, {row.name: raw for row, raw in raws})
     return [(node.row(row.name), raw) for row, raw in raws]
+
+
+def _check_limits(node: Node, raws: Mapping[str, int]) -> None:
+    """Raise RequestError for a low limit that is not below the high one; both 0 are no limits."""
+    if node.settings is None or not raws.keys() & set(GROUPS["limits"]):
+        return
+    low, high = (
+        raws.get(name, raw) for name, raw in zip(GROUPS["limits"], node.settings.raw_limits, strict=True)
+    )
+    if low >= high and (low or high):
+        what = f"would have the position limits {low} to {high} (raw), which leave no range"
+        raise node.refusal(what, "write both limits, the lower one first")
 
 
 def _check_value(node: Node, row: Register, raw: int) -> None:
@@ -251,10 +275,21 @@ def ram_block(node: Node, values: Mapping[str, Value], what: str) -> Block:
     assert node.table is not None
     raws = raw_values(node, node.table, values)
     found = list(blocks_of(node, raws))
+    _check_force(node, raws, what)
     if len(found) == 1 and all(row.storage is Storage.RAM and not _needs_limp(row) for row, _ in raws):
         return found[0]
     names = ", ".join(values) or "none"
     raise node.refusal(f"takes adjoining RAM registers by {what}, not {names}", "write() the others")
+
+
+def _check_force(node: Node, raws: Raws, what: str) -> None:
+    """Raise RequestError for a bound of the force without a goal: from 0 it would let the servo move to an old one."""
+    if any(row.name in ORDERS for row, _ in raws):
+        return
+    for row, raw in raws:
+        known = row.name == node.traits.current and node.has_force
+        if raw and _bounds_force(node, row) and not known:
+            raise node.refusal(f"may jump by {row.name} in a {what}", f"write({row.name}=…) calms it first")
 
 
 # -- REG WRITE and ACTION --------------------------------------------------------------------------------------
@@ -273,11 +308,13 @@ async def reg_write(node: Node, /, **values: Value) -> None:
 async def hand_over(node: Node, block: Block) -> None:
     """REG WRITE one block, and see that it waits."""
 
+    facts, id = node.facts, node.node
+
     def note(stops: Stops) -> None:
-        node.pending = Pending(block.goals, node.settings, node.epoch, stops(node.node))
+        facts.pending[id] = Pending(block.goals, node.settings, facts.epochs[id], stops(id))
 
     if not block.goals:
-        node.pending = None
+        facts.pending.pop(id, None)
     wire = protocol.reg_write(node.node, block.address, block.data)
     block = block._replace(repeatable=False, unless=note if block.goals else None)
     request = acknowledged(node, wire, block, deferred=Deferred(node.node))
@@ -292,56 +329,64 @@ async def action(node: Node) -> None:
     Raises RequestError if it was stopped, limp or given other settings since; OutcomeUnknown without acknowledgement.
     """
     await writable(node)
-    check_waiting([node])
     deferred = Deferred(node.node, begins=True)
-    request = acknowledged(node, protocol.action(node.node), _released([node]), deferred=deferred)
+    block = _released([node], [node.node])
+    request = acknowledged(node, protocol.action(node.node), block, deferred=deferred)
     await request
-    node.pending = None
+    node.facts.pending.pop(node.node, None)
     if not request.expected:
         await _check_waiting(node, False, request)
 
 
-def action_all(nodes: Sequence[Node] = ()) -> Request[None]:
+def action_all(nodes: Sequence[Node]) -> Request[None]:
     """ACTION as a broadcast without replies: every servo carries out its last REG WRITE at the same moment.
 
-    `nodes` are those whose goals the gate judges once more, and for which it is refused as `action` says; others obey
-    as well.
+    `nodes` are some servos of the bus; all others obey as well. It is refused as `action` says if it is stale for one
+    servo to which a REG WRITE of this bus object went, and the gate judges the goals of all of these once more.
     """
+    if not nodes or not all(isinstance(node, Node) for node in nodes):
+        raise RequestError("action_all() takes servo objects, which know what waits", expected="one or more")
     for node in nodes:
         if node.identity is not None:
             check_map(node)
-    check_waiting(nodes)
-    block = _released(nodes)
-    return unanswered(
+    pending = nodes[0].facts.pending
+    block = _released(nodes, list(pending))
+    request = unanswered(
         protocol.action(),
         block.effect,
         block.goals,
         unless=block.unless,
         deferred=Deferred(None, begins=True),
     )
+    return request.convert(lambda _: pending.clear())
 
 
-def _released(nodes: Sequence[Node]) -> Block:
-    goals = tuple(goal for node in nodes if node.pending for goal in node.pending.goals)
-    effect = Effect.MOTION if goals else Effect.TORQUE
-    return Block(0, b"", effect, goals, repeatable=False, unless=lambda stops: _stale(nodes, stops))
+def _released(nodes: Sequence[Node], ids: Sequence[int]) -> Block:
+    """What an ACTION to these ids releases. Raises RequestError if it is stale."""
 
+    def stale(stops: Stops) -> MotorbusError | None:
+        return _stale(nodes, ids, stops)
 
-def check_waiting(nodes: Sequence[Node]) -> None:
-    """Raise RequestError if one of these was stopped, limp or given other settings since its REG WRITE."""
-    if error := _stale(nodes, lambda _: 0):
+    if error := stale(lambda _: 0):
         raise error
+    waiting = nodes[0].facts.pending
+    goals = tuple(goal for id in ids if id in waiting for goal in waiting[id].goals)
+    effect = Effect.MOTION if goals else Effect.TORQUE
+    return Block(0, b"", effect, goals, repeatable=False, unless=stale)
 
 
-def _stale(nodes: Sequence[Node], stops: Stops) -> MotorbusError | None:
+def _stale(nodes: Sequence[Node], ids: Sequence[int], stops: Stops) -> MotorbusError | None:
+    """The error if one of these was stopped, limp or given other settings since its REG WRITE."""
+    facts = nodes[0].facts
     for node in nodes:
-        pending = node.pending
-        if pending is None:
-            continue
-        if pending.settings is not node.settings:
+        pending = facts.pending.get(node.node)
+        if pending is not None and (pending.settings != node.settings or node.is_outdated):
             return outdated(node)
-        if pending.epoch != node.epoch or stops(node.node) > pending.stops:
-            return node.refusal("was stopped or made limp after its REG WRITE", "reg_write() it again")
+    for id in ids:
+        pending = facts.pending.get(id)
+        if pending is not None and (pending.epoch != facts.epochs[id] or stops(id) > pending.stops):
+            what = f"node {id} was stopped or made limp after its REG WRITE"
+            return RequestError(what, advice="reg_write() it again", node=id)
     return None
 
 

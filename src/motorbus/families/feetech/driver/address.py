@@ -179,6 +179,10 @@ async def _plan_and_move(node: Node, change: AddressChange) -> None:
     change = change._replace(image=await check_alone(node))
     async with BitrateRestored():
         taken = [place for place in change.places if place != change.old and await look(place)]
+        others = node.facts.second_ids.items()
+        owner = next((id for id, second in others if second == change.new.id and id != node.node), None)
+        if change.cell == ID and owner is not None:
+            raise node.refusal(f"cannot move: servo {owner} obeys {change.new.id} as its second id")
         if change.new in taken:
             raise node.refusal(f"cannot move: the id {change.new.id} is taken at {change.new.rate} bit/s")
     move = _Move(change._replace(taken=tuple(taken)))
@@ -244,15 +248,20 @@ async def settle(change: AddressChange) -> str:
     """Find the servo, write the address that it is to have with the lock open, and lock it: "new" or "old"."""
     last: MotorbusError | None = None
     for _ in range(ROUNDS):
-        for place in change.places:
-            try:
-                if change.is_it(await look(place)):
-                    goal = change.new if place == change.new else change.old
-                    await move_to(change, place, goal)
-                    return "new" if goal == change.new else "old"
-            except (NoReply, WireError, OutcomeUnknown) as error:
-                last = error
-                break
+        try:
+            found = [place for place in change.places if change.is_it(await look(place))]
+            if len(found) > 1:
+                where = " and ".join(f"id {place.id} at {place.rate} bit/s" for place in found)
+                raise RequestError(
+                    f"two servos could be the one that was {change.old.id}: {where}",
+                    advice="connect one of them alone, then recover again",
+                )
+            for place in found:
+                goal = change.new if place == change.new else change.old
+                await move_to(change, place, goal)
+                return "new" if goal == change.new else "old"
+        except (NoReply, WireError, OutcomeUnknown) as error:
+            last = error
         await Sleep(AWAKE)
     what = f"the servo that was {change.old.id} is at neither address"
     raise last or NoReply(what, advice="scan all rates")

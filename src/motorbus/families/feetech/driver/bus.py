@@ -63,6 +63,7 @@ _AXIS: Final = AxisDriver(
     stop=motion.stop,
     limits=motion.limits,
     travel=motion.travel,
+    max_velocity=motion.max_velocity,
     cap_torque=motion.cap_torque,
     cap_current=motion.cap_current,
     stream=stream.open_stream,
@@ -139,7 +140,7 @@ class FeetechDriver(HalfDuplexSerial):
             names -= _POSITION_ONLY
         axis = AxisDriver(**{name: getattr(_AXIS, name) for name in names})
         if mode == Mode.VELOCITY.value:
-            return replace(axis, jog=modes.jog)
+            return replace(axis, jog=modes.jog, set_velocity=modes.set_velocity)
         return axis
 
     def decode(self, data: bytes) -> list[Explanation]:

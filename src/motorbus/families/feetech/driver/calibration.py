@@ -249,7 +249,7 @@ async def set_multi_turn(node: Node, on: bool, limits: tuple[float, float] | Non
     row = table["phase"]
     byte = image[row.address]
     phase = Block(row.address, bytes((byte | TURNS_BIT if on else byte & ~TURNS_BIT,)))
-    bounds = limits_block(node, table, (0, 0) if on or wished is None else raw_limits(node, table, wished))
+    bounds = limits_block(table, (0, 0) if on or wished is None else raw_limits(node, table, wished))
     # Never limits of 0 without the bit: then no position would tell the turn.
     await store(node, table, [phase, bounds] if on else [bounds, phase])
     await read_settings(node)

@@ -58,6 +58,10 @@ def _rules(node: Node, raw: Raw) -> list[tuple[bool, str]]:
     return [
         (mode is None, f"its operating mode {shown_mode(node)} is not documented: set_mode('position')"),
         (
+            mode is Mode.PWM and not traits.duty,
+            "the duty register of its PWM mode is not published: set_mode('position')",
+        ),
+        (
             mode is Mode.POSITION and low >= high and not settings.many_turns,
             f"its position limits {low} to {high} (raw) leave no range: write limits that do",
         ),

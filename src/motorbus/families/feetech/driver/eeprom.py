@@ -125,17 +125,23 @@ async def _store(
         return False
     held = keep_torque and not await is_limp(node)
     level = table["status_return_level"].address
-    async with unlocked:
-        if held:
-            await confirmed(node, limp(node)._replace(unless=unlocked.stopped))  # counts the stops so far
-        for block, before in changes:
-            unlocked.before.append(before)
-            await confirmed(node, block, timeout=STORE)
-            if block.address <= level < block.address + len(block.data):
-                node.forget_answers()
-            await verified(node, block, timeout=STORE)
-        await unlocked.check_open()
+
+    async def write_all() -> None:
+        async with unlocked:
+            if held:
+                await confirmed(node, limp(node)._replace(unless=unlocked.stopped))  # counts the stops so far
+            for block, before in changes:
+                unlocked.before.append(before)
+                await confirmed(node, block, timeout=STORE)
+                if block.address <= level < block.address + len(block.data):
+                    node.forget_answers()
+                await verified(node, block, timeout=STORE)
+            await unlocked.check_open()
+
+    error = await catch(write_all())
     if held:
         failure = await catch(torque_on_unless(node, unlocked.stopped))
         await Emit(TorqueAfterWrite(node.node, failure is None, failure.summary if failure else ""))
+    if error is not None:
+        raise error
     return True

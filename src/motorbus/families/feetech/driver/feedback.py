@@ -10,13 +10,14 @@ from collections.abc import Callable
 from typing import Final, TypeVar
 
 from motorbus.core.family import Health, State
-from motorbus.core.register import RegisterMap
-from motorbus.core.request import Request
+from motorbus.core.register import Register, RegisterMap
+from motorbus.core.request import ExactDecoder
 from motorbus.core.steps import Runnable
 from motorbus.errors import DeviceError
 from motorbus.families.feetech.driver.identity import known, unknown_map
 from motorbus.families.feetech.driver.node import Node
-from motorbus.families.feetech.driver.requests import PRESENT, TORQUE_ENABLE, read_block
+from motorbus.families.feetech.driver.requests import DATA, PRESENT, SOUND, TORQUE_ENABLE, read_block
+from motorbus.families.feetech.protocol import HEADER, OVERHEAD
 
 T = TypeVar("T")
 
@@ -79,52 +80,66 @@ def health(node: Node) -> Runnable[Health]:
     return read_block(node, TORQUE_ENABLE, PRESENT + FEEDBACK - TORQUE_ENABLE, take)
 
 
-def position(node: Node) -> Runnable[float]:
-    """Present position (rad), without the homing offset in every mode. Raises DeviceError for an unknown map."""
-    return _quantity(node, "present_position")
+def _quantity(name: str, text: str) -> Callable[[Node], Runnable[float]]:
+    """The function that reads this row."""
+
+    def read(node: Node) -> Runnable[float]:
+        kept = node.kept.get(name)
+        if kept is not None and kept[0] is node.settings:
+            return kept[1]
+        if node.table is None or node.settings is None:
+            return _identify_then(node, read)
+        if name not in node.table or not node.table[name].unit:
+            raise _unknown(node, name.removeprefix("present_"))
+        row = node.table[name]
+
+        def take(data: bytes) -> float:
+            return float(node.value(row, row.decode(data)))
+
+        request = read_block(node, row.address, row.size, take)
+        request.decode_exact = _exact(node, row)
+        node.kept[name] = node.settings, request
+        return request
+
+    read.__name__ = name.removeprefix("present_")
+    read.__qualname__ = read.__name__
+    read.__doc__ = text
+    return read
 
 
-def velocity(node: Node) -> Runnable[float]:
-    """Present velocity (rad/s). Raises DeviceError for an unknown map."""
-    return _quantity(node, "present_velocity")
+def _exact(node: Node, row: Register) -> ExactDecoder[float] | None:
+    """Decode one whole reply without an alarm, whose value is not negative; None where the homing offset counts."""
+    settings = node.settings
+    if settings is not None and settings.shift and row.name == "present_position":
+        return None
+    size, order = OVERHEAD + row.size, row.order
+    head = HEADER + bytes((node.node, row.size + 2, 0))
+    scale, sign = float(node.value(row, 1)), 1 << (8 * row.size if row.sign_bit is None else row.sign_bit)
+
+    def decode(data: bytes, at: float) -> float | None:
+        if len(data) != size or not data.startswith(head) or sum(data) & 0xFF != SOUND:
+            return None
+        raw = int.from_bytes(data[DATA:-1], order)
+        if raw >= sign or node.settings is not settings:
+            return None
+        node.at, node.alarm = at, ()
+        return raw * scale
+
+    return decode
 
 
-def load(node: Node) -> Runnable[float]:
-    """Duty of the bridge, -1 to 1; it is not the torque."""
-    return _quantity(node, "present_load")
-
-
-def current(node: Node) -> Runnable[float]:
-    """Current (A): of the supply, on HLS of the motor phase. Raises DeviceError where it is unknown."""
-    return _quantity(node, "present_current")
-
-
-def voltage(node: Node) -> Runnable[float]:
-    """Supply voltage (V)."""
-    return _quantity(node, "present_voltage")
-
-
-def temperature(node: Node) -> Runnable[float]:
-    """Temperature (°C)."""
-    return _quantity(node, "present_temperature")
-
-
-def _quantity(node: Node, name: str) -> Runnable[float]:
-    kept = node.kept.get(name)
-    if kept is not None and kept[0] is node.settings:
-        return kept[1]
-    if node.table is None or node.settings is None:
-        return _identify_then(node, lambda same: _quantity(same, name))
-    if name not in node.table or not node.table[name].unit:
-        raise _unknown(node, name.replace("_", " "))
-    row = node.table[name]
-
-    def take(data: bytes) -> float:
-        return float(node.value(row, row.decode(data)))
-
-    request: Request[float] = read_block(node, row.address, row.size, take, kept=True)
-    node.kept[name] = node.settings, request
-    return request
+position = _quantity(
+    "present_position",
+    "Present position (rad), without the homing offset in every mode. Raises DeviceError for an unknown map.",
+)
+velocity = _quantity("present_velocity", "Present velocity (rad/s). Raises DeviceError for an unknown map.")
+load = _quantity("present_load", "Duty of the bridge, -1 to 1; it is not the torque.")
+current = _quantity(
+    "present_current",
+    "Current (A): of the supply, on HLS of the motor phase. Raises DeviceError where it is unknown.",
+)
+voltage = _quantity("present_voltage", "Supply voltage (V).")
+temperature = _quantity("present_temperature", "Temperature (°C).")
 
 
 async def _identify_then(node: Node, read: Callable[[Node], Runnable[T]]) -> T:
@@ -134,5 +149,5 @@ async def _identify_then(node: Node, read: Callable[[Node], Runnable[T]]) -> T:
 
 def _unknown(node: Node, what: str) -> DeviceError:
     if not node.is_writable:
-        return unknown_map(node, f"cannot tell its {what} in a unit")
+        return unknown_map(node)
     return DeviceError(f"node {node.node}: its {what} has no known unit", advice="read_raw()", node=node.node)

@@ -271,5 +271,5 @@ def checked_limits(node: Node) -> tuple[float, float]:
 
 def no_duty(node: Node) -> RequestError:
     """The error for PWM mode of HLS: the HLS memory table names the mode and no register, the SDK has no call."""
-    fix = "use its current mode, or disable_torque()"
+    fix = "disable_torque(), then set_mode('position'), 'velocity' or 'current'"
     return node.refusal("is an HLS servo, whose duty register is not published", fix)

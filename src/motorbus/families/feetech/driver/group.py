@@ -27,6 +27,7 @@ from motorbus.core.steps import Emit, Exclusive, SetBitrate, catch, with_cleanup
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech import protocol
 from motorbus.families.feetech.driver.access import (
+    GROUPS,
     Span,
     action_all,
     check_names,
@@ -44,7 +45,9 @@ from motorbus.families.feetech.driver.node import IMAGE, Node, as_nodes
 from motorbus.families.feetech.driver.requests import (
     DATA,
     PRESENT,
+    SOUND,
     Block,
+    outdated,
     read_block,
     reports_position,
     unanswered,
@@ -55,7 +58,6 @@ T = TypeVar("T")
 One = TypeVar("One", bound=int | Node)
 
 AIR: Final = 0.004  # s of replies of one request
-SOUND: Final = 0xFD  # low byte of the sum of a whole valid packet, header and checksum included
 BITS: Final = 10  # of a byte on the wire
 MOST_IDS: Final = 251
 NUMBERS: Final = frozenset((float, int))
@@ -93,6 +95,11 @@ async def sync_read(names: Sequence[str], ids: Iterable[int | Node]) -> GroupRes
         if node.node in raws:
             groups.setdefault((_table(node).name, _table(node)["present_position"].order), []).append(node)
     for group in groups.values():
+        for node in group:
+            if error := _lacks(node, names):
+                errors[node.node] = error
+        if group[0].node in errors:
+            continue
         for span in spans(rows_of(_table(group[0]), names)):
             here = [node for node in group if node.node not in errors]
             for part in await divided(here, span.size):
@@ -112,9 +119,19 @@ async def sync_read(names: Sequence[str], ids: Iterable[int | Node]) -> GroupRes
     )
 
 
+def _lacks(node: Node, names: Sequence[str]) -> MotorbusError | None:
+    """The error for a servo whose map lacks one of these registers."""
+    lacking = [name for name in names if name not in GROUPS and name not in _table(node)]
+    return (
+        node.refusal(f"has the map {_table(node).name}, which has no {', '.join(lacking)}")
+        if lacking
+        else None
+    )
+
+
 async def prepare_all(ids: Iterable[int | Node]) -> dict[int, MotorbusError]:
     """Identify those of these servos that are unknown; the errors by id."""
-    nodes = [node for node in as_nodes(ids) if node.table is None or node.settings is None]
+    nodes = [node for node in as_nodes(ids) if node.settings is None or node.is_outdated]
     errors: dict[int, MotorbusError] = {}
     for part in await divided(nodes, IMAGE):
         images = await collect(part, 0, IMAGE, errors)
@@ -136,7 +153,8 @@ async def collect(
 ) -> dict[int, bytes]:
     """One block of each: by SYNC READ, then by READ of those that it did not return; errors of the rest by id."""
     able = [node for node in nodes if node.traits.sync_read and not node.reads_alone]
-    found = await _sync_blocks(able, address, count) if len(able) > 1 else {}
+    able = able if len(able) > 1 else []
+    found = await _sync_blocks(able, address, count) if able else {}
     for node in nodes:
         if node.node in found:
             node.reads_alone = False
@@ -203,51 +221,42 @@ def positions_request(nodes: Sequence[Node]) -> Request[Positions]:
             values[id] = float(by_id[id].value(row, row.decode(data[: row.size])))
         return Positions(values, answer.missing, answer.at)
 
-    exact = exact_positions(nodes, list(rows.values()))
+    exact = _exact_positions(nodes, list(rows.values()))
     return sync_request(nodes, PRESENT, 2, decode, exact)
 
 
-def exact_positions(nodes: Sequence[Node], rows: Sequence[Register]) -> ExactDecoder[Positions] | None:
-    """The fast decoder of `positions_request`; None for mixed byte orders, and modes that leave the offset in."""
+def _exact_positions(nodes: Sequence[Node], rows: Sequence[Register]) -> ExactDecoder[Positions] | None:
+    """Decode a SYNC READ if its bytes are all replies, in order, valid, without an alarm, none negative.
+
+    None for mixed byte orders, and modes that leave the offset in.
+    """
     if len({row.order for row in rows}) > 1 or any(
         node.settings is None or node.settings.shift for node in nodes
     ):
         return None
-    order = "<" if rows[0].order == "little" else ">"
-    unpack = Struct(order + "5xHx" * len(nodes)).unpack
+    unpack = Struct(("<" if rows[0].order == "little" else ">") + "5xHx" * len(nodes)).unpack
     made = [(node, node.settings) for node in nodes]
     ids = [node.node for node in nodes]
     scales = [float(node.value(row, 1)) for node, row in zip(nodes, rows, strict=True)]
+    size = protocol.OVERHEAD + 2
+    heads = [protocol.HEADER + bytes((id, 4, 0)) for id in ids]
+    parts = [(slice(number * size, (number + 1) * size), head) for number, head in enumerate(heads)]
 
-    def take(data: bytes, at: float) -> Positions | None:
-        raws = unpack(data)
-        if max(raws) >= 0x8000:  # negative
-            return None
-        values = dict(zip(ids, map(mul, raws, scales)))  # noqa: B905 - as many
-        for node, settings in made:
-            if node.settings is not settings:
-                return None
-            node.at, node.alarm = at, ()
-        return Positions(values, (), at)
-
-    return exact_decoder(ids, 2, take)
-
-
-def exact_decoder(ids: Sequence[int], count: int, take: ExactDecoder[T]) -> ExactDecoder[T]:
-    """Decode a SYNC READ if its bytes are all replies, in order, with valid checksums and no alarm."""
-    size = protocol.OVERHEAD + count
-    heads = [protocol.HEADER + bytes((id, count + 2, 0)) for id in ids]
-    total = size * len(ids)
-    parts = [(slice(at, at + size), head) for at, head in zip(range(0, total, size), heads, strict=True)]
-
-    def decode(data: Any, at: float) -> T | None:
-        if len(data) != total:
+    def decode(data: Any, at: float) -> Positions | None:
+        if len(data) != size * len(ids):
             return None
         for part, head in parts:
             frame = data[part]
             if not frame.startswith(head) or sum(frame) & 0xFF != SOUND:
                 return None
-        return take(data, at)
+        raws = unpack(data)
+        if max(raws) >= 0x8000:  # negative
+            return None
+        for node, settings in made:
+            if node.settings is not settings:
+                return None
+            node.at, node.alarm = at, ()
+        return Positions(dict(zip(ids, map(mul, raws, scales))), (), at)  # noqa: B905 - as many
 
     return decode
 
@@ -259,10 +268,10 @@ def _table(node: Node) -> RegisterMap:
 
 def known_row(node: Node, name: str) -> Register:
     """A row of an identified servo. Raises RequestError if it is not, DeviceError for an unknown map."""
-    if node.table is None or node.settings is None:
+    if node.table is None or node.settings is None or node.is_outdated:
         raise node.refusal("is not identified, so its limits and units are unknown", "run prepare_all()")
     if not node.table[name].unit:
-        raise unknown_map(node, f"cannot tell its {name.replace('_', ' ')} in a unit")
+        raise unknown_map(node)
     return node.row(name)
 
 
@@ -272,10 +281,10 @@ def known_row(node: Node, name: str) -> Register:
 async def sync_write(values: Mapping[One, Mapping[str, Value]]) -> None:
     """Write the same adjoining RAM registers of many servos: `{id or servo: {name: value}}`, in API units.
 
-    No servo acknowledges it. One packet carries up to 83 servos with two bytes each; more packets are not simultaneous.
-    Nothing is written if a servo is silent or unknown, or a value cannot be written.
+    No servo acknowledges it. One packet carries up to 83 servos with two bytes each. Nothing is written if a servo is
+    silent or unknown, or a value cannot be written.
     """
-    await send_all(sync_writes(*await _prepared(values, "SYNC WRITE")))
+    await sync_write_request(*await _prepared(values, "SYNC WRITE"))
 
 
 async def _prepared(values: Mapping[One, Mapping[str, Value]], what: str) -> tuple[list[Node], list[Block]]:
@@ -293,38 +302,22 @@ async def _prepared(values: Mapping[One, Mapping[str, Value]], what: str) -> tup
     return nodes, [ram_block(node, orders, what) for node, orders in zip(nodes, values.values(), strict=True)]
 
 
-def sync_writes(nodes: Sequence[Node], blocks: Sequence[Block]) -> list[Request[None]]:
-    """These blocks in few SYNC WRITEs. Each is judged by the goals of the later ones too."""
-    places: dict[tuple[int, int], list[tuple[Node, Block]]] = {}
-    for node, block in zip(nodes, blocks, strict=True):
-        places.setdefault((block.address, len(block.data)), []).append((node, block))
-    parts = []
-    for (_, size), group in places.items():
-        most = protocol.sync_write_capacity(size)
-        parts += [group[start : start + most] for start in range(0, len(group), most)]
-    requests = []
-    for number, part in enumerate(parts):
-        left = [one for later in parts[number:] for one in later]
-        requests.append(
-            unanswered(
-                protocol.sync_write(part[0][1].address, [(node.node, block.data) for node, block in part]),
-                max(block.effect for _, block in left),
-                tuple(goal for _, block in left for goal in block.goals),
-                unless=unchanged([node for node, _ in left]),
-            )
+def sync_write_request(nodes: Sequence[Node], blocks: Sequence[Block]) -> Request[None]:
+    """These blocks in one SYNC WRITE. Raises RequestError if they lie at different addresses, or are too many."""
+    places = {(block.address, len(block.data)) for block in blocks}
+    if len(places) > 1:
+        raise RequestError(
+            "these registers are not in one place in the maps of these servos",
+            advice="write the servos of each map by themselves",
         )
-    return requests
-
-
-async def send_all(requests: Sequence[Request[None]]) -> None:
-    """Send these one after the other; an error of a later one says how many have left."""
-    for sent, request in enumerate(requests):
-        try:
-            await request
-        except MotorbusError as error:
-            if sent:
-                error.add_note(f"{sent} of {len(requests)} packets had left before this one")
-            raise
+    return unanswered(
+        protocol.sync_write(
+            blocks[0].address, [(node.node, block.data) for node, block in zip(nodes, blocks, strict=True)]
+        ),
+        max(block.effect for block in blocks),
+        tuple(goal for block in blocks for goal in block.goals),
+        unless=unchanged(nodes),
+    )
 
 
 class GoalWriter:
@@ -354,7 +347,13 @@ class GoalWriter:
 
     def holds(self) -> bool:
         """Whether the settings of all servos are those that it was made by."""
-        return all(node.settings is settings for node, settings in self._made)
+        return self._outdated() is None
+
+    def _outdated(self) -> Node | None:
+        for node, settings in self._made:
+            if node.settings is not settings or node.is_outdated:
+                return node
+        return None
 
     def __call__(self, goals: Sequence[float]) -> Request[None]:
         """The packet with these goals (rad), one for each servo; the gate judges the limits.
@@ -385,12 +384,13 @@ class GoalWriter:
 
     def _checked(self, goals: Sequence[float]) -> Request[None]:
         """The packet with a negative goal, or one outside the limits, which the gate judges."""
+        if node := self._outdated():
+            raise outdated(node)
         blocks = []
         for node, row, goal in zip(self._nodes, self._rows, goals, strict=True):
             raw, order = position_goal(node, goal)
             blocks.append(Block(row.address, row.encode(raw), row.effect, (order,)))
-        (request,) = sync_writes(self._nodes, blocks)
-        return request
+        return sync_write_request(self._nodes, blocks)
 
 
 def _cell(node: Node, row: Register) -> tuple[float, int, int]:
@@ -450,8 +450,7 @@ class ServoGroup:
                 ram_block(node, dict(zip(names, row, strict=True)), "SYNC WRITE")
                 for node, row in zip(self.servos, rows, strict=True)
             ]
-            (request,) = sync_writes(self.servos, blocks)
-            return request
+            return sync_write_request(self.servos, blocks)
 
         return make
 
@@ -518,7 +517,5 @@ async def reg_write_all(values: Mapping[One, Mapping[str, Value]]) -> None:
                 error.add_note(f"servos {held} may hold a REG WRITE, which the next ACTION would carry out")
                 raise
         await action_all(nodes)
-        for node in nodes:
-            node.pending = None
 
     await Exclusive(hand_over_all())

@@ -108,7 +108,7 @@ async def read_settings(node: Node) -> RegisterMap:
 def check_map(node: Node) -> None:
     """Raise DeviceError for a servo of an unknown map."""
     if not node.is_writable:
-        raise unknown_map(node, "refuses to write to it")
+        raise unknown_map(node)
 
 
 def learn(node: Node, image: bytes) -> Identity:
@@ -122,6 +122,9 @@ def learn(node: Node, image: bytes) -> Identity:
         node.table = common_table(chosen.order)
         settings = Settings(answers_writes=image[STS["status_return_level"].address] != 0)
     node.facts.maps[node.node] = chosen.table
+    node.facts.second_ids.pop(node.node, None)
+    if "second_id" in node.table:
+        node.facts.second_ids[node.node] = image[node.table["second_id"].address]
     node.identity = _identity(node, chosen, image, settings)
     node.learn_settings(settings)
     return node.identity
@@ -157,13 +160,13 @@ def common_table(order: str) -> RegisterMap:
     return RegisterMap("common", rows, title="what all FEETECH register maps share; read-only")
 
 
-def unknown_map(node: Node, refusal: str) -> DeviceError:
+def unknown_map(node: Node) -> DeviceError:
     """The error for what needs a register map that the firmware of this servo does not tell."""
     identity = node.identity
     assert identity is not None
     return DeviceError(
         f"node {node.node} is {identity.model} with firmware {identity.firmware}, whose register map is unknown: "
-        f"motorbus {refusal}",
+        "its values have no known unit, and nothing is written",
         expected=f"a servo with one of the maps {', '.join(sorted(TABLES))}",
         cause="the same address means different things in different maps",
         advice="read() gives the registers that all maps share; disable_torque() works",

@@ -16,14 +16,13 @@ from motorbus.core.register import RegisterMap, is_number, shown
 from motorbus.core.request import Effect
 from motorbus.core.setpoint import Setpoint
 from motorbus.core.steps import Sleep, with_cleanup
-from motorbus.errors import LimitExceeded, RequestError
+from motorbus.errors import LimitExceeded, MotionError, RequestError
 from motorbus.families.feetech.driver import feedback, goals
 from motorbus.families.feetech.driver.eeprom import store
 from motorbus.families.feetech.driver.identity import read_settings, writable
 from motorbus.families.feetech.driver.motion import (
-    COUNTS,
-    TOLERANCE,
     Motion,
+    Promise,
     count_of,
     disable_torque,
     move_all,
@@ -54,8 +53,6 @@ async def set_mode(node: Node, mode: Mode | str, *, limits: tuple[float, float] 
     if wanted not in node.traits.has:
         has = " or ".join(one.value for one in node.traits.has)
         raise node.refusal(f"has no {wanted.value} mode", expected=has)
-    if wanted is Mode.PWM and not node.traits.duty:
-        raise goals.no_duty(node)
     by_code = "operating_mode" in table
     blocks = [_by_code(node, table, wanted, limits) if by_code else _by_limits(node, table, wanted, limits)]
     if node.traits.current and wanted is not Mode.CURRENT and node.known_mode in (Mode.CURRENT, None):
@@ -90,11 +87,11 @@ def _by_limits(node: Node, table: RegisterMap, wanted: Mode, limits: tuple[float
     """Both limits 0 for a motor; else limits, which only the caller or this object knows."""
     if wanted is Mode.PWM:
         node.former_limits = node.limits or node.former_limits
-        return limits_block(node, table, (0, 0))
+        return limits_block(table, (0, 0))
     wished = limits or node.limits or node.former_limits
     if wished is None:
         raise node.refusal("needs limits for position mode", "give limits=(low, high) in rad")
-    return limits_block(node, table, raw_limits(node, table, wished))
+    return limits_block(table, raw_limits(node, table, wished))
 
 
 def raw_limits(node: Node, table: RegisterMap, limits: tuple[float, float]) -> tuple[int, int]:
@@ -108,7 +105,7 @@ def raw_limits(node: Node, table: RegisterMap, limits: tuple[float, float]) -> t
     return raws
 
 
-def limits_block(node: Node, table: RegisterMap, raws: Sequence[int]) -> Block:
+def limits_block(table: RegisterMap, raws: Sequence[int]) -> Block:
     """The block of both position limits."""
     low, high = table["min_position_limit"], table["max_position_limit"]
     return Block(low.address, low.encode(raws[0]) + high.encode(raws[1]))
@@ -201,7 +198,6 @@ class _Step(Motion):
     here: dict[int, float] = field(default_factory=dict)
 
     async def check(self, device: Node, to: float) -> Setpoint:
-        self.tolerance = max(TOLERANCE, COUNTS * count_of(device))
         block = goals.step_block(device, to, self.velocity, self.acceleration)
         start = await feedback.position(device)
         self.here[device.node] = start
@@ -211,6 +207,10 @@ class _Step(Motion):
     async def send(self, device: Node, goal: Setpoint) -> None:
         await send_step(device, goals.step_block(device, self.by, self.velocity, self.acceleration))
         await Sleep(0.02)  # a goal whole turns away looks like this place until it moves
+
+    async def stop(self, device: Node) -> Promise:
+        await disable_torque(device)
+        return Promise.TORQUE_OFF_ACCEPTED
 
     async def sample(self, device: Node) -> State:
         state = await feedback.telemetry(device)
@@ -236,7 +236,7 @@ async def step(
     """Go `by` rad from here, over the end of a turn too. In step mode of STS and SMBL.
 
     Torque is switched on. Never sent twice: OutcomeUnknown if it was not acknowledged. An interrupt of the wait
-    does not stop it, for no goal of step mode holds: disable_torque() does. Bounds, tolerance, errors as in `move`.
+    makes it limp, for no goal of step mode holds. Bounds, tolerance, errors as in `move`.
     """
     if not is_number(by):
         raise LimitExceeded(f"node {node.node}: {shown(by)} is no angle", node=node.node)
@@ -244,7 +244,11 @@ async def step(
     goals.check_mode(node, Mode.STEP)
     if wait:
         logic = _Step(velocity, acceleration)
-        await move_all(logic, {node: by}, tolerance=tolerance, timeout=timeout)
+        try:
+            await move_all(logic, {node: by}, tolerance=tolerance, timeout=timeout)
+        except MotionError as error:
+            error.advice = error.advice.replace("stop()", "disable_torque()")
+            raise
     else:
         await send_step(node, goals.step_block(node, by, velocity, acceleration))
 

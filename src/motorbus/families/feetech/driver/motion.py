@@ -16,7 +16,7 @@ from typing import Any, Final
 
 from motorbus.core import move as core_move
 from motorbus.core.family import State
-from motorbus.core.register import RegisterMap, is_number, shown
+from motorbus.core.register import Register, RegisterMap, is_number, shown
 from motorbus.core.request import Effect, Precondition, Priority
 from motorbus.core.setpoint import Setpoint, torque_off, torque_on
 from motorbus.core.steps import Procedure, Sleep, catch
@@ -43,6 +43,7 @@ from motorbus.families.feetech.driver.requests import (
     verified,
     write_block,
 )
+from motorbus.families.feetech.models import NO_LOAD
 from motorbus.families.feetech.traits import Mode
 
 TOLERANCE: Final = 0.05
@@ -88,7 +89,7 @@ async def disable_torque(node: Node) -> None:
 
     Raises OutcomeUnknown if nothing is answered, VerificationFailed if the torque is still on.
     """
-    node.epoch += 1
+    node.facts.epochs[node.node] += 1
     doubt: MotorbusError | None = None
     for _ in range(TRIES):
         request = write_block(node, limp(node), priority=Priority.STOP)
@@ -236,6 +237,7 @@ async def ordered(node: Node, block: Block) -> None:
     await confirmed(node, block)
     if row is not None and has_bound:
         node.bound = row.decode(block.data[at : at + row.size])
+        node.has_force = node.bound != 0
 
 
 async def read_bound(node: Node, current: float | None = None) -> None:
@@ -243,6 +245,7 @@ async def read_bound(node: Node, current: float | None = None) -> None:
     if node.traits.current and node.bound is None and current is None:
         row = node.row(node.traits.current)
         node.bound = await read_block(node, row.address, row.size, row.decode)
+        node.has_force = node.bound != 0
 
 
 async def _read_commands(node: Node) -> bytes:
@@ -272,7 +275,7 @@ async def stop(node: Node) -> Promise:
     (`LIMP`); one with torque there is on its way to the nearer limit (`OUTSIDE_ACCEPTED`). Raises RequestError where
     only torque off ends a movement: step mode, PWM mode of HLS, an unknown mode, and where `enable_torque` raises it.
     """
-    node.epoch += 1
+    node.facts.epochs[node.node] += 1
     await read_settings(node)
     for attempt in range(TRIES):
         try:
@@ -340,11 +343,6 @@ class Motion(core_move.MoveLogic[Node]):
         await writable(device)
         await read_bound(device, self.current)
         goal = self._block(device, to).goals[0]
-        self.tolerance = max(TOLERANCE, COUNTS * count_of(device))
-        if self.velocity:  # a slow move takes its time for two counts
-            self.stall_time = (
-                core_move.STALL_TIME + 2 * max(core_move.PROGRESS, count_of(device)) / self.velocity
-            )
         self.ends[device.node] = goal.value
         return goal
 
@@ -361,6 +359,14 @@ class Motion(core_move.MoveLogic[Node]):
         if turn and state.position is not None:
             return state._replace(position=goal + remainder(state.position - goal, turn))
         return state
+
+    def tolerance_of(self, device: Node) -> float:
+        return max(TOLERANCE, COUNTS * count_of(device))
+
+    def stall_time_of(self, device: Node) -> float:
+        """A slow move takes its time for two counts."""
+        slow = 2 * max(core_move.PROGRESS, count_of(device)) / self.velocity if self.velocity else 0.0
+        return core_move.STALL_TIME + slow
 
     def stop(self, device: Node) -> Procedure[Promise | None]:
         return _stop_move(device)
@@ -444,15 +450,17 @@ async def cap_torque(node: Node, fraction: float) -> None:
     if not node.traits.limit:
         raise node.refusal("keeps its torque limit in EEPROM", "write(max_torque=…) sets it")
     row = table[node.traits.limit]
-    if fraction and not await read_block(node, row.address, row.size, row.decode):
-        await _calm(node)
+    if fraction:
+        await calm_without_force(node, row)
     block = Block(row.address, row.encode(node.raw(row, fraction)), row.effect)
     await confirmed(node, block)
     await verified(node, block)
 
 
-async def _calm(node: Node) -> None:
-    """Make a servo with torque and without force stay where it is when it gets its force back."""
+async def calm_without_force(node: Node, bound: Register) -> None:
+    """Make a servo with torque, whose force this row bounds to 0, stay where it is when it gets its force back."""
+    if await read_block(node, bound.address, bound.size, bound.decode):
+        return
     await read_settings(node)
     if node.known_mode is Mode.STEP or await is_limp(node):
         return
@@ -477,11 +485,8 @@ async def cap_current(node: Node, current: float) -> None:
     if node.known_mode not in (Mode.POSITION, Mode.VELOCITY):
         what = f"is in operating mode {goals.shown_mode(node)}, where its goal torque bounds nothing"
         raise node.refusal(what, "set_mode('position')")
-    node.bound = None
-    await read_bound(node)
-    if node.bound == 0:
-        await _calm(node)
     row = node.row(node.traits.current)
+    await calm_without_force(node, row)
     value, most = float(node.value(row, row.decode(data))), float(node.value(row, row.high))
     await ordered(node, Block(row.address, data, row.effect, (Setpoint(node.node, "cap", value, 0.0, most),)))
 
@@ -490,6 +495,12 @@ async def limits(node: Node) -> tuple[float, float]:
     """Lowest and highest position (rad); read if unknown. Raises RequestError where 0 and 0 have no known meaning."""
     await writable(node)
     return goals.checked_limits(node)
+
+
+async def max_velocity(node: Node) -> float | None:
+    """The velocity (rad/s) of its model without load; None where no source tells it."""
+    await known(node)
+    return NO_LOAD.get(node.identity.model) if node.identity else None
 
 
 async def travel(node: Node) -> tuple[float, float] | None:

@@ -28,6 +28,7 @@ _POSITIONS: Final = (
     "max_position_limit",
 )
 _VELOCITIES: Final = ("present_velocity", "goal_velocity")
+_ARCS: Final = ("homing_offset", "dead_band_cw", "dead_band_ccw", "hysteresis")
 
 
 class Settings(NamedTuple):
@@ -55,6 +56,7 @@ class Settings(NamedTuple):
     many_turns: bool = False
     tells_turns: bool = False
     shift: int = 0
+    raw_limits: tuple[int, int] = (0, 0)
     factors: Mapping[str, float] = {}
     protection_current: int = 0
     answers_writes: bool = True
@@ -80,13 +82,17 @@ class Pending(NamedTuple):
 class BusFacts:
     """What is known of the servos of one bus, by id.
 
-    `arcs` are settings (degrees), `maps` the maps that were met, `changes` counts own writes of EEPROM settings.
+    `arcs` are settings (degrees), `maps` the maps that were met, `second_ids` those of HLS, `changes` counts own writes
+    of EEPROM settings, `epochs` stops and torque-offs, `pending` are the REG WRITEs that wait.
     """
 
     def __init__(self, arcs: Mapping[int, float] | None = None) -> None:
         self.arcs: Final = arcs or {}
         self.maps: Final[dict[int, str]] = {}
+        self.second_ids: Final[dict[int, int]] = {}
         self.changes: Final[Counter[int]] = Counter()
+        self.epochs: Final[Counter[int]] = Counter()
+        self.pending: Final[dict[int, Pending]] = {}
 
 
 class Node:
@@ -100,16 +106,15 @@ class Node:
         self.settings: Settings | None = None  # None: not read, or maybe changed since
         self.alarm: tuple[str, ...] = ()  # alarm bits of the last reply
         self.at = -inf  # arrival of the last reply (s, link clock)
-        self.epoch = 0  # counts stops, torque-offs and changes of the settings
-        self.pending: Pending | None = None
         self.last_move: object = None
         self.bound: int | None = None  # raw goal torque of an HLS, as last read or written
+        self.has_force = False  # an HLS whose goal torque was above 0 after its settings were read
         self.former_limits: tuple[float, float] | None = None  # of an SCS that was made a motor
         self.reads_alone: bool | None = None  # it answers READ and not SYNC READ; None: unknown
         self.kept: Final[dict[str, tuple[Settings, Request[Any]]]] = {}  # requests, with their settings
         self._last: Settings | None = None
         self._is_written = False  # since `_last` was read
-        self._changes = 0  # of the facts, when `_last` was read
+        self._changes = self.facts.changes[node]  # when `_last` was read
 
     @property
     def limits(self) -> tuple[float, float] | None:
@@ -146,8 +151,6 @@ class Node:
         """Its settings were read. Equal ones stay the same object, so what was made by them still holds."""
         if settings == self._last and not self._is_written:
             settings = self._last
-        else:
-            self.epoch += 1
         self.settings = self._last = settings
         self._is_written = False
         self._changes = self.facts.changes[self.node]
@@ -156,6 +159,7 @@ class Node:
         """Its settings may have changed, or were `written`: they are read before they are used again."""
         self.settings = None
         self.bound = None
+        self.has_force = False
         if written:
             self._is_written = True
             self.facts.changes[self.node] += 1
@@ -217,7 +221,9 @@ def settings_of(table: RegisterMap, image: bytes, arc: float | None = None) -> S
     angle = stretch * max(1, raw("angular_resolution", 1))
     low, high = (-MANY_TURNS, MANY_TURNS) if many_turns else raw_limits
     velocity = stretch * traits.velocity_scale(phase)
+    factors = {**dict.fromkeys(_POSITIONS, angle), **dict.fromkeys(_VELOCITIES, velocity)}
     return Settings(
+        raw_limits=raw_limits,
         limits=(low * count * angle, high * count * angle) if low or high else None,
         mode=mode,
         mode_code=code,
@@ -227,7 +233,7 @@ def settings_of(table: RegisterMap, image: bytes, arc: float | None = None) -> S
         many_turns=many_turns,
         tells_turns=traits.tells_turns(phase),
         shift=0 if mode in (Mode.POSITION, None) else offset,
-        factors={**dict.fromkeys(_POSITIONS, angle), **dict.fromkeys(_VELOCITIES, velocity)},
+        factors={**factors, **dict.fromkeys(_ARCS, stretch)},
         protection_current=raw("protection_current") if traits.current else 0,
         answers_writes=raw("status_return_level") != 0,
         zero_is_maximum=traits.zero_is_maximum(phase),

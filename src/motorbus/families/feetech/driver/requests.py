@@ -41,6 +41,7 @@ TORQUE_ENABLE: Final = 40  # in every map
 ON: Final = b"\1"  # of the torque switch; any other value is limp
 STORE: Final = TimeoutClass.STORE
 ACKNOWLEDGED: Final = protocol.OVERHEAD  # bytes of a reply without parameters
+SOUND: Final = 0xFD  # low byte of the sum of a whole valid packet, header and checksum included
 DATA: Final = 5  # offset of the parameters in a reply
 DOUBTS: Final = (NoReply, OutcomeUnknown, WireError)
 """Failures of a write that the servo may have received."""
@@ -69,32 +70,22 @@ def read_block(
     *,
     priority: Priority = Priority.POLL,
     timeout: TimeoutClass = TimeoutClass.REPLY,
-    kept: bool = False,
 ) -> Request[T]:
-    """READ `count` bytes; `take` makes the value of them. `kept`: the request is run again and again."""
-    size = protocol.OVERHEAD + count
-    head = protocol.HEADER + bytes((node.node, count + 2, 0))  # 0: no alarm
+    """READ `count` bytes; `take` makes the value of them."""
 
     def decode(answer: Response) -> T:
         frame = answer.replies[0].data
         node.note_reply(frame[4], answer.at)
         return take(frame[DATA : DATA + count])
 
-    def decode_exact(data: bytes, at: float) -> T | None:
-        if len(data) != size or data[:DATA] != head or not protocol.is_valid(data):
-            return None
-        node.at, node.alarm = at, ()
-        return take(data[DATA : DATA + count])
-
     return Request(
         protocol.read(node.node, address, count),
-        (Expected(node.node, node.node, size),),
+        (Expected(node.node, node.node, protocol.OVERHEAD + count),),
         decode,
         priority=priority,
         reply_within=timeout,
         repeatable=True,
         reports_position=reports_position({node.node: node}, address, count),
-        decode_exact=decode_exact if kept else None,
     )
 
 
@@ -192,11 +183,11 @@ def unanswered(
 
 def unchanged(nodes: Iterable[Node], further: Precondition | None = None) -> Precondition:
     """Refuses a request once one of these servos has other settings than now: its goals would mean something else."""
-    made = [(node, node.settings) for node in nodes]
+    made = [(node, node.settings, node.facts.changes[node.node]) for node in nodes]
 
     def refusal(stops: Stops) -> MotorbusError | None:
-        for node, settings in made:
-            if node.settings is not settings:
+        for node, settings, changes in made:
+            if node.settings is not settings or node.facts.changes[node.node] != changes:
                 return outdated(node)
         return further(stops) if further is not None else None
 

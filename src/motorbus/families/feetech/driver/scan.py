@@ -91,7 +91,7 @@ async def broadcast_ping() -> set[int]:
         return {reply.data[2] for reply in answer.replies}
 
     wire = protocol.ping(protocol.BROADCAST)
-    return await Request(wire, ANY, decode, priority=Priority.CONFIGURATION)
+    return await Request(wire, ANY, decode)
 
 
 async def _answers(request: Request[object], garbled: set[int]) -> bool:

@@ -30,7 +30,6 @@ from motorbus.families.feetech.driver.identity import read_settings
 from motorbus.families.feetech.driver.motion import enable_torque
 from motorbus.families.feetech.driver.node import Node, as_nodes
 from motorbus.families.feetech.driver.requests import PRESENT, confirmed
-from motorbus.families.feetech.protocol import sync_write_capacity
 
 
 async def open_stream(servos: Sequence[Node], *, rate: int) -> ServoStream:
@@ -67,20 +66,19 @@ class ServoStream:
         self.nodes: Final = tuple(node.node for node in servos)
         self.positions: Final = tuple(positions)
         self._servos: Final = {node.node: node for node in servos}
-        self._writers: list[tuple[tuple[int, ...], GoalWriter]] = []
+        self._writer: GoalWriter | None = None
         self._ids: tuple[int, ...] = ()
 
     def goals(self, to: Mapping[int, float]) -> Sequence[Request[None]]:
-        """Goal positions (rad) of some or all servos, in one packet for up to 83.
+        """Goal positions (rad) of some or all servos, in one packet.
 
         Raises LimitExceeded for what no register holds, RequestError for a servo that is none of these or in another
         mode, or whose settings were written and not read since.
         """
-        if self._ids != tuple(to) or not all(writer.holds() for _, writer in self._writers):
-            self._ids, most = tuple(to), sync_write_capacity(2)
-            parts = [self._ids[start : start + most] for start in range(0, len(self._ids), most)]
-            self._writers = [(part, GoalWriter([self._servo(id) for id in part])) for part in parts]
-        return [writer([to[id] for id in ids]) for ids, writer in self._writers]
+        if self._writer is None or self._ids != tuple(to) or not self._writer.holds():
+            self._ids = tuple(to)
+            self._writer = GoalWriter([self._servo(id) for id in self._ids])
+        return [self._writer(list(to.values()))]
 
     async def start(self, speeds: Mapping[int, float]) -> None:
         """Torque on without a jump, one after the other, without acceleration and at most at these speeds (rad/s).

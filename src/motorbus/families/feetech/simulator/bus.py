@@ -121,7 +121,7 @@ class FeetechBus:
         self._pass(at)
         if self.quirks.echo:
             self._speak([Reply(at, 0, data, None, 0)])
-        if at - len(data) * self._byte_time(None) - self._received_at > FRAME_GAP:
+        if self._parser.held and at - len(data) * self._byte_time(None) - self._received_at > FRAME_GAP:
             self._parser = protocol.parser()
         self._received_at = at
         for frame, fault in self._parser.feed(data):
@@ -157,12 +157,12 @@ class FeetechBus:
 
     def _receivers(self, id: int, code: int, at: float) -> list[Servo]:
         """The servos that take this instruction to this id."""
-        servos = [servo for servo in self.servos if servo.receives(self.rate, at)]
-        if id == BROADCAST:
-            return servos
-        if code in WRITES:
-            return [servo for servo in servos if servo.obeys(id)]
-        return [servo for servo in servos if servo.id == id]
+        servos: Iterable[Servo] = self.servos
+        if id != BROADCAST and code in WRITES:
+            servos = [servo for servo in servos if servo.obeys(id)]
+        elif id != BROADCAST:
+            servos = [servo for servo in servos if servo.id == id]
+        return [servo for servo in servos if servo.receives(self.rate, at)]
 
     def _answer(self, servo: Servo, packet: protocol.Packet, at: float) -> Reply | None:
         """Let a servo carry out an instruction; returns its reply."""

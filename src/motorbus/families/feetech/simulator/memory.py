@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from math import inf
 from typing import Final, NamedTuple
 
-from motorbus.core.register import Register, RegisterMap, Storage
+from motorbus.core.register import ByteOrder, Register, RegisterMap, Storage
 
 SIZE: Final = 256
 ERASED: Final = 0xFF
@@ -35,14 +35,23 @@ class Layout:
     def __init__(self, table: RegisterMap, defaults: Mapping[str, int]) -> None:
         self.table = table
         self.shipped = bytearray(SIZE)
+        self.codes: dict[str, tuple[slice, ByteOrder, int]] = {}
+        """Row -> its bytes, their order, and the code of the sign bit."""
+        self._touched: dict[tuple[int, int], list[Register]] = {}
         self.rows: list[Register | None] = [None] * SIZE
         for row in table.values():
             self.rows[span(row)] = [row] * row.size
+            sign_bit = 8 * row.size if row.sign_bit is None else row.sign_bit
+            self.codes[row.name] = span(row), row.order, 1 << sign_bit
             self.shipped[span(row)] = code(row, defaults.get(row.name, row.default or 0))
 
     def touched(self, address: int, count: int) -> list[Register]:
         """The rows with at least one of these bytes, in order."""
-        return list({row.name: row for row in self.rows[address : address + count] if row}.values())
+        found = self._touched.get((address, count))
+        if found is None:
+            found = list({row.name: row for row in self.rows[address : address + count] if row}.values())
+            self._touched[address, count] = found
+        return found
 
 
 class Memory:
@@ -63,7 +72,9 @@ class Memory:
         self._begun = -inf
 
     def __getitem__(self, name: str) -> int:
-        return self.decode(self.layout.table[name])
+        place, order, sign = self.layout.codes[name]
+        raw = int.from_bytes(self.live[place], order)
+        return raw if raw < sign else sign - raw
 
     def decode(self, row: Register) -> int:
         """The live value of a row."""

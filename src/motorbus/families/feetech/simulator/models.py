@@ -18,7 +18,7 @@ from motorbus.core.plant import Drive
 from motorbus.core.register import RegisterMap
 from motorbus.errors import RequestError
 from motorbus.families.feetech.models import MODELS as NUMBERS
-from motorbus.families.feetech.models import map_for
+from motorbus.families.feetech.models import NO_LOAD, map_for
 from motorbus.families.feetech.registers.codes import BAUD_CODES, BAUD_CODES_OF
 from motorbus.families.feetech.registers.hls import HLS
 from motorbus.families.feetech.registers.scs import SCS, SCS2
@@ -116,11 +116,7 @@ _KINDS: Final = (
     Kind(SCS2, (3, 25), 6.0, _SCS_DRIVE, _SCS2),
     Kind(HLS, (3, 43), 12.0, _STS_DRIVE, _HLS),  # firmware met on HLS3955 and HLS3915
 )
-_MOTORS: Final = {
-    "sts3250": Drive(60 / 0.133, 0.15, 3.25),  # data sheet A/0: 60° in 0.133 s at 12 V
-    "scs15": Drive(330.0, 0.1, 1.5),  # data sheet: 55 rpm at 6 V, 1.5 A at stall
-}
-"""Motors of single models; speed in °/s."""
+_STALL_CURRENTS: Final = {"scs15": 1.5}  # A; data sheet
 _HIGH_VOLTAGE: Final = 24.0  # V, of models with HV in their name
 _HIGH_LIMITS: Final = {"max_voltage": 250, "min_voltage": 180}
 
@@ -132,9 +128,12 @@ def _all() -> Mapping[str, Sequence[Model]]:
         name, angle = known.name.lower(), radians(known.arc) / known.resolution
         for table in known.maps:
             one = Model(name=name, number=number, angle=angle, **kinds[table]._asdict())
-            if name in _MOTORS:
-                motor = _MOTORS[name]
-                one = replace(one, drive=replace(motor, top_speed=radians(motor.top_speed) / angle))
+            if known.name in NO_LOAD:
+                stall = _STALL_CURRENTS.get(name, one.drive.stall_current)
+                drive = replace(
+                    one.drive, top_speed=round(NO_LOAD[known.name] / angle, 6), stall_current=stall
+                )
+                one = replace(one, drive=drive)
             if "hv" in name:
                 one = replace(one, voltage=_HIGH_VOLTAGE, shipped=one.shipped | _HIGH_LIMITS)
             found.setdefault(name, []).append(one)

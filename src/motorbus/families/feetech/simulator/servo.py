@@ -34,6 +34,7 @@ HAND_SPEED: Final = 1.0  # rad/s of a limp shaft that is pushed # assumption
 LONGEST_PUSH: Final = 10 * tau
 ACCELERATION_UNIT: Final = 100.0  # counts/s² (memory table V3.6; servolab measured 104 to 105)
 FARTHEST: Final = 7.5  # turns to a goal over many turns (memory table V3.6: 30719 counts)
+ID, BAUD = 5, 6  # registers, in every map
 MIDDLE: Final = 128  # in torque_enable
 LOADED: Final = {
     "torque_limit": "max_torque",  # STS3215 memory table V3.6; FD: SMBL and HLS as well
@@ -224,18 +225,17 @@ class Servo(PoweredDevice):
 
     @property
     def id(self) -> int:
-        return self.memory["id"]
+        return self.memory.live[ID]
 
     def obeys(self, id: int) -> bool:
         """Whether it carries out writes to this id; an HLS has a second one (HLS memory table)."""
-        names = [name for name in ("id", "second_id") if name in self.model.table]
-        return any(self.memory[name] == id for name in names)
+        return self.id == id or ("second_id" in self.model.table and self.memory["second_id"] == id)
 
     @property
     def baud_rate(self) -> int | None:
         """Bit/s; None for an unknown code: it receives nothing."""
         # The codes 8 to 11 are rates in all maps. # assumption
-        return BAUD_CODES.get(self.memory["baud_rate"])
+        return BAUD_CODES.get(self.memory.live[BAUD])
 
     @property
     def reply_delay(self) -> float:

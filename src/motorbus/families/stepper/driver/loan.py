@@ -27,33 +27,26 @@ T = TypeVar("T")
 LENT: Final = "lent"  # journal: project 1 was read back as wanted
 RETURNING: Final = "returning"  # journal: it may be half given back
 TRIES: Final = 3  # to give it back
-VERBS: Final = ("jog", "move_by", "home", "keep_time")
+VERBS: Final = ("jog", "move_by", "home", "plan_move")
 
 
 class Loan(Guard):
-    """Project 1 reads as `wanted` inside the block. At its end the motor is stopped and project 1 is as before.
+    """From `borrow` on project 1 reads as `wanted`. At the end of the block the motor is stopped and project 1 is as
+    before.
 
-    `on_error` gets the error of the block before the clean-up. `rests`: the motion has ended by itself. `supply_lost`:
-    project 1 was as before without being given back.
+    `rests`: the motion has ended by itself. Raises OutcomeUnknown if project 1 was as before without being given back.
     """
 
-    def __init__(
-        self,
-        watch: Watch,
-        verb: str,
-        before: Project,
-        wanted: Project,
-        on_error: Callable[[BaseException], None],
-    ) -> None:
+    def __init__(self, watch: Watch, verb: str, before: Project, wanted: Project) -> None:
         self.node: Final = watch.node
         self.watch: Final = watch
         self.verb: Final = verb
         self.before: Final = before
         self.wanted: Final = wanted
-        self.on_error: Final = on_error
-        self.rests = self.supply_lost = self._is_open = self._is_lent = False
+        self.rests = self._is_open = self._is_lent = False
 
-    async def enter(self) -> None:
+    async def borrow(self) -> None:
+        """Edit project 1. After an error the block gives it back."""
         if self.wanted == self.before:
             return
         self._check()
@@ -95,17 +88,20 @@ class Loan(Guard):
             raise
 
     async def leave(self, error: BaseException | None) -> None:
-        if error is not None:
-            self.on_error(error)
         if self.watch.ordered:
             await end_motion(self.node, STOPS[::-1])
             if not self.rests:
                 await Sleep(slowest_stop(replace(self.wanted, total_steps=1)))
-        if self._is_open:
-            await self._note(RETURNING)
-            found = await give_back(self.node, self.before, self.wanted, is_read=self._is_lent)
-            self.supply_lost = found and self.watch.ordered
-            await self._note(OUTCOME, outcome="old")
+        if not self._is_open:
+            return
+        await self._note(RETURNING)
+        found = await give_back(self.node, self.before, self.wanted, is_read=self._is_lent)
+        await self._note(OUTCOME, outcome="old")
+        if found and self.watch.ordered and error is None:
+            raise OutcomeUnknown(
+                f"{self.verb}() was cut short: the controller lost its supply, and the motor is at an unknown position",
+                cause="project 1 read as before the loan, though it was read back as lent",
+            )
 
     async def _note(self, state: str, **facts: object) -> None:
         await Emit(JournalEntry(self.verb, state, {"node": self.node.node, **facts}))
@@ -143,13 +139,12 @@ async def lend(
     *,
     prepare: Callable[[], Awaitable[None]] | None = None,
     ends: bool = True,
-    on_error: Callable[[BaseException], None] = lambda error: None,
 ) -> T:
     """Make a manual motion with project 1 as `change` makes it, then stop, then give project 1 back.
 
     `prepare` runs after project 1 was read. `ends`: the motion ends by itself; else the motor decelerates after the
     stop, which is waited for. Nothing is edited where project 1 is so already. An error is `unmoved` if the motion
-    request did not leave; `on_error` gets it, before project 1 is given back.
+    request did not leave.
 
     Raises RequestError, with nothing written, while a project may run or a change is unfinished, for unsaved edits of
     another project, and if project 1 could not be given back; VerificationFailed if it does not read as wanted;
@@ -162,22 +157,14 @@ async def lend(
         before = await cached(node, MANUAL)
         if prepare is not None:
             await prepare()
-        loan = Loan(watch, verb, before, change(before), on_error)
+        loan = Loan(watch, verb, before, change(before))
         async with loan:
+            await loan.borrow()
             value = await motion(watch, loan.wanted)
             loan.rests = ends
-        if loan.supply_lost:
-            raise OutcomeUnknown(
-                f"{verb}() was cut short: the controller lost its supply, and the motor is at an unknown position",
-                cause="project 1 read as before the loan, though it was read back as lent",
-            )
         return value
 
-    try:
-        return await mark_unmoved(watch, Exclusive(work()))
-    except BaseException as error:
-        on_error(error)
-        raise
+    return await mark_unmoved(watch, Exclusive(work()))
 
 
 async def recover(node: Node, change: str, facts: Mapping[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""Manual motion: by an angle, for a time, to the home switch, together with others.
+"""Manual motion: by an angle, for a time, to the home switch.
 
 A jog with a velocity is a single move of velocity times time, so a host that dies leaves a motor that stops by itself.
 Neither a position nor a notice comes back: angle and time of such a motion are estimates.
@@ -14,24 +14,23 @@ from math import inf, tau
 from typing import Final, NamedTuple
 
 from motorbus.core.register import is_number, shown
+from motorbus.core.request import Request
 from motorbus.core.setpoint import Setpoint
-from motorbus.core.steps import Emit, Progress, SetBitrate, Sleep
-from motorbus.core.timing import Timing, Turned
+from motorbus.core.steps import Emit, Progress, Sleep
 from motorbus.errors import NotHomed, RequestError
 from motorbus.families.stepper.driver.io import check_seconds, read_input
 from motorbus.families.stepper.driver.loan import lend
 from motorbus.families.stepper.driver.node import Node
-from motorbus.families.stepper.driver.projects import MANUAL, cached
 from motorbus.families.stepper.driver.requests import command, ignore
 from motorbus.families.stepper.driver.stop import Promise, Watch
 from motorbus.families.stepper.execution.ramp import Motion, motion, pulses_of, ramp_of, slowest
 from motorbus.families.stepper.parameters import HOME_INPUT, REVERSE, Project
-from motorbus.families.stepper.protocol import REQUEST_LENGTH
 
 LONGEST_JOG: Final = 60.0  # s
 DEADLINE: Final = 30.0  # s, of homing
 LONGEST_HOMING: Final = 600.0  # s
 READINGS: Final = 2  # of input 5 in a row
+PAUSE: Final = 0.02  # s between two readings, in which another thread can use the bus
 REPORT: Final = 0.1  # s between two reports of progress, and two looks for a stop
 CLOCK: Final = 1.02  # its clock may be slower by so much # assumption
 SPARE: Final = 0.05  # s # assumption
@@ -88,7 +87,7 @@ async def move_by(node: Node, angle: float, *, velocity: float | None = None, wa
     if not wait:
         raise RequestError("a move of the stepper controller is always waited for")
     check_finite("angle", angle)
-    return await lend(node, "move_by", _shaped(angle, _rpm(velocity)), _move_once)
+    return await _move(node, "move_by", angle, _rpm(velocity))
 
 
 async def jog(node: Node, velocity: float, seconds: float) -> Moved:
@@ -99,7 +98,7 @@ async def jog(node: Node, velocity: float, seconds: float) -> Moved:
     """
     check_seconds("seconds", seconds, LONGEST_JOG)
     check_finite("velocity", velocity)
-    return await lend(node, "jog", _shaped(velocity * seconds, _rpm(abs(velocity))), _move_once)
+    return await _move(node, "jog", velocity * seconds, _rpm(abs(velocity)))
 
 
 async def run_once(node: Node) -> Moved:
@@ -126,20 +125,29 @@ async def jog_reverse(node: Node, seconds: float) -> Moved:
     return await lend(node, "jog_reverse", checked, _jog("jog_reverse", -1, seconds), ends=False)
 
 
+async def _move(node: Node, verb: str, angle: float, rpm: int | None) -> Moved:
+    def change(project: Project) -> Project:
+        project = shaped(project, angle, rpm)
+        checked_pulses(project)
+        return project
+
+    return await lend(node, verb, change, _move_once)
+
+
 async def _move_once(watch: Watch, project: Project) -> Moved:
     pulses, sign = checked_pulses(project), project.step(1).sign
     angle = sign * pulses * pulse_angle(project)
     seconds = longest(project, pulses)
-    await _request(watch, "run_once", "relative", angle, project)
-    await _wait(watch, seconds, "moving")
+    await motion_request(watch, "run_once", "relative", angle, project)
+    await wait(watch, seconds, "moving")
     return Moved(watch.node.node, angle, sign * velocity_of(project), seconds, Promise.STOP_ACCEPTED)
 
 
 def _jog(name: str, sign: int, seconds: float) -> Callable[[Watch, Project], Awaitable[Moved]]:
     async def turn(watch: Watch, project: Project) -> Moved:
         velocity = sign * velocity_of(project)
-        await _request(watch, name, "velocity", velocity, project)
-        await _wait(watch, seconds, name)
+        await motion_request(watch, name, "velocity", velocity, project)
+        await wait(watch, seconds, name)
         angle = sign * motion_of(project, None).done(seconds) * pulse_angle(project)
         return Moved(watch.node.node, angle, velocity, seconds, Promise.STOP_ACCEPTED)
 
@@ -173,7 +181,7 @@ async def home(
 
     async def turn(watch: Watch, project: Project) -> Homed:
         begun = await Sleep(0)
-        await _request(watch, "home", "velocity", -velocity_of(project), project)
+        await motion_request(watch, "home", "velocity", -velocity_of(project), project)
         seconds = await _until_home(watch, begun, deadline)
         return Homed(node.node, seconds, velocity_of(project), Promise.STOP_ACCEPTED)
 
@@ -197,7 +205,7 @@ async def _until_home(watch: Watch, begun: float, deadline: float) -> float:
     while now - begun < deadline:
         active = active + 1 if await read_input(watch.node, HOME_INPUT) else 0
         watch.check()
-        now = await Sleep(0)
+        now = await Sleep(PAUSE)
         if active == READINGS:
             return now - begun
         if now - reported >= REPORT:
@@ -211,85 +219,19 @@ async def _until_home(watch: Watch, begun: float, deadline: float) -> float:
     )
 
 
-# -- together with others ----------------------------------------------------------------------------------------------
-
-
-async def keep_time(
-    node: Node, angle: float, timing: Timing, *, velocity: float, acceleration: float | None = None
-) -> Turned:
-    """Turn by `angle` (rad) with a loan of project 1; begin with the devices of `timing`, end with them or soon after.
-
-    At most at `velocity` (rad/s) and, in each reading of the controller's number, at most at `acceleration` (rad/s²).
-    The speed is the highest whole RPM that is slow enough for the others, at least 1. All values of the result are
-    estimated. Less than a pulse takes part without a motion. Raises RequestError for a velocity below 1 RPM, and as
-    `move_by`; `timing.fails` gets each error once the others were asked.
-    """
-    check_finite("angle", angle)
-    rpm = rpm_below(velocity)
-    project = paced(await cached(node, MANUAL), rpm)
-    if not round(abs(angle) / pulse_angle(project)):
-        await timing.agreed(0.0, lambda seconds: seconds)
-        return Turned(node.node, 0.0, await timing.start(0.0), 0.0, lambda at: 0.0)
-    quickest = _limited(_shaped(angle, rpm)(project), acceleration)
-    seconds = await timing.agreed(_lasts(quickest), lambda least: _lasts(_slowed(quickest, least)))
-
-    def change(project: Project) -> Project:
-        return _slowed(_limited(_shaped(angle, rpm)(project), acceleration), seconds)
-
-    async def turn(watch: Watch, project: Project) -> Turned:
-        move = motion_of(project, checked_pulses(project))
-        first, pulse = move.moment(1), move.sign * pulse_angle(project)
-        lead = REQUEST_LENGTH * 10 / await SetBitrate(0) + first
-        await timing.start(lead)
-        begun = await Sleep(0) + lead
-        whole = pulse * (move.pulses or 0)
-        await _request(watch, "run_once", "relative", whole, project)
-        await _wait(watch, longest(project, move.pulses or 0), "moving")
-        return Turned(node.node, whole, begun, _lasts(project), lambda at: pulse * move.done(first + at))
-
-    return await lend(node, "keep_time", change, turn, on_error=timing.fails)
-
-
-def _limited(project: Project, acceleration: float | None) -> Project:
-    """The move with a ramp that is in no reading steeper than this (rad/s²), as far as the number 1 allows."""
-    if acceleration is None:
-        return project
-    step = project.step(1)
-    number = int(acceleration / pulse_angle(project) / max(1000.0, ramp_of(project, step).run))
-    return project.with_step(1, acceleration=max(1, min(number, step.acceleration)))
-
-
-def _slowed(quickest: Project, seconds: float) -> Project:
-    """The same move at the highest whole RPM with which it lasts so long (s); at 1 RPM if none does."""
-    low, high = 1, quickest.step(1).speed
-    while low < high:
-        middle = (low + high + 1) // 2
-        if _lasts(paced(quickest, middle)) >= seconds:
-            low = middle
-        else:
-            high = middle - 1
-    return paced(quickest, low)
-
-
-def _lasts(project: Project) -> float:
-    """s from the first pulse of the single move to its last."""
-    move = motion_of(project, checked_pulses(project))
-    return move.duration - move.moment(1)
-
-
 # -- requests and waits ------------------------------------------------------------------------------------------------
 
 
-async def _request(watch: Watch, name: str, quantity: str, value: float, project: Project) -> None:
-    """Send a motion, for the gate with its way or velocity; the controller knows no limits of travel."""
+def motion_request(watch: Watch, name: str, quantity: str, value: float, project: Project) -> Request[None]:
+    """A motion, for the gate with its angle or velocity; the controller knows no limits of travel."""
     node = watch.node
     setpoints = [Setpoint(node.node, quantity, value, -inf, inf)]
     if quantity == "relative":
         setpoints.append(Setpoint(node.node, "speed", velocity_of(project), -inf, inf))
-    await command(node, name, ignore, setpoints=tuple(setpoints), precondition=watch.precondition)
+    return command(node, name, ignore, setpoints=tuple(setpoints), precondition=watch.precondition)
 
 
-async def _wait(watch: Watch, seconds: float, what: str) -> None:
+async def wait(watch: Watch, seconds: float, what: str) -> None:
     """Let this time pass; reports `Progress` in ms. Raises Interrupted after a stop."""
     now = begun = await Sleep(0)
     while now < begun + seconds:
@@ -372,29 +314,23 @@ def paced(project: Project, rpm: int) -> Project:
     )
 
 
-def _shaped(angle: float, rpm: int | None) -> Callable[[Project], Project]:
-    """What makes project 1 a move by this angle (rad), in whole pulses; None: at its own speed.
+def shaped(project: Project, angle: float, rpm: int | None) -> Project:
+    """Project 1 as a move by this angle (rad), in whole pulses; `rpm` None: at its own speed.
 
     The unit is a pulse, or a part of one where a turn has no whole number of pulses; a hundredth of a degree where that
-    does not fit. Raises RequestError for less than a pulse, and for too much.
+    does not fit. Raises RequestError for too much; `checked_pulses` does so for less than a pulse.
     """
-
-    def change(project: Project) -> Project:
-        project = paced(project, checked(project).step(1).speed if rpm is None else rpm)
-        turn = project.pulses_per_turn or Fraction(0)
-        turns = Fraction(abs(angle) / tau)
-        unit, distance = turn.numerator, turn.denominator * round(turns * turn)
-        if max(unit, distance) > MAX_DISTANCE:
-            unit, distance = HUNDREDTHS, round(turns * HUNDREDTHS)
-        if distance > MAX_DISTANCE:
-            most = MAX_DISTANCE * tau / unit
-            raise RequestError(f"{angle:.6g} rad is too far for one move", expected=f"at most {most:.6g} rad")
-        direction = REVERSE if angle < 0 else 1 - REVERSE
-        move = replace(project, turn_distance=unit).with_step(1, distance=distance, direction=direction)
-        checked_pulses(move)
-        return move
-
-    return change
+    project = paced(project, checked(project).step(1).speed if rpm is None else rpm)
+    turn = project.pulses_per_turn or Fraction(0)
+    turns = Fraction(abs(angle) / tau)
+    unit, distance = turn.numerator, turn.denominator * round(turns * turn)
+    if max(unit, distance) > MAX_DISTANCE:
+        unit, distance = HUNDREDTHS, round(turns * HUNDREDTHS)
+    if distance > MAX_DISTANCE:
+        most = MAX_DISTANCE * tau / unit
+        raise RequestError(f"{angle:.6g} rad is too far for one move", expected=f"at most {most:.6g} rad")
+    direction = REVERSE if angle < 0 else 1 - REVERSE
+    return replace(project, turn_distance=unit).with_step(1, distance=distance, direction=direction)
 
 
 def check_finite(name: str, value: float) -> None:

@@ -1,28 +1,39 @@
-"""The points of docs/explanation/safety.md on the new motion package; the number of the point is in the name."""
+"""The points of docs/explanation/safety.md; the number of the point is in the name."""
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
 from math import inf, nan, pi, radians
+from pathlib import Path
+from threading import Event, Thread
 from typing import Any
 
 import pytest
 
+import motorbus
+from motorbus.core.steps import INTENT, JournalEntry
 from motorbus.errors import (
     Faulted,
     Interrupted,
     LimitExceeded,
+    LinkLost,
     MotorbusError,
     NoReply,
+    NotHomed,
     Overloaded,
     Refused,
     RequestError,
     Stalled,
 )
 from motorbus.families import feetech
+from motorbus.journal import BusJournal
+from motorbus.motion.commands import Jog, Move, Torque, WriteRegisters
 from motorbus.motion.robot import AsyncRobot, Robot
-from tests.support.machines import listen, machine, orders, wait
+from tests.conformance.cuts import Kind, violations
+from tests.support.catalogue.cuts import COMMANDS
+from tests.support.machines import described, listen, machine, orders, wait
+from tests.support.processes import Simulated, python
 
 
 def test_01_nothing_moves_on_connect() -> None:
@@ -50,7 +61,7 @@ def test_01_torque_on_moves_by_a_count_at_most(name: str) -> None:
 
 def test_02_unknown_is_not_safe_and_a_stop_is_allowed() -> None:
     with machine("1", lift=True) as (config, sims), Robot(config) as robot:
-        with pytest.raises(MotorbusError, match="lift: stage#1 has no plan move"):
+        with pytest.raises(NotHomed, match="lift: its position is not known"):
             robot.move({"lift": 0.01})
         wait(robot, 1.0)
         sims["arm"][1].unplug()
@@ -236,6 +247,54 @@ def _lead_until(robot: Robot, cycle: int, then: Callable[[], object]) -> None:
             assert state.number < 4 * cycle
 
 
+def test_09_a_change_of_settings_is_complete_or_absent() -> None:
+    with machine("1") as (config, sims), Robot(config) as robot:
+        servo = robot["a1"].device
+        before = servo.read("max_temperature", "lock")
+        with pytest.raises(RequestError):
+            servo.write(max_temperature=55, min_position_limit=1e9)
+        assert servo.read("max_temperature", "lock") == before
+        robot.execute(WriteRegisters("a1", {"max_temperature": 55}))
+        sims["arm"][1].power_cycle()
+        wait(robot, 1.0)
+        assert servo.read("max_temperature", "lock") == {**before, "max_temperature": 55}
+
+
+def test_09_an_axis_with_an_unfinished_change_gets_no_motion() -> None:
+    with machine("1-2") as (config, sims):
+        with motorbus.open(sims["arm"].url) as bus:
+            assert isinstance(bus.journal, BusJournal)
+            bus.journal(JournalEntry("set_id", INTENT, {"node": 1, "new": 7}))
+        with Robot(config) as robot:
+            assert list(robot.faults) == ["a1"]
+            listen(sims)
+            for command in (Move({"a1": 0.1, "a2": 0.1}), Torque(on=True), Jog("a1", 0.1, 0.2)):
+                with pytest.raises(Refused, match="a1 is at fault: unfinished change"):
+                    robot.execute(command)
+            with pytest.raises(Refused):
+                robot.clear_fault()
+            assert not orders(sims)
+            robot.stop()
+            robot.move({"a2": 0.1})
+
+
+@pytest.mark.parametrize("name", ["feetech-sts-set_id", "feetech-sts-set_baud"])
+def test_10_id_and_rate_are_old_or_new_after_a_crash(name: str) -> None:
+    command = next(one for one in COMMANDS if one.name == name)
+    crashes = [cut for cut in command.single_cuts() if cut.kind is Kind.BLACKOUT]
+    for crash in crashes[-12:]:
+        assert violations(command, crash) == [], crash
+
+
+def test_10_an_id_in_use_is_refused_before_anything_is_written() -> None:
+    with machine("3+7") as (config, sims), Robot(config) as robot:
+        listen(sims)
+        with pytest.raises(RequestError):
+            robot["a1"].device.set_id(7)
+        assert not orders(sims)
+        assert sorted(node.memory["id"] for node in sims["arm"].simulator.nodes.values()) == [3, 7]
+
+
 def test_11_a_restart_is_a_fault_until_it_is_cleared() -> None:
     with machine("1-2") as (config, sims), Robot(config) as robot:
         with pytest.raises(Faulted) as caught:
@@ -325,6 +384,82 @@ def test_a_silent_axis_ends_a_move_and_stops_the_others() -> None:
         with pytest.raises(NoReply, match="a1"):
             robot.move({"a1": 1.0, "a2": 1.0, "c1": 0.8})
         assert robot.stop(["a2", "c1"], verify=True).axes["a2"].at_rest
+
+
+def test_a_lost_bus_ends_a_move_and_the_other_holds() -> None:
+    with machine("1-6", "0x25-0x27", exit="leave") as (config, sims), Robot(config) as robot:
+        robot.enable_torque()
+        goals = {name: 1.0 if name in config.groups["upper"] else 0.8 for name in robot.axes}
+
+        def unplug() -> None:
+            if (robot.axes["a1"].status.known_position or 0.0) > 0.3:
+                sims["arm"].unplug(seconds=60.0)
+
+        robot.publish = unplug  # type: ignore[method-assign]
+        with pytest.raises(LinkLost) as caught:
+            robot.move(goals)
+        robot.publish = lambda: None  # type: ignore[method-assign]
+        notes = getattr(caught.value, "__notes__", [])
+        assert {"c1", "c2", "c3"} <= {note.partition(":")[0] for note in notes}
+        assert len([note for note in notes if "lost" in note]) <= 1, "one cause is told once"
+        assert all(one.at_rest for one in robot.stop("can", verify=True).axes.values())
+        assert max(robot.positions("can").values()) < 0.8
+
+
+def test_an_async_loop_of_200_hz_and_its_cancellation() -> None:
+    async def run() -> None:
+        with machine("1-6") as (config, sims):
+            async with AsyncRobot(config) as robot:
+                loop = robot.loop(200)
+
+                async def follow() -> None:
+                    async with loop:
+                        async for state in loop:
+                            for name in robot.axes:
+                                loop.set_target(name, 0.5)
+                            if state.number == 100:
+                                reached.set()
+
+                reached = asyncio.Event()
+                task = asyncio.create_task(follow())
+                await reached.wait()
+                assert loop.statistics.rate == 200
+                assert not loop.statistics.lost
+                task.cancel()
+                with pytest.raises(asyncio.CancelledError):
+                    await task
+                listen(sims)
+                assert all(one.at_rest for one in (await robot.stop(verify=True)).axes.values())
+                assert all(0.1 < place < 0.5 for place in (await robot.positions()).values())
+
+    asyncio.run(run())
+
+
+def test_an_emergency_stop_of_another_process_ends_a_move(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    with Simulated("feetech", ids="1-6", link=tmp_path / "bus") as arm:
+        config = described({"arm": arm.bus}, "1-6")
+        with Robot(config) as robot:
+            robot.enable_torque()
+
+            def stop() -> None:
+                while not robot.axes["a1"].status.moving:
+                    Event().wait(0.001)
+                with python("-m", "motorbus", "estop", arm.bus) as child:
+                    child.communicate(timeout=60)
+                codes.append(child.returncode)
+
+            codes: list[int] = []
+            thread = Thread(target=stop)
+            thread.start()
+            with pytest.raises(Interrupted, match="stop"):
+                robot.move(dict.fromkeys(robot.axes, 2.0), duration=60.0)
+            thread.join()
+            assert codes == [0]
+            robot.reset()
+            assert not any(robot[name].device.read("torque_enable")["torque_enable"] for name in robot.axes)
 
 
 def test_rounding_a_speed_up_never_makes_it_illegal() -> None:

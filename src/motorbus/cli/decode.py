@@ -1,0 +1,231 @@
+"""`motorbus decode`: explain the bytes of frames. Opens no port."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from datetime import UTC, datetime
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+from cyclopts import Parameter
+from msgspec import Struct
+
+from motorbus import families
+from motorbus.cli.common import Common, Exit
+from motorbus.cli.output import emit, escape
+from motorbus.cli.target import bus_address, key_values
+from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
+from motorbus.core.family import Explanation
+from motorbus.core.recording import ABSENT
+from motorbus.errors import RequestError
+from motorbus.recorder import Decoder, can_log
+from motorbus.recorder.files import from_text, read_bytes
+
+if TYPE_CHECKING:
+    from motorbus.core.family import BusDriver, Family
+    from motorbus.recorder.can_log import Logged
+
+LONGEST: Final = 1 << 25  # characters on stdin
+CHUNK: Final = 1 << 14  # bytes that are counted at a time
+HEAD: Final = 5  # bytes before the data of a CAN frame, see `CanFrame.flat`
+
+
+class Field(Struct, frozen=True):
+    """A field of a frame: its offset, bytes, name and meaning."""
+
+    start: int
+    data: str
+    name: str
+    meaning: str
+
+
+class Frame(Struct, frozen=True, tag="frame"):
+    """A frame, or bytes that are none (`fault` says why); `start` counts bytes, or frames on CAN."""
+
+    start: int
+    data: str
+    title: str
+    fault: str
+    fields: list[Field]
+    time: float | None = None  # s, since 1970 if it is above 1e8
+    direction: str = ""
+
+
+class Group(Struct, frozen=True):
+    """The packets of one kind, node, code and fault: how many, and their bytes."""
+
+    kind: str
+    node: int | None
+    code: str
+    packets: int
+    bytes: int
+
+
+class Summary(Struct, frozen=True, tag="summary"):
+    """The packets of a recording, noise last."""
+
+    groups: list[Group]
+    packets: int
+    noise_bytes: int
+    damaged_lines: int = 0
+
+
+def decode(
+    *data: Annotated[str, Parameter(name="HEX")],
+    family: Annotated[str, Parameter(help="Protocol: feetech, kst or stepper; else that of --bus.")] = "",
+    file: Annotated[Path | None, Parameter(help="Recording: .bin .hex .txt, or a CAN log.")] = None,
+    summary: Annotated[bool, Parameter(help="Count the frames.")] = False,
+    common: Common = Common(),
+) -> int:
+    """Explain the bytes of frames, and why a bad one is bad; without HEX those of stdin.
+
+    Examples:
+
+        motorbus decode --family feetech FF FF 01 04 02 38 02 BE
+        motorbus decode --family kst --file trace.asc --summary
+        candump -L can0 | motorbus decode --family kst --json
+
+    CAN frames are ID#DATA; CAN logs are candump, ASC, BLF, TRC. Exit code 1: noise.
+    """
+    if file is not None and data:
+        raise RequestError("bytes and --file", expected="one of them")
+    driver = _driver(family, common)
+    source = _can_lines(data, file) if driver.family.link.kind == "frames" else _read_serial(data, file)
+    if summary:
+        return _summarize(driver.family, source, common)
+    return _explain(driver, source, common)
+
+
+def _driver(name: str, common: Common) -> BusDriver:
+    if not (name or common.bus):
+        raise RequestError("no protocol", expected="--family feetech, kst or stepper")
+    found = families.load(name or bus_address("", common).partition(":")[0])
+    return found.open(**key_values(common))
+
+
+def _read_serial(texts: Sequence[str], file: Path | None) -> bytes:
+    if file is not None:
+        found = read_bytes(file)
+    else:
+        text = " ".join(texts) or sys.stdin.read(LONGEST + 1)
+        if len(text) > LONGEST:
+            raise RequestError(f"more than {LONGEST:,} characters on stdin", advice="use --file")
+        found = from_text(text)
+    if not found:
+        raise RequestError("no bytes to decode")
+    return found
+
+
+def _can_lines(texts: Sequence[str], file: Path | None) -> Iterator[Logged]:
+    """The frames of arguments, of a log, or of the lines on stdin as they come."""
+    if file is not None:
+        yield from can_log.read_log(file)
+    elif texts:
+        for text in [" ".join(texts)] if set("([") & set(texts[0]) else texts:
+            if (one := can_log.parse_line(text)) is not None:
+                yield one
+    else:
+        yield from can_log.read_lines(can_log.lines_of(sys.stdin))
+
+
+# -- frames --------------------------------------------------------------------------------------------------------
+
+
+def _explain(driver: BusDriver, source: bytes | Iterator[Logged], common: Common) -> int:
+    start, bad = 0, False
+    for one, noted in _explanations(driver, source):
+        time = None if noted is None else noted.at
+        fields = [
+            Field(part.start, part.data.hex(" ").upper(), part.name, part.meaning) for part in one.parts
+        ]
+        shown = _shown(one.data, driver.family)
+        direction = "" if noted is None else noted.direction
+        frame = Frame(start, shown, one.title, one.fault, fields, time, direction)
+        if common.json:
+            emit(frame, common)
+        else:
+            _print(frame)
+        bad = bad or bool(one.fault)
+        start += len(one.data) if noted is None else 1
+    if not start:
+        raise RequestError("no frames to decode", expected="ID#DATA, the text of candump, or a CAN log")
+    return Exit.FAILURE if bad else Exit.OK
+
+
+def _explanations(
+    driver: BusDriver, source: bytes | Iterator[Logged]
+) -> Iterator[tuple[Explanation, Logged | None]]:
+    if isinstance(source, bytes):
+        for one in driver.decode(source):
+            yield one, None
+        return
+    for noted in source:
+        if noted.frame is None:
+            what = f"line {noted.line}" if noted.line else f"CAN frame {noted.text}"
+            yield Explanation(b"", what, (), noted.fault), noted
+        else:
+            for one in driver.decode(noted.frame.flat()):
+                yield one, noted
+
+
+def _shown(data: bytes, family: Family) -> str:
+    """Bytes, or a CAN frame as candump writes it."""
+    if family.link.kind == "bytes" or len(data) < HEAD:
+        return data.hex(" ").upper()
+    head = int.from_bytes(data[:4], "big")
+    width = 8 if head >> 31 or head & ERROR_FLAG else 3
+    identifier = head & ~(1 << 31) & ~REMOTE_FLAG
+    return f"{identifier:0{width}X}#{'R' if head & REMOTE_FLAG else data[HEAD:].hex().upper()}"
+
+
+def _print(frame: Frame) -> None:
+    when = _when(frame.time) if frame.time is not None else f"at {frame.start}"
+    print(" ".join(filter(None, (when, frame.direction, escape(frame.data)))))
+    print(f"{escape(frame.title)}: {f'BAD: {frame.fault}' if frame.fault else 'good'}")
+    for field in frame.fields:
+        print(f"  {field.start:3}  {field.data:<12} {field.name:<14} {escape(field.meaning)}")
+    print(flush=True)
+
+
+def _when(time: float) -> str:
+    if time < 1e8:
+        return f"+{time:.6f} s"
+    return datetime.fromtimestamp(time, UTC).isoformat(timespec="microseconds").replace("+00:00", "Z")
+
+
+# -- summary -------------------------------------------------------------------------------------------------------
+
+
+def _summarize(family: Family, source: bytes | Iterator[Logged], common: Common) -> int:
+    decoder, damaged = Decoder(family), 0
+    chunks: Iterable[bytes | CanFrame]
+    if isinstance(source, bytes):
+        chunks = [source[start : start + CHUNK] for start in range(0, len(source), CHUNK)]
+    else:
+        logged = list(source)
+        damaged = sum(bool(one.line) for one in logged)
+        chunks = [one.frame or CanFrame(REMOTE_FLAG, b"") for one in logged if not one.line]
+    packets = [*chain.from_iterable(map(decoder.feed, chunks)), *decoder.flush()]
+    if not packets and not damaged:
+        raise RequestError("no frames to count")
+    numbers: Counter[Any] = Counter()
+    sizes: Counter[Any] = Counter()
+    for one in packets:
+        key = (bool(one.fault), one.kind + (f": {one.fault}" if one.fault else ""), one.node, one.code)
+        numbers[key] += 1
+        sizes[key] += len(one.data)
+    groups = [
+        Group(kind, _known(node), "" if code == ABSENT else f"0x{code:02X}", numbers[key], sizes[key])
+        for key in sorted(numbers)
+        for _, kind, node, code in [key]
+    ]
+    noise = sum(size for key, size in sizes.items() if key[0])
+    emit(Summary(groups, len(packets), noise, damaged), common)
+    return Exit.FAILURE if noise or damaged else Exit.OK
+
+
+def _known(node: int) -> int | None:
+    return None if node == ABSENT else node

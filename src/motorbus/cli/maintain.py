@@ -1,0 +1,379 @@
+"""`motorbus set-id`, `set-baud`, `set-zero`, `recover`, `backup`, `restore`: guarded changes of what a device keeps."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+from cyclopts import Parameter
+from msgspec import Struct
+
+from motorbus.cli.common import Common, Partial, Target, Writing
+from motorbus.cli.dryrun import carry_out
+from motorbus.cli.output import confirm, emit, note
+from motorbus.cli.registers import map_of
+from motorbus.cli.target import bus_address, load_machine, open_bus, open_devices, parse_quantity
+from motorbus.core import units
+from motorbus.core.register import Storage
+from motorbus.core.request import Effect
+from motorbus.errors import LinkError, MotorbusError, RequestError
+
+FORMAT: Final = 1
+
+
+class Changed(Struct, frozen=True, tag="changed"):
+    """The devices that have this id or rate now, and the address that reaches them."""
+
+    devices: tuple[int, ...]
+    address: str
+
+
+class Zeroed(Struct, frozen=True, tag="zeroed"):
+    """What the present pose reads now."""
+
+    device: str
+    position: str
+
+
+class Recovered(Struct, frozen=True, tag="recovered"):
+    """An unfinished change and its end: finished, taken back, forgotten; "" if it is unfinished."""
+
+    bus: str
+    change: str
+    outcome: str = ""
+
+
+class Saved(Struct, frozen=True, tag="saved"):
+    """A file with the settings of a device, or the settings that were written from it."""
+
+    device: str
+    file: str
+    settings: tuple[str, ...]
+
+
+def _one(devices: list[Target], method: str, what: str) -> Target:
+    """The only device, which has this method. Raises RequestError."""
+    if len(devices) != 1:
+        names = ", ".join(one.name for one in devices)
+        raise RequestError(f"{len(devices)} devices: {names}", expected="one device, as BUS#ID")
+    _check(devices[0], method, what)
+    return devices[0]
+
+
+def _check(target: Target, method: str, what: str) -> None:
+    if not hasattr(target.device, method):
+        raise RequestError(f"{target.family.name} devices have no {what}")
+
+
+def set_id(
+    device: str,
+    new: Annotated[str, Parameter(name="NEW")],
+    /,
+    *,
+    writing: Writing = Writing(),
+    common: Common = Common(),
+) -> None:
+    """Change the id of a device (EEPROM); it loses its torque.
+
+    Examples:
+
+        motorbus set-id feetech:/dev/ttyACM0#1 7
+        motorbus set-id shoulder 7 --dry-run
+        motorbus set-id kst:can://slcan/dev/ttyACM0#0x25 0x26 --yes
+
+    Connect one new device at a time: equal ids cannot always be told apart. `motorbus recover` ends a change that was
+    interrupted. A KST servo asks for a power cycle. The machine file follows.
+    """
+    try:
+        number = int(new, 0)
+    except ValueError:
+        raise RequestError(f"{new!r} is not an id", expected="a whole number, as 7 or 0x26") from None
+    with open_devices(common, (device,)) as devices:
+        target = _one(devices, "set_id", "id that can be changed")
+        question = f"write id {number} to the EEPROM of {target.name}"
+        found = carry_out(writing, target, lambda one: one.set_id(number), question)
+        if found is None:
+            return
+        place = _place(target)
+    _move_axis(common, target, found.node)
+    emit(Changed((found.node,), f"{place}#{found.node}"), common)
+
+
+def _place(target: Target) -> str:
+    """The address of the bus of a device, without options."""
+    name, family = target.bus.link.name, target.family.name
+    return name if name.startswith(f"{family}:") else f"{family}:{name}"
+
+
+def _move_axis(common: Common, target: Target, node: int) -> None:
+    """Change the entry of an axis of the machine file whose device has another id now."""
+    if target.name.startswith("#"):
+        return
+    from motorbus.motion.machine_edit import edit
+
+    machine = load_machine(common)
+    if machine is None:
+        return
+    path = Path(common.machine)
+    change = {f"axis.{target.name}.device": f"{machine.axes[target.name].bus}#{node}"}
+    path.write_text(edit(path.read_text("utf-8"), change), "utf-8")
+    note(f"note: {path}: {target.name} is {change[f'axis.{target.name}.device']}")
+
+
+def set_baud(
+    target: Annotated[str, Parameter(name="BUS")],
+    rate: str,
+    /,
+    *,
+    writing: Writing = Writing(),
+    common: Common = Common(),
+) -> None:
+    """Change the rate of the devices on a bus, or of one device (EEPROM).
+
+    Examples:
+
+        motorbus set-baud feetech:/dev/ttyACM0 500000
+        motorbus set-baud feetech:/dev/ttyACM0#3 1M --dry-run
+        motorbus set-baud kst:can://slcan/dev/ttyACM0#0x25 500k --yes
+
+    The devices answer at the new rate only: a bus is opened at it with `-o baud=RATE` (CAN: `-o bitrate=RATE`).
+    """
+    wanted = units.rate(rate)
+    done: list[int] = []
+    errors: list[MotorbusError] = []
+    place = ""
+    with open_devices(common, (target,)) as devices:
+        names = ", ".join(one.name for one in devices)
+        question = f"write rate {wanted} bit/s to the EEPROM of {names}"
+        for number, one in enumerate(devices):
+            _check(one, "set_baud", "rate that can be changed")
+            how = writing if number == 0 else Writing(yes=True, dry_run=writing.dry_run)
+            option = "baud" if one.family.link.kind == "bytes" else "bitrate"
+            place = f"{_place(one)},{option}={wanted}"
+            try:
+                if carry_out(how, one, lambda device: device.set_baud(wanted), question) is not None:
+                    done.append(one.node)
+            except LinkError as error:
+                error.add_note(f"at {wanted} bit/s already: {_ids(done)}")
+                raise
+            except MotorbusError as error:
+                if not done and len(devices) == 1:
+                    raise
+                errors.append(error)
+    if done:
+        emit(Changed(tuple(done), f"{place}#{_ids(done)}"), common)
+    if errors:
+        if not done:
+            raise errors[0]
+        raise Partial("; ".join(error.summary for error in errors))
+
+
+def _ids(nodes: list[int]) -> str:
+    return "+".join(map(str, nodes)) or "none"
+
+
+def set_zero(
+    device: str,
+    /,
+    *,
+    to: Annotated[str, Parameter(help="What the present pose reads then, as 180deg.")] = "",
+    writing: Writing = Writing(),
+    common: Common = Common(),
+) -> None:
+    """Set the zero position of a device (EEPROM): the present pose reads the middle of the turn, or --to.
+
+    Examples:
+
+        motorbus set-zero feetech:/dev/ttyACM0#3
+        motorbus set-zero shoulder --to 180deg --dry-run
+        motorbus set-zero kst:can://slcan/dev/ttyACM0#0x25 --yes
+
+    The device loses its torque and may move to its old target afterwards: keep clear. A KST servo reads 0 and needs a
+    profile that has the object.
+    """
+    with open_devices(common, (device,)) as devices:
+        has_offset = hasattr(devices[0].device, "calibrate")
+        target = _one(devices, "calibrate" if has_offset else "set_mid_point", "zero that can be set")
+        if to and not has_offset:
+            raise RequestError(f"{target.family.name} devices read 0 at their zero", advice="leave --to out")
+        goal = parse_quantity(to, "position") if to else None
+
+        def change(one: Any) -> float:
+            if not has_offset:
+                return float(one.set_mid_point())
+            one.calibrate(goal)
+            return float(one.position())
+
+        place = carry_out(writing, target, change, f"write the zero position to the EEPROM of {target.name}")
+        if place is not None:
+            emit(Zeroed(target.name, units.show(place, "position")), common)
+
+
+# -- recover -------------------------------------------------------------------------------------------------------
+
+OUTCOMES: Final = {"new": "finished", "old": "taken back"}
+
+
+def recover(
+    bus: str = "",
+    /,
+    *,
+    forget: Annotated[bool, Parameter(help="Forget the change; send nothing.")] = False,
+    writing: Writing = Writing(),
+    common: Common = Common(),
+) -> None:
+    """Finish an interrupted change of a bus, or take it back; without BUS list the unfinished changes.
+
+    Examples:
+
+        motorbus recover
+        motorbus recover feetech:/dev/ttyACM0
+        motorbus recover feetech:/dev/ttyACM0 --forget --yes
+
+    set-id, set-baud, and motion of a stepper controller keep a journal. A servo is locked again; a controller stops and
+    gets its project 1 back. --forget is for a device that is gone.
+    """
+    if not (bus or common.bus):
+        _list_changes(common)
+        return
+    from motorbus.session.journals import journal_of, unfinished
+
+    if forget:
+        address = bus_address(bus, common)
+        journal = journal_of(address)
+        change = journal.unfinished() if journal is not None else None
+        if journal is None or change is None:
+            emit(Recovered(address, "nothing is unfinished"), common)
+            return
+        confirm(f"forget {change.describe().rstrip(',')}", writing)
+        journal.forget()
+        emit(Recovered(address, change.describe().rstrip(","), "forgotten"), common)
+        return
+    with open_bus(common, bus) as opened:
+        change = unfinished(opened)
+        if change is None:
+            emit(Recovered(opened.link.name, "nothing is unfinished"), common)
+            return
+        device = opened.family.devices.blocking(opened, change.node)
+        target = Target(f"#{change.node}", opened, change.node, opened.family, device)
+        _check(target, "recover", "change that can be recovered")
+        text = change.describe().rstrip(",")
+        verb, facts = change.verb, change.facts
+        outcome = carry_out(writing, target, lambda one: one.recover(verb, facts), f"end {text}")
+        if outcome is not None:
+            emit(Recovered(change.bus, text, OUTCOMES.get(outcome, outcome)), common)
+
+
+def _list_changes(common: Common) -> None:
+    from motorbus.journal import everywhere
+
+    found = everywhere()
+    errors = [one for one in found if isinstance(one, MotorbusError)]
+    changes = [one for one in found if not isinstance(one, MotorbusError)]
+    if changes or common.json:
+        emit([Recovered(one.bus, one.describe().rstrip(",")) for one in changes], common)
+    elif not errors:
+        print("nothing is unfinished")
+    for error in errors:
+        raise error
+
+
+# -- backup, restore -----------------------------------------------------------------------------------------------
+
+
+def backup(device: str, file: Path, /, *, common: Common = Common()) -> None:
+    """Save the settings of a device to a new file; writes nothing to the device.
+
+    Examples:
+
+        motorbus backup feetech:/dev/ttyACM0#3 shoulder.json
+        motorbus backup shoulder shoulder.json
+        motorbus backup stepper:/dev/ttyUSB0 projects.toml
+
+    The file has each EEPROM register but id and rate; of a stepper controller all projects.
+    """
+    with open_devices(common, (device,)) as devices:
+        target = _one(devices, "read", "settings")
+        if hasattr(target.device, "backup"):
+            text = target.device.backup().text()
+            names: tuple[str, ...] = ("all projects",)
+        else:
+            values = _read_settings(target)
+            names = tuple(values)
+            head = {"format": FORMAT, "family": target.family.name, "map": map_of(target).name}
+            text = json.dumps({**head, "values": values}, indent=2) + "\n"
+    with file.open("x", encoding="utf-8") as stream:
+        stream.write(text)
+    emit(Saved(target.name, str(file), names), common)
+
+
+def _read_settings(target: Target) -> dict[str, int]:
+    """The raw values of the EEPROM registers of a device, by name."""
+    rows = [
+        row.name
+        for row in map_of(target).values()
+        if row.storage is Storage.EEPROM
+        and row.writable
+        and row.readable
+        and row.effect is not Effect.IDENTITY
+    ]
+    if not rows:
+        raise RequestError(f"{target.name}: map {map_of(target).name} has no settings that can be saved")
+    return dict(target.device.read_raw(*rows))
+
+
+def restore(file: Path, device: str, /, *, writing: Writing = Writing(), common: Common = Common()) -> None:
+    """Write the settings of a file that differ from those of the device, and read them back (EEPROM).
+
+    Examples:
+
+        motorbus restore shoulder.json feetech:/dev/ttyACM0#3 --dry-run
+        motorbus restore shoulder.json shoulder
+        motorbus restore projects.toml stepper:/dev/ttyUSB0 --yes
+    """
+    text = file.read_text("utf-8")
+    with open_devices(common, (device,)) as devices:
+        target = _one(devices, "write", "settings")
+        if hasattr(target.device, "restore"):
+            kind = type(target.device.backup())
+            wanted = kind.parse(text)
+            question = f"write all projects to {target.name}"
+            if carry_out(writing, target, lambda one: one.restore(wanted) or True, question):
+                emit(Saved(target.name, str(file), ("all projects",)), common)
+            return
+        values = _parse_settings(text, file, target)
+        now = _read_settings(target)
+        table = map_of(target)
+        changed = {name: raw for name, raw in values.items() if now[name] != raw}
+        if not changed:
+            emit(Saved(target.name, str(file), ()), common)
+            return
+        orders = {name: table[name].to_value(raw) for name, raw in changed.items()}
+        question = f"write {', '.join(changed)} to the EEPROM of {target.name}"
+        if carry_out(writing, target, lambda one: one.write(**orders) or True, question):
+            after = _read_settings(target)
+            wrong = [name for name, raw in changed.items() if after[name] != raw]
+            if wrong:
+                raise Partial(f"{target.name}: {', '.join(wrong)} read back another value")
+            emit(Saved(target.name, str(file), tuple(changed)), common)
+
+
+def _parse_settings(text: str, file: Path, target: Target) -> dict[str, int]:
+    """The values of a settings file for this device. Raises RequestError."""
+    try:
+        data = json.loads(text)
+        values = {str(name): int(raw) for name, raw in data["values"].items()}
+        family, table = str(data["family"]), str(data["map"])
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise RequestError(f"{file} is not a file of `motorbus backup`") from None
+    known = map_of(target)
+    if (family, table) != (target.family.name, known.name):
+        raise RequestError(
+            f"{file} is of a {family} device with map {table}",
+            expected=f"{target.family.name}, map {known.name}",
+        )
+    unknown = [name for name in values if name not in known]
+    if unknown:
+        raise RequestError(f"{file}: no register {unknown[0]!r} in map {table}")
+    return values
