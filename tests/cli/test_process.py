@@ -91,7 +91,7 @@ def test_estop_stops_a_process_that_holds_the_port(served: Simulator) -> None:
 
 
 def test_a_second_command_names_the_owner(served: Simulator) -> None:
-    with start("monitor", served.address, "--json") as owner:
+    with start("monitor", f"{served.address}#1-3", "--json") as owner:
         assert owner.stdout is not None
         assert json.loads(owner.stdout.readline())
         code, _, err = run("read", f"{served.address}#1")
@@ -99,7 +99,7 @@ def test_a_second_command_names_the_owner(served: Simulator) -> None:
         owner.communicate(timeout=LIMIT)
     assert code == 4
     assert str(owner.pid) in err
-    assert owner.returncode == 10
+    assert owner.returncode == 0  # Ctrl-C is its usual end
 
 
 def test_a_full_disk_is_one_line(served: Simulator) -> None:
@@ -115,7 +115,7 @@ def test_closed_streams(served: Simulator) -> None:
 
 
 def test_a_pipe_that_closes(served: Simulator) -> None:
-    command = f"{sys.executable} -m motorbus monitor '{served.address}' --json | head -1"
+    command = f"{sys.executable} -m motorbus monitor '{served.address}#1-3' --json | head -1"
     done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=LIMIT, check=False)
     assert json.loads(done.stdout)
     assert done.stderr == ""

@@ -213,7 +213,8 @@ def _report(error: BaseException, words: Sequence[str]) -> Exit:
             _drop(sys.stdout)
             error = errors.MotorbusError(f"the output cannot be written: {error.strerror}")
         else:
-            error = errors.MotorbusError(f"{error.filename}: {error.strerror}")
+            code = Exit.USAGE
+            error = errors.RequestError(f"{error.filename}: {error.strerror}")
     elif code is Exit.USAGE and not isinstance(error, errors.MotorbusError):
         error = _usage(error)
     output.print_error(error, code, as_json="--json" in words)
