@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from motorbus.cli.main import run
+from motorbus.cli.program import run
 
 READ = "FF FF 01 04 02 38 02 BE"
 STATUS = "FF FF 01 04 00 18 05 DD"

@@ -55,7 +55,7 @@ def prepare(row: Row, shell: Shell, buses: Buses) -> None:
 
 
 def test_every_command_is_in_the_table() -> None:
-    from motorbus.cli.main import build  # at the top it would hide the function `motorbus.cli.main`
+    from motorbus.cli.program import build
 
     app = build()
     found = set()

@@ -155,4 +155,4 @@ def test_a_command_runs(
         assert shell(f"motorbus backup {shlex.split(meant)[3]} {shlex.split(meant)[2]}").code == 0
     ran = shell(meant)
     assert ran.code == 0, ran.err
-    assert ran.out
+    assert ran.out or "--listen" in meant  # no other program talks on the bus

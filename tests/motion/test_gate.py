@@ -171,7 +171,7 @@ def test_a_stop_takes_the_axis_from_its_source(nodes: tuple[int, ...]) -> None:
     gate.check(goal(0.6), NOW)
     assert axis.moving
     gate.stopped(nodes)
-    assert (check_owned([(axis, owner)], None) is None) == (nodes == (2,))
+    assert (check_owned([(axis, owner)], None, latched=False) is None) == (nodes == (2,))
     assert axis.moving == (nodes == (2,))
 
 
@@ -205,7 +205,7 @@ def test_after_a_reconnect_nothing_is_known() -> None:
     owner = axis.claim()
     gate._bus.reconnect()  # type: ignore[attr-defined]
     assert axis.position is None
-    assert check_owned([(axis, owner)], None) is not None
+    assert check_owned([(axis, owner)], None, latched=False) is not None
     assert len(gate.required_reads(goal(0.6))) == 1
 
 

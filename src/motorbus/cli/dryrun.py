@@ -90,8 +90,8 @@ class Overlay:
             return self.run(step.runnable)
         if isinstance(step, Gather):
             return tuple([self.run(one) for one in step.runnables])
-        if isinstance(step, SetBitrate):
-            return self._bus.run(SetBitrate(0))
+        if isinstance(step, SetBitrate):  # on CAN, a host at another rate disturbs the bus
+            return self._bus.run(step if self.family.link.kind == "bytes" else SetBitrate(0))
         if isinstance(step, Sleep):
             self._waited += step.seconds
             return self._bus.now() + self._waited
@@ -152,6 +152,9 @@ def carry_out(
         except Unforeseeable as error:
             if writing.dry_run:
                 note(f"note: {error.summary}")
+        finally:
+            if bus.rate != overlay.rate:
+                bus.run(SetBitrate(overlay.rate))
         if writing.dry_run:
             print_frames(overlay)
             return None

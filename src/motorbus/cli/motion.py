@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 Kind = Literal["trapezoid", "minimum_jerk"]
 For = Annotated[str, Parameter(name="--for", help="Time, as 2s; without it until Enter.")]
-Speed = Annotated[float, Parameter(help="Share of the velocity of each axis, above 0, at most 1.")]
+Speed = Annotated[float, Parameter(help="Share of the velocity, above 0 to 1.")]
 LEASE = 1.0  # s after which a jog without end is stopped if its loop hangs
 
 
@@ -151,7 +151,7 @@ def move(
     duration: Annotated[str, Parameter(help="Time of the movement, as 2s.")] = "",
     speed: Speed = 1.0,
     velocity: Annotated[str, Parameter(help="Highest velocity, as 30deg/s.")] = "",
-    kind: Annotated[Kind, Parameter(help="Profile.")] = "trapezoid",
+    kind: Annotated[Kind, Parameter(help="Profile.", show_default=False)] = "trapezoid",
     no_wait: Annotated[bool, Parameter(help="Send the goal, do not wait; the device moves alone.")] = False,
     writing: Writing = Writing(),
     common: Common = Common(),
@@ -269,7 +269,7 @@ def jog(
 def home(
     *axes: Annotated[str, Parameter(name="AXIS")],
     timeout: Annotated[str, Parameter(help="Longest time.")] = "30s",
-    velocity: Annotated[str, Parameter(help="Velocity, as 20rpm; by default that of the device.")] = "",
+    velocity: Annotated[str, Parameter(help="Velocity, as 20rpm; by default of the device.")] = "",
     writing: Writing = Writing(),
     common: Common = Common(),
 ) -> None:
@@ -286,7 +286,10 @@ def home(
     limit = parse_time(timeout) or 30.0
     with open_robot(common, axes, velocity) as robot:
         names = tuple(name for word in axes for name in axes_of(robot, word)) or None
-        speed = None
+        limits: list[float] = [
+            one.config.max_velocity for name, one in robot.axes.items() if name.startswith("#")
+        ]
+        speed = min(limits) if limits else None
         if velocity:
             for name in names or robot.axes:
                 speed = parse_velocity(robot.config.axes[name], velocity, named=name[0] != "#")

@@ -350,7 +350,7 @@ class Frame(Struct, frozen=True, tag="frame"):
 def _listen(word: str, seconds: float, common: Common) -> None:
     """Show what is received on a bus, and send nothing."""
     address = bus_address(word, common)
-    if "listen_only=" not in address:
+    if ":can://" in address and "listen_only=" not in address:
         address += ",listen_only=yes"
     with open_bus(common, address) as bus:
         records = bus.trace.subscribe(10_000)

@@ -275,7 +275,9 @@ def _check_device_limits(setpoint: Setpoint) -> None:
     )
 
 
-def check_owned(axes: Sequence[tuple[AxisStatus, int]], lease: Lease | None) -> MotorbusError | None:
+def check_owned(
+    axes: Sequence[tuple[AxisStatus, int]], lease: Lease | None, *, latched: bool
+) -> MotorbusError | None:
     """The error if the owner of one of these axes has changed since the caller claimed it."""
     lost = [axis for axis, owner in axes if axis.owner != owner]
     if not lost:
@@ -283,4 +285,5 @@ def check_owned(axes: Sequence[tuple[AxisStatus, int]], lease: Lease | None) -> 
     names = ", ".join(axis.name for axis in lost)
     if lease is not None and lease.lost:
         return lease_lost(names)
-    return Interrupted(f"{names}: a stop or another command took over the axis", node=lost[0].node)
+    cause = "an emergency stop" if latched else "a stop or another command"
+    return Interrupted(f"{names}: {cause} took over the axis", node=lost[0].node)

@@ -146,7 +146,9 @@ class BusGroup:
     def lost(self, lease: Any) -> MotorbusError | None:
         """The error if the loop does not own one of its axes any more."""
         return check_owned(
-            [(one.status, one.owner) for one in self.axes.values() if one.owner is not None], lease
+            [(one.status, one.owner) for one in self.axes.values() if one.owner is not None],
+            lease,
+            latched=self.bus.latched,
         )
 
 

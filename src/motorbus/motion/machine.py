@@ -271,7 +271,8 @@ class MachineConfig(Struct, frozen=True, kw_only=True):
             return cls.parse(Path(path).read_text("utf-8"), str(path))
         except (OSError, UnicodeDecodeError) as error:
             raise RequestError(
-                f"{path}: {error}", advice="`motorbus init BUS` writes a machine file"
+                f"{path}: {getattr(error, 'strerror', '') or 'not UTF-8 text'}",
+                advice="`motorbus init BUS` writes a machine file",
             ) from None
         except RequestError as error:
             error.summary = f"{path}: {error.summary}"

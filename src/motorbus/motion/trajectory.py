@@ -140,7 +140,7 @@ class Trajectory:
         try:
             return cls.parse(Path(path).read_text("utf-8"), axes, skip_others=skip_others)
         except (OSError, UnicodeDecodeError) as error:
-            raise RequestError(f"{path}: {error}") from None
+            raise RequestError(f"{path}: {getattr(error, 'strerror', '') or 'not UTF-8 text'}") from None
         except RequestError as error:
             error.summary = f"{path}: {error.summary}"
             raise
