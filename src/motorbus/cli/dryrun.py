@@ -12,7 +12,7 @@ from msgspec import Meta, Struct
 from motorbus.cli.output import confirm, note
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import ANY, Effect, Priority, Request, Step, TimeoutClass
-from motorbus.core.steps import Emit, Exclusive, Gather, SetBitrate, Shielded, Sleep, discard
+from motorbus.core.steps import Exclusive, Gather, SetBitrate, Shielded, Sleep, discard
 from motorbus.errors import MotorbusError
 
 if TYPE_CHECKING:
@@ -95,9 +95,7 @@ class Overlay:
         if isinstance(step, Sleep):
             self._waited += step.seconds
             return self._bus.now() + self._waited
-        if isinstance(step, Emit):
-            return None  # no journal entry: nothing changes
-        return None
+        return None  # `Emit`: no journal entry, nothing changes
 
     def _request(self, request: Request[Any]) -> Any:
         nodes = set() if request.expected is ANY else {one.node for one in request.expected}
@@ -117,19 +115,6 @@ class Overlay:
 def _only_reads(request: Request[Any]) -> bool:
     is_polled = request.priority is Priority.POLL or request.reply_within is TimeoutClass.SCAN
     return request.effect is Effect.NONE and is_polled
-
-
-class Withheld(Struct, frozen=True):
-    """A frame that would be sent, and its meaning by the map of its device."""
-
-    frame: str
-    meaning: str
-
-
-class DryRun(Struct, frozen=True, tag="dry_run"):
-    """The frames that a real run would send, as far as they can be known before."""
-
-    frames: list[Withheld]
 
 
 def carry_out(
