@@ -12,7 +12,7 @@ from msgspec import Struct
 
 from motorbus import Robot, plot
 from motorbus.cli.common import Common
-from motorbus.cli.output import emit, note, note_once
+from motorbus.cli.output import emit, note_once
 from motorbus.core import units
 from motorbus.errors import RequestError
 from motorbus.motion.commands import AxisResult
@@ -69,14 +69,11 @@ def demo(
             states.append(state)
         config = robot.config
     tracks = {name: _track(states, name, config.axes[name].display_unit) for name in config.axes}
-    drawn = {name: track for name, track in tracks.items() if track.times}
-    for name in tracks.keys() - drawn.keys():
-        note(f"{name} moves too; it is not drawn, for no position is known while it moves")
     plot.tracks(
         output,
         (),
-        drawn,
-        title=f"{len(drawn)} of {len(tracks)} axes on {len(config.buses)} buses",
+        tracks,
+        title=f"{len(tracks)} axes on {len(config.buses)} buses",
         remark="simulated",
     )
     axes = {name: _end(config.axes[name], one) for name, one in results[-1].axes.items()}

@@ -49,6 +49,8 @@ class StopsIfInterrupted(Guard):
         if error is None:
             return
         moving = [axis for axis in self._axes if axis.status.moving and not axis.status.fault]
+        for axis in moving:
+            axis.status.estimate = None
         results = await stop_axes(moving)
         accepted = [axis for axis in moving if not isinstance(results[axis.name], MotorbusError)]
         await on_axes(accepted, lambda axis: watch_rest(axis, NOTE_TIME))
@@ -177,15 +179,26 @@ class _Mover(Guard):
                 raise_first(dict(enumerate(values)) if isinstance(values, list) else {0: values})
         elif self._loop is not None:
             peaks = {name: one.peak for name, one in profile.profiles.items()}
-            course = Course(profile.duration, profile.positions, peaks, self._goals)
+
+            def positions(elapsed: float) -> Mapping[str, float]:
+                self._estimate(min(elapsed, profile.duration))
+                return profile.positions(elapsed)
+
+            course = Course(profile.duration, positions, peaks, self._goals)
             begun = await lead(self._loop, course, starts, tolerance, timeout)
         raise_first(await self._finish())
         for axis in self._timed:
-            start = self._starts[axis.name]
-            axis.status.estimate = None if start is None else start + self._plans[axis.name].angle
+            _moved(axis, self._starts[axis.name], self._plans[axis.name].angle)
             axis.status.moving = False
         axes = {name: self._result(name, goal) for name, goal in self._goals.items()}
         return MoveResult(axes, profile.duration, machine.now() - begun, profile.limited_by)
+
+    def _estimate(self, elapsed: float) -> None:
+        """Where the self-timed axes are by their plans, for who watches the move."""
+        for axis in self._timed:
+            start = self._starts[axis.name]
+            if start is not None:
+                axis.status.estimate = start + self._plans[axis.name].position(elapsed)
 
     async def _finish(self) -> dict[str, Any]:
         planned = [axis for axis in self._timed if axis.name in self._plans]
@@ -194,6 +207,9 @@ class _Mover(Guard):
     async def leave(self, error: BaseException | None) -> None:
         if error is None:
             return
+        for axis in self._timed:
+            if axis.status.estimate != self._starts[axis.name]:
+                axis.status.estimate = None
         for name, result in (await self._finish()).items():
             if isinstance(result, MotorbusError) and not isinstance(result, Interrupted):
                 error.add_note(f"{name}: {result.summary}")
