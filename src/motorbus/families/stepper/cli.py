@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from math import pi, tau
@@ -13,7 +14,7 @@ from msgspec import Struct
 
 from motorbus.cli.common import Common, Exit, Target, Writing
 from motorbus.cli.dryrun import carry_out
-from motorbus.cli.output import confirm, emit, note
+from motorbus.cli.output import confirm, emit, note, progress
 from motorbus.cli.target import open_devices, parse_quantity
 from motorbus.core import units
 from motorbus.core.steps import Progress
@@ -265,7 +266,8 @@ def run(
             confirm(question, writing)
         procedure = Controller.run.function(target.device, project, timeout=seconds, endless=endless)
         try:
-            ran: Ran = target.bus.run(procedure, report=_report)
+            with progress(f"project {project}") as advance:
+                ran: Ran = target.bus.run(procedure, report=partial(_report, advance))
         except (KeyboardInterrupt, SystemExit):
             note(f"project {project} may still run: `motorbus stop {device}` ends it")
             raise
@@ -286,11 +288,11 @@ def _way(program: Program) -> str:
     return f"which turns by up to {units.show(angle, 'position')}" if angle > FAR else ""
 
 
-def _report(event: object) -> None:
+def _report(advance: Callable[..., None], event: object) -> None:
     if isinstance(event, InputChanged):
         note(f"{event.at:.3f} s: input {event.port} {'active' if event.active else 'inactive'}")
-    elif isinstance(event, Progress) and event.what:
-        note(f"{event.what}")
+    elif isinstance(event, Progress):
+        advance(event.done, event.total, event.what)
 
 
 # -- inputs and outputs --------------------------------------------------------------------------------------------
@@ -327,8 +329,9 @@ def io(
             emit(Ports(outputs={str(port): level for port, level in one.last_commanded.items()}), common)
             return
         if watch:
-            procedure = partial(Controller.watch_inputs.function, one)(seconds=seconds)
-            found = target.bus.run(procedure, report=_report).levels
+            procedure = Controller.watch_inputs.function(one, seconds=seconds)
+            with progress("inputs") as advance:
+                found = target.bus.run(procedure, report=partial(_report, advance)).levels
         else:
             found = one.inputs()
         emit(Ports(inputs={str(port): active for port, active in found.items()}), common)
