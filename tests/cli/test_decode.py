@@ -64,7 +64,6 @@ def test_a_line_that_cannot_be_read_is_named(
 
 
 def test_events_and_channels_of_an_asc_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("can")
     file = tmp_path / "trace.asc"
     file.write_text(ASC)
     assert run(["decode", "--family", "kst", "--file", str(file), "--json"], last=False) == 0
@@ -75,7 +74,6 @@ def test_events_and_channels_of_an_asc_log(tmp_path: Path, capsys: pytest.Captur
 def test_a_damaged_asc_line_is_named_without_words_of_python(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    pytest.importorskip("can")
     file = tmp_path / "trace.asc"
     file.write_text(ASC + "   0.030000 1  625   Tx   d 8 22 zz 60 00 84 03 00 00\n")
     assert run(["decode", "--family", "kst", "--file", str(file)], last=False) == 1

@@ -164,16 +164,16 @@ def _judge(stops: list[StoppedBus], errors: list[MotorbusError]) -> None:
             "no bus is open on a real port, and none was named", expected="BUS, as feetech:/dev/ttyACM0"
         )
         raise with_others([*errors] or [nothing])
-    heard = [one for one in stops if one.acknowledged]
+    acknowledged = [one for one in stops if one.acknowledged]
     silent = [
         f"{one.bus}: no acknowledgement from {_list(one)}"
         for one in stops
         if not one.error and (one.silent or not one.acknowledged)
     ]
-    if errors and not silent and not heard:
+    if errors and not silent and not acknowledged:
         raise with_others(errors)
     text = "; ".join([*(error.summary for error in errors), *silent])
-    if not heard:
+    if not acknowledged:
         raise NoReply(text, advice=BY_HAND)
     if text:
         raise Partial(text, advice=BY_HAND)

@@ -82,7 +82,7 @@ def set_id(
         motorbus set-id shoulder 7 --dry-run
         motorbus set-id kst:can://slcan/dev/ttyACM0#0x25 0x26 --yes
 
-    Connect one new device at a time: equal ids cannot always be told apart. `motorbus recover` ends a change that was
+    Connect one new device at a time: two devices with one id may look like one. `motorbus recover` ends a change that was
     interrupted. A KST servo asks for a power cycle. The machine file follows.
     """
     try:

@@ -42,14 +42,6 @@ def begin() -> None:
     _noted.clear()
 
 
-def emit_line(result: Any, common: Common) -> None:
-    """Print one of a stream of Structs: one line of JSON, or a table that replaces the last one on a terminal."""
-    if common.json or not sys.stdout.isatty():
-        emit(result, common)
-        return
-    redraw(_struct_lines(result))
-
-
 def redraw(lines: Sequence[str]) -> None:
     """Print lines in place of the last ones on a terminal, else below them."""
     if sys.stdout.isatty():

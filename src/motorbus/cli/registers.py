@@ -243,7 +243,7 @@ def monitor(
     if listen:
         _listen(targets[0] if targets else "", seconds, common)
         return
-    heard: set[str] = set()
+    answered: set[str] = set()
     with ExitStack() as stack:
         devices = stack.enter_context(open_devices(common, targets))
         machine = load_machine(common)
@@ -255,7 +255,7 @@ def monitor(
         try:
             while True:
                 samples = [_sample(one, axes, drivers) for one in devices]
-                heard |= {one.device for one in samples if not one.error}
+                answered |= {one.device for one in samples if not one.error}
                 at = bus.now() - start
                 _show_samples(Samples(at, samples), axes, common)
                 if table is not None:
@@ -266,9 +266,9 @@ def monitor(
                 bus.run(_sleep(start + number / rate - bus.now()))
         except KeyboardInterrupt:
             pass
-    silent = ", ".join(one.name for one in devices if one.name not in heard)
+    silent = ", ".join(one.name for one in devices if one.name not in answered)
     if silent:
-        raise (Partial if heard else NoReply)(f"no answer from {silent}")
+        raise (Partial if answered else NoReply)(f"no answer from {silent}")
 
 
 async def _sleep(seconds: float) -> None:
@@ -340,7 +340,7 @@ def _write_rows(file: Any, at: float, samples: Sequence[Sample], *, head: bool) 
 
 
 class Frame(Struct, frozen=True, tag="frame"):
-    """A frame that was heard; time in s on the link clock."""
+    """A received frame; time in s on the link clock."""
 
     time: float
     frame: str

@@ -1,7 +1,7 @@
 """Discovery of families: packages in this folder, and packages named in the entry point group `motorbus.families`.
 
 The `__init__` of a family holds `FAMILY`, see `motorbus.core.family.Family`. Its `driver` and `simulator` never
-import each other. No module but the commands of a family (`Family.cli`) names it.
+import each other. No module but the commands of a family (`families/F/cli.py`) names it.
 """
 
 from __future__ import annotations

@@ -74,7 +74,6 @@ FAMILY: Final = Family(
     driver=FeetechDriver,
     simulator_module="motorbus.families.feetech.simulator",
     recording_module="motorbus.families.feetech.recording",
-    cli="motorbus.families.feetech.cli",
     commands={name: getattr(Servo, name).function for name in _COMMANDS},
     sync_write=sync_write,
 )

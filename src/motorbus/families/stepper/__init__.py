@@ -62,6 +62,5 @@ FAMILY: Final = Family(
     driver=StepperDriver,
     simulator_module="motorbus.families.stepper.simulator",
     recording_module="motorbus.families.stepper.recording",
-    cli="motorbus.families.stepper.cli",
     commands={name: getattr(Controller, name).function for name in COMMANDS},
 )
