@@ -82,8 +82,8 @@ def set_id(
         motorbus set-id shoulder 7 --dry-run
         motorbus set-id kst:can://slcan/dev/ttyACM0#0x25 0x26 --yes
 
-    Connect one new device at a time: two devices with one id may look like one. `motorbus recover` ends a change that was
-    interrupted. A KST servo asks for a power cycle. The machine file follows.
+    Connect one new device at a time: two devices with one id may look like one.
+    `motorbus recover` ends an interrupted change. A KST servo asks for a power cycle.
     """
     try:
         number = int(new, 0)
