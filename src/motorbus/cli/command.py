@@ -14,7 +14,7 @@ from msgspec import Struct
 from motorbus.cli.common import Common, Target, Writing
 from motorbus.cli.dryrun import carry_out
 from motorbus.cli.output import emit
-from motorbus.cli.registers import assignments, map_of, parse_value
+from motorbus.cli.registers import assignments, parse_value
 from motorbus.cli.target import bus_address, open_devices
 from motorbus.core import units
 from motorbus.errors import RequestError
@@ -116,7 +116,7 @@ def _parse(
             named[key] = _value(known[key], text)
         elif equals and takes_registers:
             [(register, text)] = assignments([word])
-            named[register] = parse_value(target, map_of(target)[register], text)
+            named[register] = parse_value(target, register, text)
         elif len(given) < len(plain) or rest is not None:
             given.append(_value(plain[len(given)] if len(given) < len(plain) else rest, word))
         else:

@@ -9,17 +9,17 @@ from typing import Annotated, Any, Final
 from cyclopts import Parameter
 from msgspec import Struct
 
-from motorbus.cli.common import Common, Partial, Target, Writing
+from motorbus.cli.common import Common, NeedsConsent, Partial, Target, Writing
 from motorbus.cli.dryrun import carry_out
 from motorbus.cli.output import confirm, emit, note
-from motorbus.cli.registers import map_of
-from motorbus.cli.target import bus_address, load_machine, open_bus, open_devices, parse_quantity
+from motorbus.cli.registers import map_of, raise_errors
+from motorbus.cli.target import bus_address, bus_of, need_machine, open_bus, open_devices, parse_quantity
 from motorbus.core import units
 from motorbus.core.register import Storage
 from motorbus.core.request import Effect
 from motorbus.errors import LinkError, MotorbusError, RequestError
-
-FORMAT: Final = 1
+from motorbus.journal import everywhere
+from motorbus.session.journals import journal_of, unfinished
 
 
 class Changed(Struct, frozen=True, tag="changed"):
@@ -57,13 +57,9 @@ def _one(devices: list[Target], method: str, what: str) -> Target:
     if len(devices) != 1:
         names = ", ".join(one.name for one in devices)
         raise RequestError(f"{len(devices)} devices: {names}", expected="one device, as BUS#ID")
-    _check(devices[0], method, what)
+    if not hasattr(devices[0].device, method):
+        raise RequestError(f"{devices[0].family.name} devices have no {what}")
     return devices[0]
-
-
-def _check(target: Target, method: str, what: str) -> None:
-    if not hasattr(target.device, method):
-        raise RequestError(f"{target.family.name} devices have no {what}")
 
 
 def set_id(
@@ -95,30 +91,19 @@ def set_id(
         found = carry_out(writing, target, lambda one: one.set_id(number), question)
         if found is None:
             return
-        place = _place(target)
-    _move_axis(common, target, found.node)
-    emit(Changed((found.node,), f"{place}#{found.node}"), common)
+    if not target.name.startswith("#"):
+        _move_axis(common, target.name, found.node)
+    emit(Changed((found.node,), f"{bus_of(target)}#{found.node}"), common)
 
 
-def _place(target: Target) -> str:
-    """The address of the bus of a device, without options."""
-    name, family = target.bus.link.name, target.family.name
-    return name if name.startswith(f"{family}:") else f"{family}:{name}"
-
-
-def _move_axis(common: Common, target: Target, node: int) -> None:
+def _move_axis(common: Common, axis: str, node: int) -> None:
     """Change the entry of an axis of the machine file whose device has another id now."""
-    if target.name.startswith("#"):
-        return
     from motorbus.motion.machine_edit import edit
 
-    machine = load_machine(common)
-    if machine is None:
-        return
     path = Path(common.machine)
-    change = {f"axis.{target.name}.device": f"{machine.axes[target.name].bus}#{node}"}
-    path.write_text(edit(path.read_text("utf-8"), change), "utf-8")
-    note(f"note: {path}: {target.name} is {change[f'axis.{target.name}.device']}")
+    device = f"{need_machine(common).axes[axis].bus}#{node}"
+    path.write_text(edit(path.read_text("utf-8"), {f"axis.{axis}.device": device}), "utf-8")
+    note(f"note: {path}: {axis} is {device}")
 
 
 def set_baud(
@@ -141,36 +126,30 @@ def set_baud(
     """
     wanted = units.rate(rate)
     done: list[int] = []
-    errors: list[MotorbusError] = []
-    place = ""
+    errors: dict[str, MotorbusError] = {}
     with open_devices(common, (target,)) as devices:
-        names = ", ".join(one.name for one in devices)
-        question = f"write rate {wanted} bit/s to the EEPROM of {names}"
-        for number, one in enumerate(devices):
-            _check(one, "set_baud", "rate that can be changed")
-            how = writing if number == 0 else Writing(yes=True, dry_run=writing.dry_run)
-            option = "baud" if one.family.link.kind == "bytes" else "bitrate"
-            place = f"{_place(one)},{option}={wanted}"
+        first = _one(devices[:1], "set_baud", "rate that can be changed")
+        question = f"write rate {wanted} bit/s to the EEPROM of {', '.join(one.name for one in devices)}"
+        how = writing
+        for one in devices:
             try:
                 if carry_out(how, one, lambda device: device.set_baud(wanted), question) is not None:
                     done.append(one.node)
-            except LinkError as error:
-                error.add_note(f"at {wanted} bit/s already: {_ids(done)}")
+            except (LinkError, NeedsConsent) as error:
+                if done:
+                    error.add_note(f"at {wanted} bit/s already: {_ids(done)}")
                 raise
             except MotorbusError as error:
-                if not done and len(devices) == 1:
-                    raise
-                errors.append(error)
+                errors[one.name] = error
+            how = Writing(yes=True, dry_run=writing.dry_run)
     if done:
-        emit(Changed(tuple(done), f"{place}#{_ids(done)}"), common)
-    if errors:
-        if not done:
-            raise errors[0]
-        raise Partial("; ".join(error.summary for error in errors))
+        option = "baud" if first.family.link.kind == "bytes" else "bitrate"
+        emit(Changed(tuple(done), f"{bus_of(first)},{option}={wanted}#{_ids(done)}"), common)
+    raise_errors(errors, is_partial=bool(done))
 
 
 def _ids(nodes: list[int]) -> str:
-    return "+".join(map(str, nodes)) or "none"
+    return "+".join(map(str, nodes))
 
 
 def set_zero(
@@ -237,46 +216,43 @@ def recover(
     if not (bus or common.bus):
         _list_changes(common)
         return
-    from motorbus.session.journals import journal_of, unfinished
-
+    address = bus_address(bus, common)
     if forget:
-        address = bus_address(bus, common)
         journal = journal_of(address)
         change = journal.unfinished() if journal is not None else None
-        if journal is None or change is None:
-            emit(Recovered(address, "nothing is unfinished"), common)
+        if journal is not None and change is not None:
+            text = change.describe().rstrip(",")
+            confirm(f"forget {text}", writing)
+            journal.forget()
+            emit(Recovered(address, text, "forgotten"), common)
             return
-        confirm(f"forget {change.describe().rstrip(',')}", writing)
-        journal.forget()
-        emit(Recovered(address, change.describe().rstrip(","), "forgotten"), common)
-        return
-    with open_bus(common, bus) as opened:
-        change = unfinished(opened)
-        if change is None:
-            emit(Recovered(opened.link.name, "nothing is unfinished"), common)
-            return
-        device = opened.family.devices.blocking(opened, change.node)
-        target = Target(f"#{change.node}", opened, change.node, opened.family, device)
-        _check(target, "recover", "change that can be recovered")
-        text = change.describe().rstrip(",")
-        verb, facts = change.verb, change.facts
-        outcome = carry_out(writing, target, lambda one: one.recover(verb, facts), f"end {text}")
-        if outcome is not None:
-            emit(Recovered(change.bus, text, OUTCOMES.get(outcome, outcome)), common)
+    else:
+        with open_bus(common, address) as opened:
+            change = unfinished(opened)
+            if change is not None:
+                text = change.describe().rstrip(",")
+                device = opened.family.devices.blocking(opened, change.node)
+                target = Target(f"#{change.node}", opened, change.node, opened.family, device)
+                verb, facts = change.verb, change.facts
+                outcome = carry_out(writing, target, lambda one: one.recover(verb, facts), f"end {text}")
+                if outcome is not None:
+                    emit(Recovered(change.bus, text, OUTCOMES.get(outcome, outcome)), common)
+                return
+    emit(Recovered(address, "nothing is unfinished"), common)
 
 
 def _list_changes(common: Common) -> None:
-    from motorbus.journal import everywhere
-
     found = everywhere()
     errors = [one for one in found if isinstance(one, MotorbusError)]
-    changes = [one for one in found if not isinstance(one, MotorbusError)]
+    changes = [
+        Recovered(one.bus, one.describe().rstrip(",")) for one in found if not isinstance(one, MotorbusError)
+    ]
     if changes or common.json:
-        emit([Recovered(one.bus, one.describe().rstrip(",")) for one in changes], common)
+        emit(changes, common)
     elif not errors:
         print("nothing is unfinished")
-    for error in errors:
-        raise error
+    if errors:
+        raise errors[0]
 
 
 # -- backup, restore -----------------------------------------------------------------------------------------------
@@ -302,14 +278,15 @@ def backup(device: str, file: Path, /, *, common: Common = Common()) -> None:
             values = _read_settings(target)
             names = tuple(values)
             identity = target.device.identify()
-            head = {
-                "format": FORMAT,
+            data = {
+                "format": 1,
                 "family": target.family.name,
                 "model": identity.model,
                 "firmware": identity.firmware,
                 "map": map_of(target).name,
+                "values": values,
             }
-            text = json.dumps({**head, "values": values}, indent=2) + "\n"
+            text = json.dumps(data, indent=2) + "\n"
     with file.open("x", encoding="utf-8") as stream:
         stream.write(text)
     emit(Saved(target.name, str(file), names), common)
@@ -357,17 +334,15 @@ def restore(file: Path, device: str, /, *, writing: Writing = Writing(), common:
             raise RequestError(f"{file}: {unknown[0]!r} is not a setting of {target.name}")
         table = map_of(target)
         changed = {name: raw for name, raw in values.items() if now[name] != raw}
-        if not changed:
-            emit(Saved(target.name, str(file), ()), common)
-            return
         orders = {name: table[name].to_value(raw) for name, raw in changed.items()}
         question = f"write {', '.join(changed)} to the EEPROM of {target.name}"
-        if carry_out(writing, target, lambda one: one.write(**orders) or True, question):
-            after = _read_settings(target)
-            wrong = [name for name, raw in changed.items() if after[name] != raw]
-            if wrong:
-                raise Partial(f"{target.name}: {', '.join(wrong)} read back another value")
-            emit(Saved(target.name, str(file), tuple(changed)), common)
+        if changed and not carry_out(writing, target, lambda one: one.write(**orders) or True, question):
+            return
+        after = _read_settings(target) if changed else now
+        wrong = [name for name, raw in changed.items() if after[name] != raw]
+        if wrong:
+            raise Partial(f"{target.name}: {', '.join(wrong)} read back another value")
+        emit(Saved(target.name, str(file), tuple(changed)), common)
 
 
 def _parse_settings(text: str, file: Path, target: Target) -> dict[str, int]:

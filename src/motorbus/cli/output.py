@@ -6,7 +6,7 @@ import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any, Final, get_type_hints
+from typing import TYPE_CHECKING, Any, Final, TextIO, get_type_hints
 
 from motorbus.errors import MotorbusError
 
@@ -25,19 +25,22 @@ def emit(result: Any, common: Common) -> None:
     A mapping of Structs, and a list of them, is a table; other fields are lines `name: value`.
     """
     if common.json:
-        print(_encode(result), flush=True)
+        print_json(result)
     elif isinstance(result, list | tuple):
         print_table(_rows(result))
     else:
         _print_struct(result)
 
 
+as_json = False  # of the command that runs
 _drawn: list[int] = []  # lines of the last table on the terminal
 _noted: set[str] = set()  # by `note_once`
 
 
-def begin() -> None:
-    """A command begins."""
+def begin(*, json: bool) -> None:
+    """A command begins; `json`: it has --json."""
+    global as_json
+    as_json = json
     _drawn.clear()
     _noted.clear()
 
@@ -51,10 +54,11 @@ def redraw(lines: Sequence[str]) -> None:
     print("\n".join(lines), flush=True)
 
 
-def _encode(result: Any) -> str:
+def print_json(result: Any, file: TextIO | None = None) -> None:
+    """Print one JSON document."""
     import msgspec
 
-    return msgspec.json.encode(result, enc_hook=str).decode()
+    print(msgspec.json.encode(result, enc_hook=str).decode(), file=file, flush=True)
 
 
 def _print_struct(result: Any) -> None:
@@ -238,7 +242,7 @@ def print_error(error: BaseException, code: int, *, as_json: bool) -> None:
         }
         facts |= {"notes": [escape(text) for text in notes]} if notes else {}
         with suppress(OSError, ValueError):
-            print(_encode(facts), file=sys.stderr, flush=True)
+            print_json(facts, sys.stderr)
         return
     note("\n".join([f"error: {summary}", *(f"  {name}: {text}" for name, text in parts)]))
     for text in notes:

@@ -32,6 +32,14 @@ def load_machine(common: Common) -> MachineConfig | None:
     return MachineConfig.load(common.machine)
 
 
+def need_machine(common: Common) -> MachineConfig:
+    """The machine file. Raises RequestError without one."""
+    machine = load_machine(common)
+    if machine is None:
+        raise RequestError(f"no machine file {common.machine}", advice="`motorbus init NAME=BUS` writes one")
+    return machine
+
+
 def is_address(word: str) -> bool:
     """`FAMILY:PORT`, not a name of the machine file."""
     return ":" in word
@@ -153,6 +161,17 @@ def _addresses(common: Common, words: Sequence[str]) -> Iterator[tuple[str, str]
                 yield f"{_with_options(address, common)}#{config.node}", axis
 
 
+def bus_of(target: Target) -> str:
+    """The address of the bus of a device, without options."""
+    name, family = target.bus.link.name, target.family.name
+    return name if name.startswith(f"{family}:") else f"{family}:{name}"
+
+
+def address_of(target: Target) -> str:
+    """The axis, or the address of a device, as the user types it."""
+    return f"{bus_of(target)}{target.name}" if target.name.startswith("#") else target.name
+
+
 def _scan(bus: Bus) -> tuple[int, ...]:
     if bus.family.link.only is not None:
         return (bus.family.link.only,)
@@ -222,6 +241,14 @@ def parse_quantity(text: str, kind: str, unit: str = "") -> float:
             raise RequestError(f"{kind} {text!r} has no unit", expected=f"a unit, as {text}{usual}")
         text += unit
     return units.parse(text, kind)
+
+
+def parse_time(text: str) -> float | None:
+    """A time (s); None for "". Raises RequestError."""
+    seconds = parse_quantity(text, "time", "s") if text else None
+    if seconds is not None and seconds <= 0:
+        raise RequestError(f"{text} is not a time", expected="a time above 0, as 2s")
+    return seconds
 
 
 # -- log -----------------------------------------------------------------------------------------------------------
