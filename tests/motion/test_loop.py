@@ -218,6 +218,8 @@ def test_positions_and_targets_without_a_clock() -> None:
             robot.carry_out(pause(robot, 0.02))
         assert sent["a1"] == pytest.approx(loop.read()["a1"], abs=0.3)
         assert sent["c1"] == pytest.approx(0.2)
+        robot.carry_out(pause(robot, 3.0))
+        assert loop.write({"c1": 0.2}, elapsed=0.02)["c1"] == pytest.approx(0.2)
 
 
 async def pause(robot: Robot, seconds: float) -> None:

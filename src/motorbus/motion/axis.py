@@ -103,6 +103,11 @@ async def read_state(axis: Axis) -> None:
         status.state = state
         if state.position is None or status.take(state.position, state.at):
             return
-    for _ in range(2 if "position" in axis.driver else 0):  # a suspect position is read again
-        if status.take(await axis.driver.position(axis.device), axis.bus.now()):
+    await read_position(axis)
+
+
+async def read_position(axis: Axis) -> None:
+    """Procedure: read its position, a suspect one again; nothing without one."""
+    for _ in range(2 if axis.status.measured else 0):
+        if axis.status.take(await axis.driver.position(axis.device), axis.bus.now()):
             return

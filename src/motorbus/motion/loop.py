@@ -22,10 +22,12 @@ from motorbus.motion.machine import SLACK, Names
 from motorbus.motion.profile import Limits, SetpointGenerator
 from motorbus.motion.program import LOST, Exchange, OnBuses, raise_first
 from motorbus.motion.state import OpenMachine
+from motorbus.motion.status import FRESH
 
 Policy: TypeAlias = Literal["reject", "clamp"]
 MAX_MISSED: Final = 2  # cycles without a position after which an axis gets no goal
 SILENCE: Final = 0.3  # s without a position after which the loop ends
+STALE: Final = 0.8 * FRESH  # s; an older position is read again before goals are sent
 STALL: Final = 0.5  # s that the host may be late
 CATCH_UP: Final = 3  # periods that a late cycle makes good by one longer step
 MIN_RATE: Final = 4.0  # Hz; goals are one period ahead
@@ -265,6 +267,7 @@ class ControlLoop:
             await self._begin()
         self._check_owned()
         periods = self._schedule(self.machine.now())
+        await self._refresh(self._next)
         await self._turn_wheels(periods)
         batches: dict[BaseBus, Sequence[Request[Any]]] = {
             group.bus: group.requests(self._goals(group, periods)) for group in self.groups
@@ -287,6 +290,12 @@ class ControlLoop:
         await self._look()
         return state
 
+    async def _refresh(self, at: float) -> None:
+        """Read all positions again if one is too old, or too doubtful, to judge a goal at this time (s)."""
+        led = [axis.status for axis in self.axes.values() if axis.owner is not None]
+        if any(one.suspect is not None or (one.measured and at - one.at > STALE) for one in led):
+            self._absorb(await self._read())
+
     async def read(self) -> Mapping[str, float]:
         """Read all positions (rad, m) now, without the clock of the loop."""
         values = await self._read()
@@ -301,6 +310,7 @@ class ControlLoop:
             self.set_target(name, target)
         if any(axis.target is not None and axis.owner is None for axis in self.axes.values()):
             await self._begin()
+        await self._refresh(self.machine.now())
         periods = max(1, round(elapsed * self.rate))
         await self._turn_wheels(periods)
         batches = {}
@@ -372,6 +382,8 @@ class ControlLoop:
         goals = {}
         for node, axis in group.axes.items():
             if axis.owner is None or axis.target is None or axis.missed > MAX_MISSED or axis.config.is_wheel:
+                continue
+            if axis.status.suspect is not None:
                 continue
             if self.direct and axis.behind:
                 one_cycle = axis.config.max_velocity / self.rate

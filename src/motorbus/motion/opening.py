@@ -144,7 +144,15 @@ async def _identify_axis(bus: BaseBus, name: str, config: AxisConfig, kind: str)
         config = config.with_counts(_resolution(bus, name, identity))
     if name.startswith("#") and "stream" not in driver and "set_velocity" in driver:
         config = structs.replace(config, kind="wheel")
-    axis = Axis(name, config, bus, device, driver, AxisStatus(name, config), identity.model)
+    axis = Axis(
+        name,
+        config,
+        bus,
+        device,
+        driver,
+        AxisStatus(name, config, measured="position" in driver),
+        identity.model,
+    )
     if config.is_wheel and not axis.follows_setpoints:
         axis.require("jog")
     elif not config.is_wheel and "position" in driver and "stream" not in driver:
@@ -155,8 +163,6 @@ async def _identify_axis(bus: BaseBus, name: str, config: AxisConfig, kind: str)
         axis.require("cap_torque")
     if config.exit_action == "torque_off":
         axis.require("disable_torque")
-    if "position" in driver:
-        axis.status.read = lambda: driver.position(device)
     if "limits" in driver and not config.is_wheel:
         found = await catch(driver.limits(device))
         if isinstance(found, NoReply):

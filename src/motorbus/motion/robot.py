@@ -26,7 +26,7 @@ from msgspec import structs
 from motorbus.bus.interrupts import Interrupts, interrupts
 from motorbus.errors import Refused, RequestError
 from motorbus.motion import commands, moves, teach
-from motorbus.motion.axis import Axis
+from motorbus.motion.axis import Axis, read_position
 from motorbus.motion.blocks import Attendance, Loop
 from motorbus.motion.commands import EStopResult, RobotCommand
 from motorbus.motion.describe import MachineDescription, describe
@@ -283,7 +283,8 @@ class RobotMethods(OpenMachine):
 
 
 async def call_device(robot: OpenMachine, name: str, function: str, arguments: Mapping[str, Any]) -> Any:
-    """Program: a driver function of the device of an axis."""
+    """Program: a driver function of the device of an axis, after a read of its position."""
+    await run(robot.axis(name).bus, read_position(robot.axis(name)))
     return await _call(robot.axis(name), function, (), arguments)
 
 
@@ -293,7 +294,8 @@ async def read_registers(robot: OpenMachine, name: str, registers: Sequence[str]
 
 
 async def write_registers(robot: OpenMachine, name: str, values: Mapping[str, float]) -> Any:
-    """Program: write registers of the device of an axis."""
+    """Program: write registers of the device of an axis, after a read of its position."""
+    await run(robot.axis(name).bus, read_position(robot.axis(name)))
     return await _call(robot.axis(name), "write", (), values)
 
 
