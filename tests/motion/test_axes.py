@@ -1,10 +1,10 @@
-"""Wheels, self-timed axes, addresses instead of files, raw counts, notes about the model."""
+"""Wheels, self-timed axes, addresses instead of files, notes about the model."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import inf, pi, tau
+from math import inf, tau
 from typing import Any
 
 import pytest
@@ -218,7 +218,7 @@ def test_an_interrupted_self_timed_move_is_stopped_and_loses_its_position(timed:
     assert orders({"stage": sims["stage"]})  # the stop; the start was a probe
 
 
-# -- addresses, counts, notes ----------------------------------------------------------------------------------
+# -- addresses, notes ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("family", "far"), [("feetech", 7.0), ("kst", 2.0)])
@@ -231,16 +231,6 @@ def test_an_address_has_axes_with_the_limits_of_its_devices(family: str, far: fl
             robot.move({"#2": start["#2"] + far})
     with pytest.raises(RequestError, match="names no device"):
         Robot.at("feetech:sim")
-
-
-def test_raw_counts_become_angles_when_the_device_is_known() -> None:
-    keys = {"zero": "2048 raw", "low": "1024 raw", "high": "3072 raw", "sign": -1}
-    with machine("1", axes={"a1": keys}) as (config, sims), Robot(config) as robot:
-        axis = robot.describe().axes["a1"]
-        assert axis.low == pytest.approx(-pi / 2)
-        assert axis.high == pytest.approx(pi / 2)
-        robot.move({"a1": -0.5})
-        assert sims["arm"][1].memory["goal_position"] == pytest.approx(2048 + 0.5 * 4096 / tau, abs=3)
 
 
 def test_a_velocity_above_that_of_the_model_is_noted(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -140,8 +140,6 @@ async def _identify_axis(bus: BaseBus, name: str, config: AxisConfig, kind: str)
     device = getattr(bus.family.devices, kind)(bus, config.node)
     if not driver.names:
         raise RequestError(f"{name}: {config.device} is {identity.model}, whose functions are not known")
-    if config.counted:
-        config = config.with_counts(_resolution(bus, name, identity))
     if name.startswith("#") and "stream" not in driver and "set_velocity" in driver:
         config = structs.replace(config, kind="wheel")
     axis = Axis(
@@ -171,14 +169,3 @@ async def _identify_axis(bus: BaseBus, name: str, config: AxisConfig, kind: str)
     if "max_velocity" in driver:
         axis.top_velocity = await driver.max_velocity(device)
     return axis
-
-
-def _resolution(bus: BaseBus, name: str, identity: Identity) -> float:
-    """rad per count of the position of a device. Raises RequestError where that is not known."""
-    table = bus.family.registers.get(identity.table)
-    row = table["present_position"] if table is not None and "present_position" in table else None
-    if row is None or row.unit != "rad":
-        raise RequestError(
-            f"{name}: the resolution of {identity.model} is not known", advice="give angles, not raw"
-        )
-    return row.scale
