@@ -1,4 +1,4 @@
-"""Wheels, self-timed axes, addresses instead of files, notes about the model."""
+"""Wheels, self-timed axes, addresses instead of files."""
 
 from __future__ import annotations
 
@@ -218,7 +218,7 @@ def test_an_interrupted_self_timed_move_is_stopped_and_loses_its_position(timed:
     assert orders({"stage": sims["stage"]})  # the stop; the start was a probe
 
 
-# -- addresses, notes ----------------------------------------------------------------------------------
+# -- addresses, keys ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("family", "far"), [("feetech", 7.0), ("kst", 2.0)])
@@ -231,20 +231,6 @@ def test_an_address_has_axes_with_the_limits_of_its_devices(family: str, far: fl
             robot.move({"#2": start["#2"] + far})
     with pytest.raises(RequestError, match="names no device"):
         Robot.at("feetech:sim")
-
-
-def test_a_velocity_above_that_of_the_model_is_noted(monkeypatch: pytest.MonkeyPatch) -> None:
-    async def top(device: Any) -> float:
-        return 5.2
-
-    def change(driver: Any, axis: AxisDriver, node: int) -> AxisDriver:
-        return replace(axis, max_velocity=top)
-
-    with_functions(monkeypatch, type(feetech.FAMILY.open()), change)
-    with machine("1-2", axes={"a1": {"max_velocity": "10 rad/s"}}) as (config, _), Robot(config) as robot:
-        assert [note.partition(":")[0] for note in robot.warnings] == ["a1"]
-        assert "297.9 deg/s" in robot.warnings[0]
-        assert robot.describe().axes["a1"].notes
 
 
 def test_a_key_that_a_device_cannot_follow_is_refused() -> None:

@@ -154,13 +154,9 @@ def test_positions_go_to_the_device_and_back(
     assert MachineConfig.parse(write(machine)) == machine
 
 
-def test_shown_and_typed_positions_are_in_the_unit_of_the_axis() -> None:
+def test_shown_positions_are_in_the_unit_of_the_axis() -> None:
     axes = MachineConfig.parse(GOOD).axes
     assert (axes["pan"].show(-pi / 4), axes["lift"].show(0.0125)) == ("-45.0 deg", "12.50 mm")
-    assert [axes["pan"].parse("45"), axes["lift"].parse("12.5")] == pytest.approx([pi / 4, 0.0125])
-    assert axes["pan"].parse("0.5 rad") == 0.5
-    with pytest.raises(RequestError):
-        axes["pan"].parse("5 mm")
 
 
 def test_the_schema_accepts_good_files_and_refuses_wrong_ones() -> None:

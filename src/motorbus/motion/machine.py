@@ -206,14 +206,6 @@ class AxisConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         number = f"{position / scale:.{digits}f}"
         return f"{number if float(number) else number.removeprefix('-')} {unit}"
 
-    def parse(self, text: str) -> float:
-        """`90 deg`, or a number in the display unit -> position (rad, m). Raises RequestError."""
-        quantity = "length" if self.travel else "position"
-        try:
-            return units.real(text.strip()) * units.SCALES[quantity][self.display_unit]
-        except ValueError:
-            return units.parse(text, quantity)
-
 
 class GroupConfig(Struct, frozen=True, forbid_unknown_fields=True):
     """A group of axes."""

@@ -16,7 +16,6 @@ from motorbus.core.steps import READABLE, catch, gather
 from motorbus.errors import MotorbusError, NoReply, RequestError
 from motorbus.link.memory import MemoryLink, share_clock
 from motorbus.motion.axis import Axis
-from motorbus.motion.describe import notes_of
 from motorbus.motion.gate import SafetyGate
 from motorbus.motion.machine import AxisConfig, BusConfig, MachineConfig, Names, Velocity
 from motorbus.motion.program import OnBuses, raise_first
@@ -114,8 +113,6 @@ async def identify(machine: OpenMachine, kind: str) -> None:
         machine.gates[bus] = SafetyGate(
             bus, [axis.status for axis in machine.axes.values() if axis.bus is bus]
         )
-    for axis in machine.axes.values():
-        machine.warnings += notes_of(axis)
     for name, bus in machine.buses.items():
         machine.warnings += [f"{name}: {text}" for text in bus.warnings]
         _distrust(machine, bus)
@@ -166,6 +163,4 @@ async def _identify_axis(bus: BaseBus, name: str, config: AxisConfig, kind: str)
         if isinstance(found, NoReply):
             raise found
         axis.limits = None if isinstance(found, MotorbusError) else found
-    if "max_velocity" in driver:
-        axis.top_velocity = await driver.max_velocity(device)
     return axis
