@@ -10,7 +10,6 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from enum import Enum
 from functools import cached_property
 from importlib import import_module
 from math import inf
@@ -74,15 +73,6 @@ class IdChanged(NamedTuple):
     new: int
 
 
-class Quality(Enum):
-    """Reliability of a sample."""
-
-    FRESH = "fresh"  # new and plausible
-    REPEATED = "repeated"  # an older sample again
-    CONFIRMED = "confirmed"  # implausible after the last one, but equal to a suspect one before it
-    SUSPECT = "suspect"  # implausible and not confirmed
-
-
 class State(NamedTuple):
     """One sample of a device in API units (rad, rad/s, fraction, A, V, °C); None for values it does not report."""
 
@@ -95,7 +85,6 @@ class State(NamedTuple):
     temperature: float | None = None
     moving: bool | None = None
     alarm: tuple[str, ...] = ()  # names of the alarm bits that are set
-    quality: Quality = Quality.FRESH
     refused: tuple[str, ...] = ()  # errors of values that the device refused; they are None
 
 
