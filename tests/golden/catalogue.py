@@ -323,8 +323,6 @@ KST: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("provision", new_id=9, new_rate=250_000), "", ()),
     (call("set_id", 9), "", ()),
     (call("set_baud", 250_000), "", ()),
-    (call("set_reports", True), "", ()),
-    (call("set_reports", False), "off", (call("set_reports", True),)),
     (call("set_mid_point"), "", ()),
     (call("read", "negative_limit", "positive_limit"), "limits", ()),
     (call("write", negative_limit=-0.5, positive_limit=0.5), "limits", ()),

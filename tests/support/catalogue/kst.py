@@ -178,12 +178,6 @@ def save(rig: KstRig) -> None:
     rig.link.advance(0.5)
 
 
-def start_reports(rig: KstRig) -> None:
-    """Nobody answers a start or a stop."""
-    rig.servo.set_reports(True)
-    rig.servo.set_reports(False)
-
-
 def broadcast_reading(rig: KstRig) -> None:
     raw = rig.stir()
     row = rig.servo.table["present_position"]
@@ -234,7 +228,6 @@ KINDS: dict[str, Kind] = {
     "write 1 byte that is kept": Kind(set_bit_rate),
     "save": Kind(save),
     "save that is acknowledged": Kind(save, options={"save_reply": "ack"}),
-    "start and stop of reports": Kind(start_reports),
     "start and move": Kind(write_2, profile="xqpower"),
     "stop": Kind(stopping, sure=False),  # it is said again in the next round of a stop
     "broadcast read": Kind(broadcast_reading, alone=False),

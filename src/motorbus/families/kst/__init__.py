@@ -41,7 +41,9 @@ _SETTINGS: Final = (
     Option("profile", str, "kst", "the make of the servos; no servo reports it", tuple(PROFILES)),
     Option("id_format", str, "std", "identifiers of 11 bits (std) or 29 (ext)", ID_FORMATS),
     Option("sized", str, "no", "whether writes state their length", SIZED),
-    Option("nmt", str, "profile", "form of start and stop: profile, none, vendor or standard", NMT),
+    Option(
+        "nmt", str, "profile", "start before a move: by the profile, none, or standard (NMT of CiA 301)", NMT
+    ),
 )
 
 _COMMANDS: Final = (

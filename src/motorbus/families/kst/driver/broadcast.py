@@ -85,7 +85,7 @@ async def broadcast_write(
 
     async def start_and_write() -> Response:
         if setpoints and settings.must_start:
-            start = settings.format(encode_start(settings.nmt, sdo.BROADCAST, True))
+            start = settings.format(encode_start(sdo.BROADCAST))
             await Request(start, **common)
         if name == "node_id":
             await Emit(IdChanged(None, raw))

@@ -6,7 +6,6 @@ All times come with their source; none was measured on hardware.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, Final
 
 from motorbus.core.can_bits import least
@@ -46,7 +45,6 @@ _AXIS: Final = AxisDriver(
     move=motion.move,
     stop=motion.stop,
     limits=motion.limits,
-    travel=motion.travel,
     stream=motion.open_stream,
 )
 
@@ -75,7 +73,7 @@ class KstDriver:
             profile=made,
             extended=choice("id_format", id_format, ID_FORMATS) == "ext",
             sized=choice("sized", sized, SIZED) == "yes",
-            nmt=made.nmt if form == "profile" else form,
+            must_start=(made.nmt if form == "profile" else form) == "standard",
         )
 
     def air_time(self, request: Request[Any], rate: int) -> float:
@@ -142,12 +140,7 @@ class KstDriver:
         return scan.scan(self.settings, ids, rates)
 
     def axis(self, identity: Identity) -> AxisDriver:
-        profile = PROFILES.get(identity.table)
-        if profile is None:
-            return AxisDriver()
-        if "status" not in profile.table:
-            return _AXIS
-        return replace(_AXIS, current=feedback.current, temperature=feedback.temperature)
+        return _AXIS if identity.table in PROFILES else AxisDriver()
 
     def decode(self, data: bytes) -> list[Explanation]:
         return decode.decode(data, self.settings.profile)
