@@ -40,7 +40,7 @@ class Mirror:
     def due(self) -> float | None:
         return min((when for when, _ in self.coming), default=None)
 
-    def tune(self, rate: int, listen_only: bool = False) -> None: ...
+    def tune(self, rate: int) -> None: ...
 
 
 def test_time_moves_only_inside_read_and_to_the_event() -> None:

@@ -82,7 +82,7 @@ def find_adapter(name: str, device: str, wanted: Adapter | None, lister: Lister)
 
 
 class Reconnecting:
-    """A link that is reopened after a loss; see `reconnecting`. It keeps the lock of `link`.
+    """A link that is reopened after a loss, at its present rate; see `reconnecting`. It keeps the lock of `link`.
 
     `find` returns the present address, and raises PortNotFound while the port is absent, LinkLost for another adapter.
     `settings` are for `open_link`. `on_rename` is called with the new name of the lock, and with "" when another
@@ -113,7 +113,7 @@ class Reconnecting:
             link.lock = PortLock(link.lock.port)  # closing the link releases nothing
         link.name = self.name
         self._link = link
-        self.listen_only = bool(getattr(link, "listen_only", False))
+        self.listen_only: bool = getattr(link, "listen_only", False)
         self.rate: int = link.rate
         self.warnings: tuple[str, ...] = link.warnings
         self.latency: float = link.latency
@@ -127,9 +127,9 @@ class Reconnecting:
         """The name under which the port is locked; "" when it is not."""
         return self._lock.port if self._lock.held else ""
 
-    def tune(self, rate: int, listen_only: bool = False) -> None:
-        self._link.tune(rate, listen_only)
-        self.rate, self.listen_only = self._link.rate, listen_only
+    def tune(self, rate: int) -> None:
+        self._link.tune(rate)
+        self.rate = self._link.rate
 
     def trouble(self) -> str:
         """What the adapter has reported since the last call."""
@@ -153,8 +153,10 @@ class Reconnecting:
                 raise self._loss()
             self._link.close()
             before = self._lock
+            lock = before if before.held else None
             try:
-                self._use(self._reopen())
+                settings = {**self._settings, "rate": self.rate}
+                self._use(open_link(self._find(), lock=lock, connect_time=CONNECT_TIME, **settings))
             except (MotorbusError, OSError) as error:
                 self._error = error
                 if isinstance(error, AnotherAdapter) and before.held:  # any program may open that one
@@ -168,22 +170,6 @@ class Reconnecting:
             if self._lock is not before:
                 before.release()
                 self.on_rename(self.lock_name)
-
-    def _reopen(self) -> Link:
-        """Open the port with its present rate and mode."""
-        settings = {**self._settings, "rate": self.rate}
-        if settings.get("kind") == "frames":
-            settings["options"] = {**(settings.get("options") or {}), "listen_only": self.listen_only}
-        lock = self._lock if self._lock.held else None
-        address = self._find()
-        link = open_link(address, lock=lock, connect_time=CONNECT_TIME, **settings)
-        try:
-            if self._find() == address:
-                return link
-            raise PortNotFound(f"{self.name} was exchanged while it was opened")
-        except BaseException:
-            link.close()
-            raise
 
     def rest(self, until: float) -> None:
         """See `Renewable.rest`."""
