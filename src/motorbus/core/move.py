@@ -7,7 +7,7 @@ stop.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, Final, Generic, Protocol, TypeVar
 
 from motorbus.core import units
@@ -86,10 +86,6 @@ class MoveLogic(Generic[D]):
         )
 
 
-async def _await(runnable: Runnable[object]) -> None:
-    await runnable
-
-
 async def move(
     logic: MoveLogic[D],
     goals: Mapping[D, float],
@@ -97,13 +93,12 @@ async def move(
     wait: bool = True,
     tolerance: float | None = None,
     timeout: float | None = None,
-    around: Callable[[Runnable[object]], Runnable[object]] = _await,
 ) -> None:
     """Move devices to these goals (rad); return when all are in position, or at once with `wait=False`.
 
     All goals are checked before the first is sent. In position: within `tolerance` rad and not moving; a device that
     does not report whether it moves is in position after two such samples in a row. An interrupt of the wait stops
-    all. `around` wraps what is awaited for each device; it may raise an interrupt for an error.
+    all.
 
     Raises LimitExceeded; Stalled when a position has not changed for 0.5 s; MotionError after `timeout` s (None: from
     the distance).
@@ -117,7 +112,7 @@ async def move(
 
     async def send() -> None:
         for device, goal in checked:
-            await around(logic.send(device, goal))
+            await logic.send(device, goal)
 
     if not wait:
         for device in goals:
@@ -126,9 +121,7 @@ async def move(
         return
     async with _StopIfInterrupted(logic, tuple(goals)):
         await send()
-        await gather(
-            *[around(_arrive(logic, device, goal.value, tolerance, timeout)) for device, goal in checked]
-        )
+        await gather(*[_arrive(logic, device, goal.value, tolerance, timeout) for device, goal in checked])
 
 
 async def _arrive(

@@ -13,6 +13,7 @@ import json
 import os
 import re
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -28,10 +29,9 @@ TRIES = 20  # of 1 ms: a process that looks up the owner holds the file for a mo
 
 
 def state_folder() -> Path:
-    """The folder of locks, sockets and journals, made with mode 0700: `motorbus` in the folder for the state of programs.
+    """The folder of locks, sockets and journals, made with mode 0700. Raises LinkError when it cannot be made.
 
-    That is $XDG_STATE_HOME, ~/.local/state, or the local application data of Windows. Raises LinkError when it cannot
-    be made or belongs to another user.
+    It is `motorbus` in $XDG_STATE_HOME, in ~/.local/state, or in the local application data of Windows.
     """
     if os.name == "nt":
         home = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
@@ -39,7 +39,11 @@ def state_folder() -> Path:
         home = Path(os.environ.get("XDG_STATE_HOME", ""))
         if not home.is_absolute():  # the XDG specification: a relative path is ignored
             home = Path("~/.local/state").expanduser()
-    folder = home / "motorbus"
+    return _make_private(home / "motorbus")
+
+
+def _make_private(folder: Path) -> Path:
+    """Make this folder with mode 0700. Raises LinkError, also when it belongs to another user."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         if not hasattr(os, "getuid") or folder.lstat().st_uid == os.getuid():
@@ -70,17 +74,18 @@ def _file(port: str, suffix: str) -> Path:
 
 
 def socket_path(port: str) -> Path:
-    """Where the owner of this port listens for an emergency stop: a short name, for a Unix socket.
+    """Where the owner of this port listens for an emergency stop; short enough for a Unix socket.
 
-    Raises LinkError when the state folder cannot be used.
+    Raises LinkError when neither the state folder nor the temporary folder can be used.
     """
-    path = state_folder() / f"{hashlib.sha256(real_name(port).encode()).hexdigest()[:16]}.sock"
-    if len(os.fsencode(path)) > SOCKET_LIMIT:
-        raise LinkError(
-            f"{path.parent} is too long for a Unix socket: a path has at most {SOCKET_LIMIT} bytes",
-            advice="set XDG_STATE_HOME to a shorter path",
-        )
-    return path
+    path = _file(port, ".sock")
+    if len(os.fsencode(path)) <= SOCKET_LIMIT:
+        return path
+    user = os.getuid() if hasattr(os, "getuid") else 0
+    folder = _make_private(Path(tempfile.gettempdir()) / f"motorbus-{user}")
+    if folder.lstat().st_uid != user:  # root may change the mode of any folder
+        raise LinkError(f"{folder} belongs to another user", advice="set XDG_STATE_HOME to a shorter path")
+    return folder / f"{hashlib.sha256(os.fsencode(path)).hexdigest()[:16]}.sock"
 
 
 def journal_path(port: str) -> Path:

@@ -45,6 +45,8 @@ TERMIOS2 = struct.Struct("=4I20s2I")
 
 def ports(lister: Callable[[], Iterable[SerialPortInfo]] | None = None) -> list[PortInfo]:
     """The serial ports of this machine, USB adapters first."""
+    import serialx
+
     found = [
         PortInfo(
             device=port.resolved_device,
@@ -55,17 +57,11 @@ def ports(lister: Callable[[], Iterable[SerialPortInfo]] | None = None) -> list[
             manufacturer=port.manufacturer or "",
             product=port.product or "",
             guess=usb_adapters.ADAPTERS.get((port.vid, port.pid), ""),
+            part=(port.interface_num, port.port_number),
         )
-        for port in (lister or list_ports)()
+        for port in (lister or serialx.list_serial_ports)()
     ]
     return sorted(found, key=lambda port: (port.vid is None, port.device))
-
-
-def list_ports() -> list[SerialPortInfo]:
-    """The serial ports of this machine, as serialx describes them."""
-    import serialx
-
-    return list(serialx.list_serial_ports())
 
 
 class SerialLink(StreamLink):
