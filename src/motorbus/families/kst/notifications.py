@@ -6,7 +6,7 @@
     heartbeat   0x700 + node                   1 byte (CiA 301)
 
 The length of a frame tells a report from a reply, never the first byte. Source: the KST CAN protocol manual has none of
-this; public drivers of these servos (a flight-controller driver, an STM32 driver, a driver of XQPOWER servos) do.
+this; public drivers of these servos (a autopilot driver, an STM32 driver, a driver of XQPOWER servos) do.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 A save has no reply, requests during the write to flash are lost or answered with transitional values, and some writes
 fail or are undone. So a setting is written, read back, saved, and read back again; that it is saved shows after a
-restart only. Source: KST CAN protocol manual, command 3; a public flight-controller driver for the wait and the reading
+restart only. Source: KST CAN protocol manual, command 3; a public autopilot driver for the wait and the reading
 back. The manual has no mid point and no reverse bit: a profile without them raises RequestError and names others.
 """
 
