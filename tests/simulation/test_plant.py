@@ -60,15 +60,6 @@ def test_a_wheel_speeds_up_and_never_ends() -> None:
     assert motion.moving(1e9)
 
 
-@pytest.mark.parametrize(
-    ("goal", "speed", "acceleration"),
-    [(float("nan"), 1.0, 1.0), (inf, 1.0, 1.0), (1.0, -1.0, 1.0), (1.0, 1.0, 0.0), (1.0, inf, inf)],
-)
-def test_impossible_figures_are_refused(goal: float, speed: float, acceleration: float) -> None:
-    with pytest.raises(ValueError, match="must be|cannot"):
-        move(0.0, 0.0, goal, speed=speed, acceleration=acceleration)
-
-
 @given(places, places, velocities, speeds, accelerations)
 def test_position_and_velocity_never_jump(
     start: float, goal: float, velocity: float, speed: float, acceleration: float

@@ -10,7 +10,7 @@ differences matter.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import copysign, inf, isfinite, sqrt
+from math import copysign, inf, sqrt
 from typing import NamedTuple
 
 
@@ -93,11 +93,8 @@ def move(
     With an initial `velocity` too high to stop at the goal it overshoots and returns. An initial velocity away from the
     goal, or above `speed`, is braked first. With infinite `acceleration` the velocity changes at once. `speed` 0 brakes
     to a halt anywhere.
-
-    Raises ValueError for a negative speed, an acceleration of 0 or less, NaN, an infinite position or velocity, and if
-    both speed and acceleration are infinite.
+    The caller gives finite values, except for `acceleration`, which is above 0.
     """
-    _check(speed, acceleration, position, goal, velocity)
     if not speed:
         return run(at, position, 0.0, velocity=velocity, acceleration=acceleration)
     if acceleration == inf:
@@ -130,21 +127,11 @@ def run(
     at: float, position: float, velocity_goal: float, *, velocity: float = 0.0, acceleration: float = inf
 ) -> Motion:
     """Accelerate to `velocity_goal` and keep it without end, as a wheel; 0 brakes to a halt."""
-    _check(abs(velocity_goal), acceleration, position, velocity_goal, velocity)
     change = velocity_goal - velocity
     if not change or acceleration == inf:
         return Motion(at, (), position, velocity_goal)
     ramp = Phase(abs(change) / acceleration, position, velocity, copysign(acceleration, change))
     return Motion(at, (ramp,), ramp.position_after(ramp.duration), velocity_goal)
-
-
-def _check(speed: float, acceleration: float, *finite: float) -> None:
-    if not all(map(isfinite, finite)):
-        raise ValueError("position, goal and velocity must be finite")
-    if not speed >= 0 or not acceleration > 0:
-        raise ValueError("speed must be 0 or more, acceleration more than 0")
-    if speed == acceleration == inf:
-        raise ValueError("speed and acceleration cannot both be infinite")
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Final, Generic, Protocol, TypeVar
 
 from motorbus.core.family import Positions
-from motorbus.core.register import is_number, shown
+from motorbus.core.register import shown
 from motorbus.core.request import Precondition, Request, Stops
 from motorbus.core.steps import Procedure, gather
 from motorbus.errors import RequestError
@@ -72,14 +72,8 @@ class PositionStream(Generic[N]):
 
     async def start(self, speeds: Mapping[int, float]) -> None:
         """Prepare all devices at the same time; then raise the first error."""
-        for node, speed in speeds.items():
-            self._device(node)
-            if not (is_number(speed) and speed > 0):
-                raise RequestError(
-                    f"node {node}: {shown(speed)} is no speed",
-                    expected="a number above 0, in rad/s",
-                    node=node,
-                )
+        for node in speeds:
+            self._device(node)  # raises
         await gather(*[self._start(device, speeds.get(node)) for node, device in self._devices.items()])
 
     def _device(self, node: int) -> N:

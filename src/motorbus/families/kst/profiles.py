@@ -270,8 +270,7 @@ def current(profile: Profile, raw: int) -> float:
 
 def temperature(raw: int) -> int:
     """Temperature (°C) in the raw value of `status`."""
-    byte = raw >> 16 & 0xFF
-    return byte - 256 if byte > 127 else byte
+    return (raw >> 16 & 0xFF ^ 0x80) - 0x80
 
 
 def bit_rate_code(rate: int) -> int:
