@@ -331,7 +331,6 @@ KST: list[tuple[Call, str, tuple[Call, ...]]] = [
 ]
 KST_GROUP: list[tuple[Call, str]] = [
     (shared("scan", SETTINGS, (1, 2, 3)), "ids"),
-    (shared("broadcast_read", "node_id", SETTINGS), ""),
     (shared("broadcast_write", "goal_position", 0.2, SETTINGS, nodes=(1, 2)), "goal"),
     (shared("broadcast_write", "store", SAVE, SETTINGS), "save"),
     (shared("broadcast_write", "bit_rate_code", 4, SETTINGS), "bit_rate"),

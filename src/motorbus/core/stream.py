@@ -4,21 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Final, Generic, Protocol, TypeVar
+from typing import Final, Generic, TypeVar
 
 from motorbus.core.family import Positions
+from motorbus.core.move import Device
 from motorbus.core.register import shown
 from motorbus.core.request import Precondition, Request, Stops
 from motorbus.core.steps import Procedure, gather
 from motorbus.errors import RequestError
-
-
-class Device(Protocol):
-    """A device of a stream."""
-
-    @property
-    def node(self) -> int: ...
-
 
 N = TypeVar("N", bound=Device)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Final
 
 from motorbus.core.family import DeviceTypes, Family, LinkSpec, Option
-from motorbus.families.kst.driver.broadcast import broadcast_read, broadcast_write
+from motorbus.families.kst.driver.broadcast import broadcast_write
 from motorbus.families.kst.driver.bus import KstDriver
 from motorbus.families.kst.driver.feedback import RawStatus, Status
 from motorbus.families.kst.driver.motion import Promise
@@ -31,7 +31,6 @@ __all__ = [
     "ScanWarning",
     "Servo",
     "Status",
-    "broadcast_read",
     "broadcast_write",
     "scan",
     "settings_of",

@@ -48,9 +48,11 @@ def status(node: Node) -> Request[RawStatus | Status]:
 
 def _status(node: Node) -> Request[Status]:
     row = feature_row(node, "status", "current and temperature")
-    return read_row(
-        node, row, lambda raw: Status(profiles.current(node.profile, raw), profiles.temperature(raw))
-    )
+
+    def decode(raw: int) -> Status:
+        return Status(profiles.current(node.profile, raw), float(profiles.temperature(raw)))
+
+    return read_row(node, row, decode)
 
 
 async def current(node: Node) -> float:

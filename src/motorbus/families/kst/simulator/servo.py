@@ -32,7 +32,6 @@ TOO_HIGH: Final = 0x0609_0031
 TOO_LOW: Final = 0x0609_0032
 NOT_STORED: Final = 0x0800_0020  # CiA 301, object 1010h: the reply to a wrong signature
 TURNAROUND: Final = 0.0001  # s from the end of a request to the start of its reply # assumption
-MAILBOX: Final = 16  # requests that may wait for a servo # assumption
 FLASH_TIME: Final = 0.15  # s that a save takes; a public autopilot driver leaves 150 ms
 VERSION: Final = int.from_bytes(b"V1.2", "little")  # of firmware and software # assumption
 INTERVAL: Final = 20
@@ -138,9 +137,7 @@ class Servo(PoweredDevice):
     # -- requests ------------------------------------------------------------------------------------------------
 
     def receive(self, frame: CanFrame, request: sdo.Sdo | None, at: float) -> None:
-        """Carry out a request (None: not known) and reply, one after the other; more than `MAILBOX` are lost."""
-        if self._busy_until - at > MAILBOX * TURNAROUND:
-            return
+        """Carry out a request (None: not known) and reply, one after the other."""
         self.extended = frame.extended
         if self.saving(at):
             return  # lost (autopilot driver)
