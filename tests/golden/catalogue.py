@@ -323,8 +323,6 @@ KST: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("provision", new_id=9, new_rate=250_000), "", ()),
     (call("set_id", 9), "", ()),
     (call("set_baud", 250_000), "", ()),
-    (call("set_reports", True), "", ()),
-    (call("set_reports", False), "off", (call("set_reports", True),)),
     (call("set_mid_point"), "", ()),
     (call("read", "negative_limit", "positive_limit"), "limits", ()),
     (call("write", negative_limit=-0.5, positive_limit=0.5), "limits", ()),
@@ -333,7 +331,6 @@ KST: list[tuple[Call, str, tuple[Call, ...]]] = [
 ]
 KST_GROUP: list[tuple[Call, str]] = [
     (shared("scan", SETTINGS, (1, 2, 3)), "ids"),
-    (shared("broadcast_read", "node_id", SETTINGS), ""),
     (shared("broadcast_write", "goal_position", 0.2, SETTINGS, nodes=(1, 2)), "goal"),
     (shared("broadcast_write", "store", SAVE, SETTINGS), "save"),
     (shared("broadcast_write", "bit_rate_code", 4, SETTINGS), "bit_rate"),

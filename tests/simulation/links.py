@@ -69,7 +69,7 @@ class QueueLink:
             os.read(self._pipe[0], 1)
         return [frame]
 
-    def tune(self, rate: int, listen_only: bool = False) -> None:
+    def tune(self, rate: int) -> None:
         self.rate = rate
 
     def fileno(self) -> int | None:

@@ -29,7 +29,7 @@ def test_a_servo_says_what_it_is_and_how_it_is_set(name: str) -> None:
 def test_a_known_map_gives_an_axis_whatever_the_model_number() -> None:
     driver = FAMILY.open()
     axis = driver.axis(Identity(1, "unknown model 10.27", "3.43", "hls"))
-    assert {"move", "stream", "stop", "cap_current"} <= axis.names
+    assert {"move", "stream", "stop", "cap_torque"} <= axis.names
     assert driver.axis(Identity(1, "STS3215", "9.99", "")).names == frozenset()
     assert "cap_torque" not in driver.axis(Identity(1, "SCS0009", "0.10", "scs")).names
     assert "current" not in driver.axis(Identity(1, "SCS0009", "0.10", "scs")).names

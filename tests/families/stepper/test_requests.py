@@ -119,10 +119,10 @@ def test_motor_number_is_that_of_the_bus() -> None:
 # -- the bus -----------------------------------------------------------------------------------------------------------
 
 
-def test_axis_moves_by_and_has_no_position() -> None:
+def test_axis_has_no_position() -> None:
     driver = FAMILY.open()
     assert driver.axis(Identity(1, "stepper controller", "", "")).names == {
-        "move_by", "jog", "home", "plan_move", "run", "stop",
+        "jog", "home", "plan_move", "run", "stop",
     }  # fmt: skip
     assert not driver.axis(Identity(1, "", "", "")).names
 

@@ -51,24 +51,17 @@ HELD: Final = PRESENT + 2  # bytes of registers 0 to 57, which decide how a serv
 _AXIS: Final = AxisDriver(
     state=feedback.telemetry,
     position=feedback.position,
-    velocity=feedback.velocity,
-    load=feedback.load,
-    current=feedback.current,
-    voltage=feedback.voltage,
-    temperature=feedback.temperature,
     health=feedback.health,
     enable_torque=motion.enable_torque,
     disable_torque=motion.disable_torque,
     move=motion.move,
     stop=motion.stop,
     limits=motion.limits,
-    travel=motion.travel,
     max_velocity=motion.max_velocity,
     cap_torque=motion.cap_torque,
-    cap_current=motion.cap_current,
     stream=stream.open_stream,
 )
-_POSITION_ONLY: Final = frozenset(("move", "limits", "travel", "stream"))
+_POSITION_ONLY: Final = frozenset(("move", "limits", "stream"))
 
 
 class FeetechDriver(HalfDuplexSerial):
@@ -128,13 +121,7 @@ class FeetechDriver(HalfDuplexSerial):
         """By the register map, whatever the model; a servo in another mode than position has an axis of that kind."""
         if identity.table not in TABLES:
             return AxisDriver()
-        traits = TRAITS[identity.table]
-        lacks = {
-            "current": not TABLES[identity.table]["present_current"].unit,
-            "cap_torque": not traits.limit,
-            "cap_current": not traits.current,
-        }
-        names = _AXIS.names - {name for name, missing in lacks.items() if missing}
+        names = _AXIS.names if TRAITS[identity.table].limit else _AXIS.names - {"cap_torque"}
         mode = identity.details.get("mode", Mode.POSITION.value)
         if mode != Mode.POSITION.value:
             names -= _POSITION_ONLY

@@ -25,7 +25,6 @@ DUMP_END: Final = 0.6  # s from a request to the end of its dump, at 9600 baud #
 GAP: Final = 0.05  # s within an old reply # assumption
 
 _AXIS: Final = AxisDriver(
-    move_by=manual.move_by,
     jog=manual.jog,
     home=manual.home,
     plan_move=plan.plan_move,
