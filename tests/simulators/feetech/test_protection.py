@@ -72,7 +72,7 @@ def test_threshold_or_time_of_0_and_a_lower_limit_never_trip(settings: tuple[int
 
 def test_hls_has_no_overload_registers() -> None:
     host, servo = holding(0.9, "hls")
-    assert (servo.overload.next, tripped(host.wait(100.0))) == (inf, False)
+    assert (servo.trips_at, tripped(host.wait(100.0))) == (inf, False)
 
 
 def test_time_starts_again_after_a_relief_and_not_after_a_command() -> None:
@@ -97,7 +97,7 @@ def test_exact_moment_however_late_the_host_asks() -> None:
     host.write(1, POSITION, *word(2000), 0, 0, *word(1000))
     hit = 1.0 + 0.5 + 0.5 * 1000 / 25_400
     assert servo.motion.done_at == pytest.approx(hit)
-    assert servo.overload.next == pytest.approx(hit + 2.0)
+    assert servo.trips_at == pytest.approx(hit + 2.0)
     host.wait(1000.0)
     assert servo.motion.start == pytest.approx(hit + 2.0)
     assert (tripped(host), servo.raw_position) == (True, 1500)
