@@ -9,7 +9,7 @@ import pytest
 from motorbus.core.register import Register, Storage
 from motorbus.families.feetech.registers import TABLES
 from motorbus.families.feetech.registers.sts import STS
-from motorbus.families.feetech.simulator.memory import Cell, Layout, Memory, code
+from motorbus.families.feetech.simulator.memory import Cell, Memory, code
 from motorbus.families.feetech.simulator.servo import FEEDBACK
 from tests.simulators.feetech.host import LOCK, READ, RESTORE, WRITE, Host, packet
 
@@ -22,7 +22,7 @@ class Slow:
 
     def __init__(self, torn: str = "erased") -> None:
         self.now = 0.0
-        self.memory = Memory(Layout(STS, {"id": 9}), lambda: self.now, 0.02, torn)
+        self.memory = Memory(STS, {"id": 9}, lambda: self.now, 0.02, torn)
 
 
 def writable(row: Register) -> bool:

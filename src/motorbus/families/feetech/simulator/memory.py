@@ -28,45 +28,38 @@ class Cell(NamedTuple):
     value: int
 
 
-class Layout:
-    """The rows of a map by address, and the values as shipped; servos of one model share it."""
-
-    def __init__(self, table: RegisterMap, defaults: Mapping[str, int]) -> None:
-        self.table = table
-        self.shipped = bytearray(SIZE)
-        self._touched: dict[tuple[int, int], list[Register]] = {}
-        self._rows: list[Register | None] = [None] * SIZE
-        for row in table.values():
-            self._rows[span(row)] = [row] * row.size
-            self.shipped[span(row)] = code(row, defaults.get(row.name, row.default or 0))
-
-    def touched(self, address: int, count: int) -> list[Register]:
-        """The rows with at least one of these bytes, in order."""
-        found = self._touched.get((address, count))
-        if found is None:
-            rows = self._rows[address : address + count]
-            found = list({row.name: row for row in rows if row is not None}.values())
-            self._touched[address, count] = found
-        return found
-
-
 class Memory:
     """The registers of one servo: `live` are the bytes, `values` the raw values by name, which follow them."""
 
     def __init__(
-        self, layout: Layout, now: Callable[[], float], time: float = 0.0, torn: str = "erased"
+        self,
+        table: RegisterMap,
+        shipped: Mapping[str, int],
+        now: Callable[[], float],
+        time: float = 0.0,
+        torn: str = "erased",
     ) -> None:
-        """`time` is the s of a write to the EEPROM, `torn` as in `Quirks`."""
-        self.layout = layout
-        self.live = bytearray(layout.shipped)
+        """`shipped` are raw values of rows; `time` is the s of a write to the EEPROM, `torn` as in `Quirks`."""
+        self.table = table
+        self.shipped = bytearray(SIZE)
+        self._rows: list[Register | None] = [None] * SIZE
+        for row in table.values():
+            self._rows[span(row)] = [row] * row.size
+            self.shipped[span(row)] = code(row, shipped.get(row.name, row.default or 0))
+        self.live = bytearray(self.shipped)
         self.values: dict[str, int] = {}
-        self.decode(layout.table.values())
+        self.decode(table.values())
         self._now = now
         self._time = time
         self._torn = torn
-        self._stored = bytearray(layout.shipped)
+        self._stored = bytearray(self.shipped)
         self._wear: Counter[int] = Counter()
         self._waiting: list[Cell] = []
+
+    def touched(self, address: int, count: int) -> Iterable[Register]:
+        """The rows with at least one of these bytes, in order."""
+        rows = self._rows[address : address + count]
+        return {row.name: row for row in rows if row is not None}.values()
 
     def decode(self, rows: Iterable[Register]) -> None:
         """Set the values of these rows by the live bytes."""
@@ -80,7 +73,7 @@ class Memory:
 
     def __setitem__(self, name: str, raw: int) -> None:
         """Set a live value as the servo itself does, cut to what its row can express; no lock, no rights."""
-        row = self.layout.table[name]
+        row = self.table[name]
         self.live[row.address : row.address + row.size] = code(row, raw)
         self.decode((row,))
 
@@ -95,7 +88,7 @@ class Memory:
         """
         names: set[str] = set()
         cells: list[int] = []
-        for row in self.layout.touched(address, len(data)):
+        for row in self.touched(address, len(data)):
             if not row.writable and row.name != _KEPT:
                 continue
             begin, end = max(row.address, address), min(row.address + row.size, address + len(data))
@@ -170,21 +163,21 @@ class Memory:
         cells = bytearray(self.stored)
         for cell in self._waiting:
             cells[cell.address] = cell.value
-        self.live = bytearray(self.layout.shipped)
-        for row in self.layout.table.values():
+        self.live = bytearray(self.shipped)
+        for row in self.table.values():
             if row.storage is not Storage.RAM:
                 self.live[span(row)] = cells[span(row)]
-        self.decode(self.layout.table.values())
+        self.decode(self.table.values())
 
     def restore_factory(self, keep: Iterable[str], time: float) -> None:
         """All rows but these as shipped; the EEPROM needs `time` s for it."""
         cells: list[int] = []
-        for row in self.layout.table.values():
+        for row in self.table.values():
             if row.name not in keep and row.storage is not Storage.FACTORY:
-                self.live[span(row)] = self.layout.shipped[span(row)]
+                self.live[span(row)] = self.shipped[span(row)]
                 if row.storage is Storage.EEPROM and row.writable:
                     cells += range(row.address, row.address + row.size)
-        self.decode(self.layout.table.values())
+        self.decode(self.table.values())
         self.store(cells, time)
 
 

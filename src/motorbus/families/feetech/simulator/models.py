@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from functools import cached_property
 from math import radians
 from typing import Final
 
@@ -20,7 +19,6 @@ from motorbus.families.feetech.models import MODELS as NUMBERS
 from motorbus.families.feetech.models import NO_LOAD, map_for
 from motorbus.families.feetech.registers import TABLES
 from motorbus.families.feetech.registers.codes import BAUD_CODES
-from motorbus.families.feetech.simulator.memory import Layout
 from motorbus.families.feetech.traits import TRAITS, Traits
 
 DEFAULT: Final = "sts3215"
@@ -44,16 +42,15 @@ class Model:
     number: tuple[int, int] = 0, 0
     angle: float = 1.0
 
-    @cached_property
+    @property
     def traits(self) -> Traits:
         return TRAITS[self.table.name]
 
-    @cached_property
-    def layout(self) -> Layout:
-        """Its registers as shipped."""
+    @property
+    def identity(self) -> dict[str, int]:
+        """Raw values of the rows that identify it."""
         names = ("firmware_major", "firmware_minor", "model_major", "model_minor")
-        identity = dict(zip(names, (*self.firmware, *self.number), strict=True))
-        return Layout(self.table, self.shipped | identity)
+        return dict(zip(names, (*self.firmware, *self.number), strict=True))
 
     @property
     def rate(self) -> int:

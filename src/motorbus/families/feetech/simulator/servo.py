@@ -104,7 +104,8 @@ class Servo(PoweredDevice):
         """`baud_code` is stored as the baud rate; None: as shipped."""
         self.model = model
         self.quirks = quirks
-        self.memory = Memory(model.layout, now, quirks.store_time, quirks.torn)
+        shipped = model.shipped | model.identity
+        self.memory = Memory(model.table, shipped, now, quirks.store_time, quirks.torn)
         self.pending: tuple[int, bytes] | None = None
         self.lacks: set[int] = set()
         self.lives = self.jitter = self.zero = self._alarm = 0
@@ -213,7 +214,7 @@ class Servo(PoweredDevice):
         self.restart()
         for name, possible in (("id", range(MAX_ID + 1)), ("baud_rate", BAUD_CODES)):
             if self.memory[name] not in possible:
-                self.memory[name] = self.model.layout.shipped[self.model.table[name].address]
+                self.memory[name] = self.memory.shipped[self.model.table[name].address]
         self.deaf_until = self._now() + self.quirks.startup_time if self.quirks.startup_time else -inf
 
     def restart(self) -> None:
@@ -417,7 +418,7 @@ class Servo(PoweredDevice):
 
     def read(self, address: int, count: int) -> bytes:
         """The bytes of a READ."""
-        for row in self.memory.layout.touched(address, count):
+        for row in self.memory.touched(address, count):
             if row.name in FEEDBACK:
                 self.memory[row.name] = FEEDBACK[row.name](self, self._now())
         return self.memory.read(address, count)
