@@ -25,10 +25,7 @@ VARIANTS = {"feetech": tuple(MODELS), "kst": PROFILES, "stepper": ("",)}
 
 EXCLUDED = {
     "feetech": {
-        "forget_answers": "memory of the driver; sends nothing",
-        "forget_settings": "memory of the driver; sends nothing",
         "note_reply": "called by the driver with a reply",
-        "learn_settings": "called by the driver with settings that were read",
         "raw": "converts a value; sends nothing",
         "refusal": "makes an error; sends nothing",
         "row": "gives a table row; sends nothing",
@@ -152,8 +149,6 @@ FEETECH_GROUP: list[tuple[Call, str]] = [
 NARROW = (call("write", min_position_limit=1.9, max_position_limit=3.0), call("enable_torque"))
 AWAY = (call("write", min_position_limit=3.2, max_position_limit=3.5),)
 """Limits that the servo stands outside of."""
-SILENT = (call("write", status_return_level=0),)
-"""From then on writes are not acknowledged."""
 TURNED = (call("calibrate", 1.0),)
 
 FEETECH_STATES: list[tuple[Call, str, tuple[Call, ...]]] = [
@@ -172,11 +167,6 @@ FEETECH_STATES: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("stop"), "unprepared", ()),
     (call("stop"), "limp", PREPARED),
     (call("disable_torque"), "unprepared", ()),
-    (call("write", acceleration=10.0), "not_acknowledged", SILENT),
-    (call("enable_torque"), "not_acknowledged", SILENT),
-    (call("move", 2.5, wait=False), "not_acknowledged", (*SILENT, call("enable_torque"))),
-    (call("disable_torque"), "not_acknowledged", SILENT),
-    (call("reg_write", goal_position=2.5), "not_acknowledged", (*SILENT, call("enable_torque"))),
     (call("position"), "offset", TURNED),
     (call("position"), "offset_in_velocity_mode", (*TURNED, *VELOCITY[:1])),
     (call("move", 8.0, wait=False), "many_turns", (call("set_multi_turn", True), call("enable_torque"))),

@@ -199,7 +199,7 @@ class TestServoGroup:
                 assert exact(damaged, 1.0) is None
             assert exact(whole[:-1], 1.0) is None
             assert exact(frames[1] + frames[0], 1.0) is None
-            nodes[1].forget_settings()
+            nodes[1].known.forget()
             assert exact(whole, 1.0) is None
 
     def test_registers_are_read_by_name(self) -> None:
