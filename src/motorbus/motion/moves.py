@@ -179,9 +179,11 @@ class _Mover(Guard):
                 raise_first(dict(enumerate(values)) if isinstance(values, list) else {0: values})
         elif self._loop is not None:
             peaks = {name: one.peak for name, one in profile.profiles.items()}
+            period = 1 / self._loop.rate
 
             def positions(elapsed: float) -> Mapping[str, float]:
-                self._estimate(min(elapsed, profile.duration))
+                # `elapsed` is that of the next slot
+                self._estimate(min(elapsed - period, profile.duration))
                 return profile.positions(elapsed)
 
             course = Course(profile.duration, positions, peaks, self._goals)

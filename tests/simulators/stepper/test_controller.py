@@ -244,19 +244,6 @@ def test_inputs_start_stop_wait_and_cut() -> None:
         host.controller.set_input(6, True)
 
 
-def test_a_script_changes_inputs_at_its_moments() -> None:
-    host = Host()
-    host.line.script("2.5 1 on\n0.5 2 on\n3.0 1 off")
-    assert host.line.due() == 0.5
-    seen = []
-    for moment in (0.4, 0.5, 2.5, 3.0):
-        host.line.advance(moment)
-        seen.append(sorted(host.controller.machine.inputs))
-    assert seen == [[], [2], [1, 2], [2]]
-    with pytest.raises(RequestError, match="'1 6 on' is no change of an input"):
-        host.line.script("1 6 on")
-
-
 def test_busy_controller_acknowledges_and_ignores_a_start() -> None:
     host = Host(made(project_loop=255))
     host.ask("start_project", project=1)

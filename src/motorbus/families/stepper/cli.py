@@ -23,9 +23,10 @@ from motorbus.families.stepper.driver.controller import Controller
 from motorbus.families.stepper.driver.io import InputChanged
 from motorbus.families.stepper.driver.run import Outcome, Ran
 from motorbus.families.stepper.execution import ramp, sequence
-from motorbus.families.stepper.parameters import PARAMETERS
+from motorbus.families.stepper.parameters import PARAMETERS, Project
 from motorbus.families.stepper.program import estimate
 from motorbus.families.stepper.program.file import Program
+from motorbus.families.stepper.program.lint import Finding
 
 app = App(name="stepper", help="Commands of stepper controllers only.", help_epilogue="")
 
@@ -53,15 +54,6 @@ class StepPlan(Struct, frozen=True):
     output: str
     wait: int | None
     stop: int | None
-
-
-class Finding(Struct, frozen=True):
-    """A mistake of a program."""
-
-    level: str
-    rule: str
-    step: int
-    text: str
 
 
 class Checked(Struct, frozen=True, tag="checked"):
@@ -127,28 +119,28 @@ def check(file: Path, /, *, common: Common = Common()) -> int:
     Exit code 1 if a finding is an error.
     """
     program = Program.load(str(file))
-    steps = [_step(program, number) for number in estimate.numbers(program.project)]
-    found = [Finding(one.level, one.rule, one.step, one.text) for one in program.lint()]
+    steps = [_step(program.project, number) for number in range(1, program.project.total_steps + 1)]
+    found = program.lint()
     checked = Checked(steps, found, str(program.estimate()))
     if common.json:
         emit(checked, common)
     else:
         emit(steps, common)
-        for one in program.lint():
+        for one in found:
             print(one)
         print(checked.estimate)
     return Exit.FAILURE if any(one.level == "error" for one in found) else Exit.OK
 
 
-def _step(program: Program, number: int) -> StepPlan:
-    project, step = program.project, program.project.step(number)
+def _step(project: Project, number: int) -> StepPlan:
+    step = project.step(number)
     return StepPlan(
         step=number,
         times=sequence.times(project, number),
         units=step.sign * step.distance,
         pulses=ramp.pulses_of(project, step),
         frequency=ramp.ramp_of(project, step).run,
-        motion=estimate.step_seconds(project, step),
+        motion=ramp.move_of(project, step).duration,
         pause=step.delay / 1000,
         output=PARAMETERS["output"].choices[step.output] if step.output else "",
         wait=step.start_input or None,
@@ -253,17 +245,11 @@ def run(
     endless = seconds is not None
     with open_devices(common, (device,)) as devices:
         target = _controller(devices)
-        way = _way(target.device.read_project(project))
-        question = f"start project {project} of {target.name}, {way}" if way else ""
-
-        def start(one: Any) -> None:
-            one.start_project(project, endless=endless)
-
         if writing.dry_run:
-            carry_out(writing, target, start)
+            carry_out(writing, target, lambda one: one.start_project(project, endless=endless))
             return
-        if question:
-            confirm(question, writing)
+        if way := _way(target.device.read_project(project)):
+            confirm(f"start project {project} of {target.name}, {way}", writing)
         procedure = Controller.run.function(target.device, project, timeout=seconds, endless=endless)
         try:
             with progress(f"project {project}") as advance:
@@ -274,7 +260,7 @@ def run(
     emit(Result(project, ran.outcome.value, f"{ran.why}; estimate: {ran.predicted}", ran.seconds), common)
     if error := ERRORS.get(ran.outcome):
         advice = (
-            "" if ran.outcome is Outcome.STOPPED else f"it may still run: `motorbus stop {device}` ends it"
+            "" if ran.outcome is Outcome.STOPPED else f"`motorbus stop {device}` ends it if it still runs"
         )
         raise error(f"project {project}: {ran.outcome.value}: {ran.why}", advice=advice)
 
@@ -290,7 +276,7 @@ def _way(program: Program) -> str:
 
 def _report(advance: Callable[..., None], event: object) -> None:
     if isinstance(event, InputChanged):
-        note(f"{event.at:.3f} s: input {event.port} {'active' if event.active else 'inactive'}")
+        note(f"input {event.port} is {'active' if event.active else 'inactive'}")
     elif isinstance(event, Progress):
         advance(event.done, event.total, event.what)
 

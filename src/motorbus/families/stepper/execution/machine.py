@@ -236,8 +236,8 @@ class Machine:
 
     def _move_by_hand(self, phase: Phase, project: Project, pulses: int | None, sign: int) -> None:
         self.stop_mode = project.stop_mode
-        speed = ramp.ramp_of(project, project.step(1))
-        self._go(phase, ramp.motion(speed, pulses, sign, self.tick_ms))
+        speed = ramp.ramp_of(project, project.step(1), self.tick_ms)
+        self._go(phase, ramp.motion(speed, pulses, sign))
 
     def _end_manual(self) -> None:
         self._happen("rests")
@@ -264,7 +264,7 @@ class Machine:
     def _start(self, project: Project, by_command: bool) -> None:
         self.stop_mode = project.stop_mode  # the stop mode belongs to each project # assumption
         self.run = Run(project, by_command, self._now)
-        if sequence.last_step(project):
+        if project.used:
             self._begin_step()
         else:
             self._finish("ended")  # a project without steps ends at once, with a notice # assumption
@@ -282,8 +282,7 @@ class Machine:
         run = self._running()
         project, step = run.project, run.step
         self.outputs = parameters.outputs_after_step(self.outputs, step.output)
-        pulses = ramp.pulses_of(project, step)
-        self._go(Phase.MOVE, ramp.motion(ramp.ramp_of(project, step), pulses, step.sign, self.tick_ms))
+        self._go(Phase.MOVE, ramp.move_of(project, step, self.tick_ms))
         self._happen("begins")
         if step.stop_input in self.inputs:
             self._end_motion()

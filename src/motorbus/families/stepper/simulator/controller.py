@@ -15,7 +15,7 @@ from motorbus.core.request import TimeoutClass
 from motorbus.core.simulated import PoweredDevice
 from motorbus.errors import RequestError
 from motorbus.families.stepper.execution.machine import Machine, Phase
-from motorbus.families.stepper.parameters import HOME_INPUT, INPUTS, Project, check_value
+from motorbus.families.stepper.parameters import HOME_INPUT, INPUTS, Project, check_value, values_of
 from motorbus.families.stepper.protocol import MOTOR, Command, decode_request, encode_reply
 from motorbus.families.stepper.simulator.memory import Memory
 from motorbus.families.stepper.simulator.quirks import Quirks
@@ -47,7 +47,6 @@ class Controller(PoweredDevice):
         self.now = 0.0
         self.offset = 0
         self.notices: list[float] = []
-        self.planned: list[tuple[float, int, bool]] = []  # changes of inputs: moment (s), input, active
         self.on_power_off: Callable[[], object] = list  # set by the bus
         self._storing: Storing | None = None
         self._remarks = 0
@@ -59,7 +58,7 @@ class Controller(PoweredDevice):
     @property
     def memory(self) -> Mapping[str, int]:
         """The raw value of each row of the project that is edited."""
-        return self.store.values
+        return values_of(self.store.working)
 
     @property
     def position(self) -> int:
@@ -131,8 +130,7 @@ class Controller(PoweredDevice):
     def due(self) -> float:
         """The next moment (s) at which something happens by itself; inf if none."""
         stored = inf if self._storing is None else self._storing.end
-        planned = self.planned[0][0] if self.planned else inf
-        return min(stored, planned, self.machine.until, self._home_crossing())
+        return min(stored, self.machine.until, self._home_crossing())
 
     def advance(self, to: float) -> None:
         """Let time pass until this moment (s)."""
@@ -141,9 +139,6 @@ class Controller(PoweredDevice):
             if self._storing is not None and self._storing.end <= moment:
                 self.store.put(self._storing.number, self._storing.project)
                 self._storing = None
-            elif self.planned and self.planned[0][0] <= moment:
-                _, port, active = self.planned.pop(0)
-                self.set_input(port, active)
             elif self._home_crossing() <= moment:
                 self._set_input(HOME_INPUT, HOME_INPUT not in self.machine.inputs, moment)
             self.machine.advance(moment)
