@@ -10,7 +10,7 @@ import pytest
 
 from motorbus.core.steps import Progress
 from motorbus.errors import Interrupted, RequestError
-from motorbus.families.stepper import Outcome, Program
+from motorbus.families.stepper import Backup, Outcome, Program
 from motorbus.families.stepper.parameters import Project, decode_image
 from tests.families.stepper.bench import Bench, bench, made
 
@@ -72,7 +72,7 @@ def test_erased_project_is_shown_written_and_cleared(one: Bench, number: int) ->
 
 
 def test_restore_reports_and_writes_steps_beyond_the_last(one: Bench) -> None:
-    kept = one.device.backup((1,))
+    kept = Backup(dumps={1: one.device.dump(1)})
     one.simulated.put(1, made().with_step(5, delay=9))
     (written,) = one.device.restore(kept)
     assert written.changes == {"step_5_delay": (9, 0)}
@@ -98,7 +98,9 @@ def test_emergency_stop_ends_a_run_for_the_next_motion(one: Bench) -> None:
     one.react = stop
     with pytest.raises(Interrupted):
         one.device.run(1)
-    assert one.journal.unfinished() is None
+    change = one.journal.unfinished()
+    assert change is not None
+    assert change.facts["cause"] == "it was started, and its end is not recorded"
     assert not one.device.state.may_run, "the stop was acknowledged"
     one.bus.reset()
     assert one.device.run(1).outcome is Outcome.COMPLETED

@@ -317,16 +317,6 @@ def test_stop_project_leaves_a_jog_alone_and_stop_motor_ends_it() -> None:
 # -- manual motion and power -----------------------------------------------------------------------------
 
 
-def test_the_other_jog_command_stops_and_reverses() -> None:
-    machine = Machine()
-    machine.jog(project(RAMPED, stop_mode=0), 1, 0.0)
-    assert machine.jog(project(RAMPED, stop_mode=0), -1, 5.0)
-    assert machine.phase is Phase.SLOWING
-    machine.advance(9.0)
-    assert (machine.phase, machine.frequency(9.0)) == (Phase.JOG, -1600)
-    assert not machine.jog(project(RAMPED), -1, 9.0)
-
-
 def test_one_move_is_that_of_step_1() -> None:
     machine = Machine()
     machine.run_once(project(replace(TURN, direction=1, start_input=1, output=4, delay=900)), 0.0)

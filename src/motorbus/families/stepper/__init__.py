@@ -15,7 +15,7 @@ from typing import Final
 from motorbus.core.family import DeviceTypes, Family, LinkSpec, Option
 from motorbus.families.stepper.driver.bus import StepperDriver
 from motorbus.families.stepper.driver.controller import AsyncController, Controller
-from motorbus.families.stepper.driver.io import InputChanged, Watched
+from motorbus.families.stepper.driver.io import InputChanged
 from motorbus.families.stepper.driver.manual import Homed, Moved
 from motorbus.families.stepper.driver.projects import Written
 from motorbus.families.stepper.driver.run import Outcome, Ran
@@ -43,7 +43,6 @@ __all__ = [
     "Promise",
     "Ran",
     "StepperDriver",
-    "Watched",
     "Written",
 ]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from math import pi, tau
 from pathlib import Path
@@ -57,11 +56,11 @@ class StepPlan(Struct, frozen=True):
 
 
 class Checked(Struct, frozen=True, tag="checked"):
-    """The steps of a program, its findings, and the estimated time."""
+    """The estimated time of a program, its steps, and its findings."""
 
+    estimate: str
     steps: list[StepPlan]
     findings: list[Finding]
-    estimate: str
 
 
 class Difference(Struct, frozen=True):
@@ -79,13 +78,6 @@ class Result(Struct, frozen=True, tag="project"):
     outcome: str
     detail: str = ""
     seconds: float | None = None
-
-
-class Text(Struct, frozen=True, tag="program"):
-    """A project as a program file."""
-
-    project: int
-    text: str
 
 
 class Ports(Struct, frozen=True, tag="ports"):
@@ -121,14 +113,7 @@ def check(file: Path, /, *, common: Common = Common()) -> int:
     program = Program.load(str(file))
     steps = [_step(program.project, number) for number in range(1, program.project.total_steps + 1)]
     found = program.lint()
-    checked = Checked(steps, found, str(program.estimate()))
-    if common.json:
-        emit(checked, common)
-    else:
-        emit(steps, common)
-        for one in found:
-            print(one)
-        print(checked.estimate)
+    emit(Checked(str(program.estimate()), steps, found), common)
     return Exit.FAILURE if any(one.level == "error" for one in found) else Exit.OK
 
 
@@ -170,19 +155,17 @@ def write(
     """
     program = Program.load(str(file))
     number = project or program.project.number
-    wanted = replace(program, project=replace(program.project, number=number))
     with open_devices(common, (device,)) as devices:
         target = _controller(devices)
-        changes = target.device.difference(wanted)
+        changes = target.device.difference(program, number)
         rows = [Difference(name, old, new) for name, (old, new) in changes.items()]
-        if writing.dry_run:
+        if writing.dry_run or not (writing.yes or common.json):
             emit(rows, common)
+        if writing.dry_run:
             return
-        if rows and not writing.yes:
-            if not common.json:
-                emit(rows, common)
+        if rows:
             confirm(f"write {len(rows)} parameters to project {number} of {target.name}", writing)
-        written = target.device.write_project(wanted)
+        written = target.device.write_project(program, number)
         emit(Result(number, written.proof, f"parameters changed: {len(written.changes)}"), common)
 
 
@@ -212,7 +195,7 @@ def read(
             stream.write(text)
         emit(Result(number, "read", str(to)), common)
     elif common.json:
-        emit(Text(number, text), common)
+        emit(Result(number, "read", text), common)
     else:
         print(text, end="")
 
@@ -304,8 +287,6 @@ def io(
     """
     wanted = [_level(text) for text in levels]
     seconds = parse_quantity(watch, "time") if watch else 0.0
-    if wanted and watch:
-        raise RequestError("outputs and --watch", expected="one of them")
     with open_devices(common, (device,)) as devices:
         target = _controller(devices)
         one: Any = target.device
@@ -317,10 +298,8 @@ def io(
         if watch:
             procedure = Controller.watch_inputs.function(one, seconds=seconds)
             with progress("inputs") as advance:
-                found = target.bus.run(procedure, report=partial(_report, advance)).levels
-        else:
-            found = one.inputs()
-        emit(Ports(inputs={str(port): active for port, active in found.items()}), common)
+                target.bus.run(procedure, report=partial(_report, advance))
+        emit(Ports(inputs={str(port): active for port, active in one.inputs().items()}), common)
 
 
 def _level(text: str) -> tuple[int, bool]:

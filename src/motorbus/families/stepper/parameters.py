@@ -44,15 +44,12 @@ def _row(
 ) -> Register:
     """`items` are those of the manual; in its item 15 a place is [row][byte], x for the row of a step."""
     more = {"access": Access.READ_WRITE, "effect": Effect.PERSISTENT} | more
-    source = f"{MANUAL}, {items.replace('@', _place(address, size))}"
+    place = f"{address}..{address + size - 1}" if size > 1 else f"{address}"
+    source = f"{MANUAL}, {items.replace('@', place)}"
     return Register(
         name=name, address=address, size=size, low=low, high=high, storage=Storage.EEPROM, source=source,
         note=note, **more,
     )  # fmt: skip
-
-
-def _place(address: int, size: int) -> str:
-    return f"{address}..{address + size - 1}" if size > 1 else f"{address}"
 
 
 _INPUTS: Final = {0: "none", **{number: f"input {number}" for number in STEP_INPUTS}}
@@ -313,14 +310,14 @@ def checked_order(order: object) -> Order:
 # -- ranges ----------------------------------------------------------------------------------------------------------
 
 UNITS: Final[Mapping[str, str]] = {
-    "microsteps": "microsteps per full step",
-    "step_angle": "hundredths of a degree (2.55° at most)",
+    "microsteps": "per full step",
+    "step_angle": "hundredths of a degree",
     "turn_distance": "units per turn",
     "distance": "units",
     "start_frequency": "Hz",
     "acceleration": "Hz",
     "speed": "RPM",
-    "delay": "ms (4 h 39 min 37.215 s at most)",
+    "delay": "ms",
 }
 """Unit of a raw value."""
 _ONE_OF: Final = ("start_input", "stop_input")

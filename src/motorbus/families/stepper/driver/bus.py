@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
-from typing import Any, ClassVar, Final, TypeVar
+from typing import Any, ClassVar, Final
 
 from motorbus.core import units
 from motorbus.core.family import AxisDriver, Explanation, Family, Identity, Receiver, Stop
@@ -19,8 +19,6 @@ from motorbus.families.stepper.driver.projects import dump_once
 from motorbus.families.stepper.driver.requests import STOPS, command, ignore
 from motorbus.families.stepper.execution.ramp import TICK_MS
 from motorbus.families.stepper.parameters import PROJECTS, checked_order
-
-N = TypeVar("N", int, float)
 
 MODEL: Final = "stepper controller"
 UNKNOWN: Final = "unknown"  # it reports no version
@@ -59,11 +57,14 @@ class StepperDriver(HalfDuplexSerial):
         ramp_tick_ms: object = TICK_MS,
     ) -> None:
         super().__init__(family)
-        self.motor: Final = protocol.checked_motor(_number("motor", motor, units.whole))
-        self.order: Final = checked_order(dump_order)
-        self.tick_ms: Final = _number("ramp_tick_ms", ramp_tick_ms, units.real)
+        try:
+            number, self.tick_ms = units.whole(str(motor)), units.real(str(ramp_tick_ms))
+        except ValueError:
+            raise RequestError(f"motor={motor},ramp_tick_ms={ramp_tick_ms}: a number is needed") from None
+        self.motor: Final = protocol.checked_motor(number)
         if not 1e-3 <= self.tick_ms <= 1e4:
             raise RequestError(f"ramp_tick_ms={ramp_tick_ms} is not possible", expected="0.001 to 10000")
+        self.order: Final = checked_order(dump_order)
         self.state = BusState()
 
     def __copy__(self) -> StepperDriver:
@@ -131,10 +132,3 @@ async def identify(node: Node) -> Identity:
     """A controller that replies with a dump; it reports no model, version or number."""
     await dump_once(node, 1)
     return Identity(node.node, MODEL, UNKNOWN, node.table.name, {"motor": node.motor, "projects": PROJECTS})
-
-
-def _number(name: str, value: object, parse: Callable[[str], N]) -> N:
-    try:
-        return parse(str(value))
-    except ValueError:
-        raise RequestError(f"{name}={value} is not possible", expected="a number") from None

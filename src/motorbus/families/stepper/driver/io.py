@@ -29,15 +29,6 @@ class InputChanged(NamedTuple):
     at: float
 
 
-class Watched(NamedTuple):
-    """The last level of each input, the changes in order, and how often each input was read in how many s."""
-
-    levels: Mapping[int, bool]
-    changes: tuple[InputChanged, ...]
-    rounds: int
-    seconds: float
-
-
 class Levels:
     """Inputs by readings: a change counts when it was read twice in a row."""
 
@@ -85,8 +76,10 @@ async def _level(node: Node, port: int) -> bool:
     )
 
 
-async def watch_inputs(node: Node, ports: Iterable[int] = PORTS, seconds: float = 10.0) -> Watched:
-    """Read these inputs in turn for `seconds`; report `InputChanged` at the second reading of a change.
+async def watch_inputs(
+    node: Node, ports: Iterable[int] = PORTS, seconds: float = 10.0
+) -> tuple[InputChanged, ...]:
+    """Read these inputs in turn for `seconds`; return and report each change at its second reading.
 
     A round takes 18 ms for each input; a change shorter than two rounds is missed. Raises RequestError for another
     port, or a time not above 0.
@@ -95,7 +88,6 @@ async def watch_inputs(node: Node, ports: Iterable[int] = PORTS, seconds: float 
     check_seconds("seconds", seconds)
     levels = Levels(await inputs(node, chosen))
     changes = []
-    rounds = 0
     now = begun = await Sleep(0)
     while now - begun < seconds:
         for port in chosen:
@@ -104,8 +96,7 @@ async def watch_inputs(node: Node, ports: Iterable[int] = PORTS, seconds: float 
             if change := levels.take(port, active, now):
                 changes.append(change)
                 await Emit(change)
-        rounds += 1
-    return Watched(levels.settled, tuple(changes), rounds, now - begun)
+    return tuple(changes)
 
 
 async def set_output(node: Node, port: int, active: bool) -> None:

@@ -66,10 +66,6 @@ class Homed(NamedTuple):
     seconds: float
     velocity: float
 
-    def __str__(self) -> str:
-        rpm = self.velocity * 60 / tau
-        return f"input {HOME_INPUT} was active after {self.seconds:.1f} s in reverse at {rpm:.0f} RPM"
-
 
 # -- by an angle, for a time -------------------------------------------------------------------------------------------
 
@@ -175,13 +171,10 @@ async def home(node: Node, *, deadline: float = DEADLINE, velocity: float | None
         seconds = await _until_home(watch, begun, deadline)
         return Homed(node.node, seconds, velocity_of(project))
 
-    return await with_project1(
-        node,
-        "home",
-        lambda project: checked(project) if rpm is None else paced(project, rpm),
-        turn,
-        prepare=partial(_check_released, node),
-    )
+    def change(project: Project) -> Project:
+        return checked(project) if rpm is None else paced(project, rpm)
+
+    return await with_project1(node, "home", change, turn, prepare=partial(_check_released, node))
 
 
 async def _check_released(node: Node) -> None:

@@ -7,7 +7,7 @@ what is stored is an assumption. So a project that does not read as wanted after
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
@@ -36,7 +36,6 @@ from motorbus.families.stepper.protocol import REPLY_LENGTH
 
 READINGS: Final = 5  # dumps of which two must be equal
 TRIES: Final = 3  # of a save; flash wears
-SHOWN: Final = 6  # differences that an error lists
 MANUAL: Final = 1  # the project from whose step 1 manual motion takes distance and speed
 
 Changes = Mapping[str, tuple[int, int]]
@@ -54,9 +53,6 @@ class Written(NamedTuple):
     project: int
     changes: Changes
     proof: str
-
-    def __str__(self) -> str:
-        return f"project {self.project} {self.proof}, parameters changed: {len(self.changes)}"
 
 
 # -- read --------------------------------------------------------------------------------------------------------------
@@ -93,8 +89,8 @@ async def dump(node: Node, project: int = 1) -> bytes:
 
 async def read_image(node: Node, number: int) -> Project:
     """A project by two equal dumps. Raises as `dump`."""
-    await dump(node, number)
-    return node.state.projects[number]
+    data = await dump(node, number)
+    return replace(parameters.decode_image(data[REPLY_LENGTH:], node.order), number=number)
 
 
 async def cached(node: Node, number: int) -> Project:
@@ -171,10 +167,9 @@ async def _send(node: Node, project: int, orders: list[Edit]) -> None:
 
 def _different(node: Node, wanted: Project, found: Project, state: str) -> VerificationFailed:
     wrong = [f"{name}: {old} -> {new}" for name, (old, new) in differences(wanted, found).items()]
-    more = f" and {len(wrong) - SHOWN} more" if len(wrong) > SHOWN else ""
     return VerificationFailed(
         f"project {wanted.number} reads different from what was written: {state}",
-        expected=f"(wanted -> read) {'; '.join(wrong[:SHOWN])}{more}",
+        expected=f"(wanted -> read) {'; '.join(wrong)}",
         cause="it lost its supply, another program edits it, it refuses a value, or dump_order is wrong",
         advice="write it again",
         node=node.node,
@@ -308,11 +303,10 @@ async def _clear(node: Node, number: int) -> Written:
     before, blank = await read_image(node, number), Project(number=number)
     if _is_blank(before):
         return Written(number, {}, "unchanged")
-    error = await catch(command(node, "clear_project", ignore, project=number))
-    if isinstance(error, OutcomeUnknown | WireError):
-        error = await catch(command(node, "clear_project", ignore, project=number))  # twice is as once
-    if error is not None:
-        raise error
+    try:
+        await command(node, "clear_project", ignore, project=number)
+    except (OutcomeUnknown, WireError):
+        await command(node, "clear_project", ignore, project=number)  # twice is as once
     found = await read_image(node, number)
     if not _is_blank(found):
         raise _different(node, blank, found, "it was cleared")
@@ -324,58 +318,51 @@ def _is_blank(project: Project) -> bool:
     return replace(project, number=0, stop_mode=0, mode4=0, power_on_home=0) == Project()
 
 
-async def backup(node: Node, projects: Iterable[int] = range(1, PROJECTS + 1)) -> Backup:
-    """Read these projects, each by two equal dumps; only reads.
+async def backup(node: Node) -> Backup:
+    """Read all projects, each by two equal dumps; only reads.
 
     Edits that were not saved are read in place of what is stored, an assumption. Reports `Progress`. Raises
-    RequestError for another number, and while project 1 is in use by an unfinished motion; else as `dump`.
+    RequestError while project 1 is in use by an unfinished motion; else as `dump`.
     """
-    numbers = tuple(dict.fromkeys(projects))
-    for number in numbers:
-        check_value("project", number)
 
     async def read_all() -> Backup:
         await Emit(JournalEntry("backup", ASKED, {"node": node.node, READABLE: True}))
         dumps = {}
-        for done, number in enumerate(numbers, 1):
+        for number in range(1, PROJECTS + 1):
             dumps[number] = await dump(node, number)
-            await Emit(Progress(done, len(numbers), "reading projects"))
+            await Emit(Progress(number, PROJECTS, "reading projects"))
         return Backup(dumps=dumps, order=node.order)
 
     return await Exclusive(read_all())
 
 
-async def restore(node: Node, backup: Backup, projects: Iterable[int] | None = None) -> tuple[Written, ...]:
-    """Write projects of a backup (None: all), save them and read them back, one after the other.
+async def restore(node: Node, backup: Backup) -> tuple[Written, ...]:
+    """Write the projects of a backup, save them and read them back, one after the other.
 
     Steps beyond the last are written too, a project that was cleared or erased is cleared, and lint is not asked. Bytes
     that the manual does not name cannot be written. Raises RequestError, with nothing sent, for numbers that no request
     can carry; else as `write_project`, with a note that names the restored projects.
     """
-    numbers = dict.fromkeys(backup.projects if projects is None else projects)
-    wanted = [replace(backup.project(number), number=number) for number in numbers]
+    wanted = [replace(backup.project(number), number=number) for number in backup.projects]
     for project in wanted:
         errors = parameters.check_project(replace(project, total_steps=STEPS), expert=True)
         for error in [] if project.is_cleared else errors:
-            raise RequestError(
-                f"project {project.number} of this backup: {error.summary}", expected=error.expected
-            )
+            error.add_note(f"project {project.number} of the backup")
+            raise error
     done: list[Written] = []
 
-    async def write_all() -> tuple[Written, ...]:
+    async def restore_one(project: Project) -> Written:
+        if project.is_cleared:
+            return await _clear(node, project.number)
+        return await _write(node, "restore", project.number, lambda before: project, True)
+
+    async def restore_all() -> tuple[Written, ...]:
         for project in wanted:
-            number, change = project.number, _constant(project)
-            is_blank = project.is_cleared
-            work = _clear(node, number) if is_blank else _write(node, "restore", number, change, True)
-            done.append(await work)
+            done.append(await restore_one(project))  # noqa: PERF401 - kept for the note of an error
         return tuple(done)
 
     try:
-        return await Exclusive(write_all())
+        return await Exclusive(restore_all())
     except BaseException as error:
         error.add_note(f"restored: {', '.join(str(one.project) for one in done) or 'no project'}")
         raise
-
-
-def _constant(project: Project) -> Callable[[Project], Project]:
-    return lambda before: project

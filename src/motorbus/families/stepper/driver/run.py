@@ -25,7 +25,6 @@ from motorbus.core.steps import (
     WaitFor,
     catch,
     gather,
-    with_cleanup,
 )
 from motorbus.errors import (
     Interrupted,
@@ -113,36 +112,36 @@ async def run(
         check_seconds("timeout", timeout)
     elif endless:
         raise RequestError("a project without end needs a timeout", advice="or use start_project()")
-    ports = checked_ports(watch)
-    wait = _Wait(node, timeout)
+    guard, ports = Watch(node), checked_ports(watch)
+    notices: list[float] = []
+    is_over: list[bool] = []
 
-    async def begin() -> Levels:
-        found = await _checked_project(node, project, endless, expert)
-        levels = Levels(await inputs(node, ports))
-        wait.expect(found, await Sleep(0))
-        start = await catch(_start(wait.watch, found))
-        if isinstance(start, MotorbusError) and not isinstance(start, OutcomeUnknown | NoReply | WireError):
-            raise start
-        wait.begin(start)
-        return levels
-
-    async def follow() -> None:
-        try:
-            await _follow(wait, await Exclusive(begin()))
-        finally:
-            wait.is_over = True
+    def take(notice: Notification) -> bool:
+        if notice.kind == COMPLETED:
+            notices.append(notice.at)
+        return notice.kind == COMPLETED
 
     async def listen() -> None:
-        while not wait.is_over:
-            await WaitFor(wait.take, LOOK)
+        while not is_over:
+            await WaitFor(take, LOOK)
 
-    async def close() -> None:
-        if wait.ran is not None and not node.state.may_run:
-            await close_run(node, wait.ran.outcome.value)
+    async def begin() -> tuple[_Course, Levels]:
+        found = await _checked_project(node, project, endless, expert)
+        levels = Levels(await inputs(node, ports))
+        course = _Course(guard, found, await Sleep(0), timeout, notices)
+        course.begin(await catch(_start(guard, found)))
+        return course, levels
 
-    await with_cleanup(gather(follow(), listen()), close)
-    assert wait.ran is not None
-    return wait.ran
+    async def follow() -> Ran:
+        try:
+            return await _follow(*await Exclusive(begin()))
+        finally:
+            is_over.append(True)
+
+    ran, _ = await gather(follow(), listen())
+    if not node.state.may_run:
+        await close_run(node, ran.outcome.value)
+    return ran
 
 
 # -- start -------------------------------------------------------------------------------------------------------------
@@ -211,113 +210,97 @@ def setpoints(node: Node, project: Project) -> tuple[Setpoint, ...]:
 # -- wait --------------------------------------------------------------------------------------------------------------
 
 
-class _Wait:
-    """The wait for one run: takes its acknowledgement, notices and time, and decides the outcome. Times in s, link
-    clock.
-    """
+class _Course:
+    """One run of a project, `sent` at this time. Times in s, link clock."""
 
-    def __init__(self, node: Node, timeout: float | None) -> None:
-        self.watch: Final = Watch(node)
-        self.timeout: Final = timeout
-        self.ran: Ran | None = None
-        self.is_over = False
-        self.is_pending = True  # neither an acknowledgement nor its loss is known
+    def __init__(
+        self, watch: Watch, project: Project, sent: float, timeout: float | None, notices: list[float]
+    ) -> None:
+        self.watch: Final = watch
+        self.predicted: Final = estimate(project, watch.node.tick_ms)
+        self.start = sent
         self.is_button_pressed = False  # input 4
+        self._sent: Final = sent
+        self._least: Final = earliest_end(project) * CLOCK
+        self._timeout: Final = timeout
+        self._notices: Final = notices
+        self._stopped: Final = watch.node.state.stopped
         self._lost: MotorbusError | None = None
-        self._notices: list[float] = []
-
-    def expect(self, project: Project, at: float) -> None:
-        """The project is about to be started."""
-        self.predicted = estimate(project, self.watch.node.tick_ms)
-        self._least = earliest_end(project) * CLOCK
-        self._sent = self.start = at
-        self._stopped = self.watch.node.state.stopped
 
     def begin(self, start: float | MotorbusError | None) -> None:
-        """It was acknowledged at this time, or not; None in a dry run."""
-        self.is_pending = False
-        if isinstance(start, MotorbusError):
+        """It was acknowledged at this time; None in a dry run. Raises the error of a start that did not leave."""
+        if not isinstance(start, MotorbusError):
+            self.start = start or self._sent
+        elif isinstance(start, OutcomeUnknown | NoReply | WireError):
             self._lost = start
         else:
-            self.start = start or self._sent
+            raise start
 
     @property
     def deadline(self) -> float:
-        """Until when its notice is waited for (s)."""
-        if self.timeout is not None:
-            return self.start + self.timeout
+        """Until when its notice is waited for."""
+        if self._timeout is not None:
+            return self.start + self._timeout
         if self.predicted.waits and self._lost is None:
             return inf
         return self.start + self.predicted.seconds * LONGER + SPARE
 
-    def take(self, notice: Notification) -> bool:
-        """Take a notice; True if the outcome is known."""
-        if notice.kind == COMPLETED:
-            self._notices.append(notice.at)
-            self.decide(notice.at)
-        return self.ran is not None
-
-    def decide(self, now: float) -> None:
-        """Set `ran` if the outcome is known now."""
-        state = self.watch.node.state
-        if self.ran is not None or self.is_pending:
-            return
+    def outcome(self, now: float) -> Ran | None:
+        """The outcome; None if it is not known yet."""
+        state, seconds = self.watch.node.state, None
         end = next((at for at in self._notices if self._is_own(at)), None)
         if state.stopped > self._stopped:
-            self._end(Outcome.STOPPED, "a stop of this host was acknowledged")
+            outcome, why = Outcome.STOPPED, "a stop of this host was acknowledged"
         elif self.is_button_pressed:
             state.may_run = False
-            self._end(Outcome.STOPPED, "input 4, which stops projects, was active")
+            outcome, why = Outcome.STOPPED, "input 4, which stops projects, was active"
         elif end is not None and not self.watch.is_stopped:
             state.may_run = False
             seconds = max(0.0, end - self.start)
-            self._end(Outcome.COMPLETED, f"its notice came {seconds:.3f} s after the start", seconds)
+            outcome, why = Outcome.COMPLETED, f"its notice came {seconds:.3f} s after the start"
         elif now < (self.deadline if end is None else end + STOPPING):
-            return
+            return None
         elif end is not None:
             state.may_run = False
-            self._end(Outcome.UNKNOWN, "its notice came after a stop that was not acknowledged")
+            outcome, why = Outcome.UNKNOWN, "its notice came after a stop that was not acknowledged"
         elif self._lost is not None:
             why = f"neither an acknowledgement ({self._lost.summary}) nor a notice came; it may run"
-            self._end(Outcome.UNKNOWN, why)
+            outcome = Outcome.UNKNOWN
         elif self._notices:
             first = self._notices[0] - self._sent
             why = f"a notice came after {first:.3f} s, which is too early; it may still run"
-            self._end(Outcome.UNKNOWN, why)
+            outcome = Outcome.UNKNOWN
         else:
-            self._end(Outcome.TIMEOUT, "no notice came in time; it may still run")
+            outcome, why = Outcome.TIMEOUT, "no notice came in time; it may still run"
+        return Ran(outcome, seconds, self.predicted, why)
 
     def _is_own(self, at: float) -> bool:
         return at > self.start - SETTLES and at - self._sent >= self._least
 
-    def _end(self, outcome: Outcome, why: str, seconds: float | None = None) -> None:
-        self.ran = Ran(outcome, seconds, self.predicted, why)
 
-
-async def _follow(wait: _Wait, levels: Levels) -> None:
-    """Report, read the watched inputs, and decide, until the outcome is known."""
-    reported, whole = -inf, wait.predicted.seconds
-    wait.decide(await Sleep(0))
-    while wait.ran is None:
+async def _follow(course: _Course, levels: Levels) -> Ran:
+    """Report and read the watched inputs until the outcome is known."""
+    reported = -inf
+    while True:
         now = await Sleep(0)
+        if ran := course.outcome(now):
+            return ran
         if now - reported >= REPORT:
             reported = now
-            done = round(1000 * (now - wait.start))
-            await Emit(Progress(done, round(1000 * whole), "running, estimated"))
+            done, whole = now - course.start, course.predicted.seconds
+            await Emit(Progress(round(1000 * done), round(1000 * whole), "running, estimated"))
         for port in levels.settled:
-            await _read_watched(wait, levels, port)
-        pause = LOOK if levels.settled or now >= wait.deadline else min(REPORT, wait.deadline - now)
-        await WaitFor(wait.take, pause)
-        wait.decide(await Sleep(0))
+            await _read_watched(course, levels, port)
+        await WaitFor(
+            lambda notice: True, LOOK if levels.settled else max(LOOK, min(REPORT, course.deadline - now))
+        )
 
 
-async def _read_watched(wait: _Wait, levels: Levels, port: int) -> None:
-    active = await catch(read_input(wait.watch.node, port))
-    if isinstance(active, NoReply | WireError):
+async def _read_watched(course: _Course, levels: Levels, port: int) -> None:
+    try:
+        active = await read_input(course.watch.node, port)
+    except (NoReply, WireError):
         return
-    if isinstance(active, MotorbusError):
-        raise active
     if change := levels.take(port, active, await Sleep(0)):
-        if port == STOP_INPUT and change.active:
-            wait.is_button_pressed = True
+        course.is_button_pressed |= port == STOP_INPUT and change.active
         await Emit(change)

@@ -49,21 +49,27 @@ class Finding(Struct, frozen=True):
     level: Level
     step: int
     text: str
+    reason: str
 
     def __str__(self) -> str:
         where = f"step {self.step}: " if self.step else ""
-        return f"{self.rule} {self.level}: {where}{self.text} ({RULES[self.rule][1]})"
+        return f"{self.rule} {self.level}: {where}{self.text} ({self.reason})"
 
 
 def lint(project: Project) -> list[Finding]:
     """All findings: those of the project first, then by step."""
     if project.is_cleared:
-        return [Finding("L1", "error", 0, "the project has no steps")]
+        return [_finding("L1", 0, "the project has no steps")]
     found = [(0, *one) for one in _of_project(project)]
     for number, step in enumerate(project.used, 1):
         found += [(number, *one) for one in _motion(project, step, number)]
         found += [(number, *one) for one in _pauses_and_inputs(project, step)]
-    return [Finding(rule, RULES[rule][0], number, text) for number, rule, text in found]
+    return [_finding(rule, number, text) for number, rule, text in found]
+
+
+def _finding(rule: str, step: int, text: str) -> Finding:
+    level, reason = RULES[rule]
+    return Finding(rule, level, step, text, reason)
 
 
 def _of_project(project: Project) -> _Found:
