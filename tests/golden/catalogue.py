@@ -412,7 +412,6 @@ STEPPER: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("write_project", PROGRAM), "", ALIVE),
     (call("write_project", PROGRAM, save=False), "unsaved", ALIVE),
     (call("write", project=1, step_1_delay=0.5), "", ALIVE),
-    (call("save", 2), "", (call("write_project", PROGRAM, save=False),)),
     (call("clear", 3), "", ALIVE),
     (call("save_project", 2), "", SELECTED),
     (call("clear_project", 3), "", ALIVE),

@@ -121,8 +121,11 @@ async def move(
                 await timed.start()
             else:
 
+                period = 1 / loop.rate
+
                 def positions(elapsed: float) -> Mapping[str, float]:
-                    timed.estimate(min(elapsed, profile.duration))
+                    # `elapsed` is that of the next slot
+                    timed.estimate(min(elapsed - period, profile.duration))
                     return profile.positions(elapsed)
 
                 peaks = {name: one.peak for name, one in profile.profiles.items()}
