@@ -157,8 +157,8 @@ class MotionError(MotorbusError):
 class Refused(MotionError):
     """Motion was refused before anything was sent.
 
-    `reason`: "limits", "step" (too far from the present position), "velocity", "stale" or "suspect" (position), "fault",
-    "lease" or "unattended".
+    `reason`: "limits", "step" (too far from the present position), "velocity", "stale" or "suspect" (position),
+    "fault", "lease" or "unattended".
     """
 
     unmoved = True
