@@ -13,7 +13,6 @@ from motorbus.core.family import Family, Health, Identity, PositionStream, State
 from motorbus.core.request import Effect, Request
 from motorbus.core.steps import Runnable, catch, gather
 from motorbus.errors import LimitExceeded, NoReply, RequestError
-from tests.support.subjects import line_of
 from tests.support.world import IDS, Steps, World, abilities, kept, sent, world
 
 DOCUMENTED: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
@@ -54,10 +53,6 @@ def test_without_a_known_register_map_there_is_no_axis(subject: Family) -> None:
 
 def test_a_model_that_is_led_tells_its_position_and_its_limits_and_can_be_stopped(leader: Family) -> None:
     assert {"position", "state", "limits", "move", "stop"} <= abilities(leader).names
-
-
-def test_a_torque_switch_goes_both_ways(subject: Family) -> None:
-    assert ("enable_torque" in abilities(subject)) == ("disable_torque" in abilities(subject))
 
 
 def test_what_it_tells_is_a_number_and_telling_writes_nothing(subject: Family) -> None:
@@ -368,10 +363,6 @@ def test_who_is_known_is_coupled_again_without_being_asked(leader: Family) -> No
         with sent(there.bus) as frames:
             there.bus.run(make())
         assert frames == []
-
-
-def test_only_lines_that_can_hold_several_devices_have_trains(leader: Family) -> None:
-    assert line_of(leader).devices != 1
 
 
 def switched(there: World, node: int, name: str) -> None:

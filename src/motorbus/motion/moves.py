@@ -120,7 +120,6 @@ async def move(
             if loop is None:
                 await timed.start()
             else:
-
                 period = 1 / loop.rate
 
                 def positions(elapsed: float) -> Mapping[str, float]:

@@ -48,13 +48,6 @@ def decode(data: bytes, profile: Profile = PROFILES["kst"]) -> list[Explanation]
     return found
 
 
-CODE_MEANING: Final = (
-    "of SDO frames specifier, index and sub-index as one number of 32 bits; of others the identifier without the "
-    "node"
-)
-"""The meaning of `Explanation.code`."""
-
-
 class _Frame:
     """One frame; `fields`, `row` (of its object), `fault`, `kind`, `node` and `code` are set while it is decoded."""
 

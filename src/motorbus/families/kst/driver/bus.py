@@ -56,7 +56,6 @@ class KstDriver:
     """Four to ten nodes in flight fill any CAN bus."""
     full_duplex = False
     probe_after = 128
-    code_meaning = decode.CODE_MEANING
 
     def __init__(
         self,
