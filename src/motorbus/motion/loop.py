@@ -18,6 +18,7 @@ from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, NoReply, 
 from motorbus.motion.axis import Axis, by_bus, on_axes
 from motorbus.motion.gate import check_owned
 from motorbus.motion.health import HealthMonitor
+from motorbus.motion.lease import lease_lost
 from motorbus.motion.machine import SLACK, Names
 from motorbus.motion.profile import Limits, SetpointGenerator
 from motorbus.motion.program import LOST, Exchange, OnBuses, raise_first
@@ -472,8 +473,11 @@ class ControlLoop:
             await self.machine.health.look([axis.axis for axis in owned], goals)
 
     def _check_owned(self) -> None:
-        """Raise the error if a stop or another command has taken an axis; it gets no more goals."""
-        lost = [error for group in self.groups if (error := group.lost(self.machine.lease)) is not None]
+        """Raise the error if the lease is lost, or a stop or another command has taken an axis."""
+        lease = self.machine.lease
+        lost = [error for group in self.groups if (error := group.lost(lease)) is not None]
+        if not lost and lease is not None and lease.lost:
+            raise lease_lost("the loop")
         if lost:
             for axis in self.axes.values():
                 if axis.owner != axis.status.owner:

@@ -70,7 +70,7 @@ def keep(rig: Rig, servo: Servo) -> None:
     rig.count += 1
     servo.write(max_temperature=wanted)
     assert rig.servos[1].memory["max_temperature"] == wanted
-    assert rig.servos[1].locked
+    assert rig.servos[1].memory["lock"]
 
 
 def position(rig: Rig, servo: Servo) -> None:
