@@ -237,7 +237,7 @@ def _limits(target: Target, driver: AxisDriver) -> tuple[float, float] | None:
 
 
 def _axis_limits(config: AxisConfig | None) -> str:
-    if config is None or config.low is None or config.high is None or config.counted:
+    if config is None or config.low is None or config.high is None:
         return ""
     return f"{config.show(config.low)} to {config.show(config.high)}"
 

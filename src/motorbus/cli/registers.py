@@ -321,7 +321,7 @@ def _sample(target: Target, axes: Any, drivers: dict[int, AxisDriver]) -> Sample
     except MotorbusError as error:
         return Sample(target.name, error=error.summary)
     config, position = axes.get(target.name), state.position
-    is_known = config is not None and position is not None and not config.counted
+    is_known = config is not None and position is not None
     return Sample(
         target.name,
         position,
