@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Any, Final
 
+import msgspec
 from cyclopts import Parameter
 from msgspec import Struct
 
@@ -13,12 +13,20 @@ from motorbus.cli.common import Common, NeedsConsent, Partial, Target, Writing
 from motorbus.cli.dryrun import carry_out
 from motorbus.cli.output import confirm, emit, note
 from motorbus.cli.registers import map_of, raise_errors
-from motorbus.cli.target import bus_address, bus_of, need_machine, open_bus, open_devices, parse_quantity
+from motorbus.cli.target import (
+    bus_address,
+    bus_of,
+    edit_machine,
+    need_machine,
+    open_bus,
+    open_devices,
+    parse_quantity,
+)
 from motorbus.core import units
 from motorbus.core.register import Storage
 from motorbus.core.request import Effect
 from motorbus.errors import LinkError, MotorbusError, RequestError
-from motorbus.journal import everywhere
+from motorbus.journal import Change, everywhere
 from motorbus.session.journals import journal_of, unfinished
 
 
@@ -50,6 +58,17 @@ class Saved(Struct, frozen=True, tag="saved"):
     device: str
     file: str
     settings: tuple[str, ...]
+
+
+class Settings(Struct, frozen=True):
+    """A settings file: raw register values by name."""
+
+    format: int
+    family: str
+    model: str
+    firmware: str
+    map: str
+    values: dict[str, int]
 
 
 def _one(devices: list[Target], method: str, what: str) -> Target:
@@ -98,12 +117,9 @@ def set_id(
 
 def _move_axis(common: Common, axis: str, node: int) -> None:
     """Change the entry of an axis of the machine file whose device has another id now."""
-    from motorbus.motion.machine_edit import edit
-
-    path = Path(common.machine)
     device = f"{need_machine(common).axes[axis].bus}#{node}"
-    path.write_text(edit(path.read_text("utf-8"), {f"axis.{axis}.device": device}), "utf-8")
-    note(f"note: {path}: {axis} is {device}")
+    edit_machine(Path(common.machine), {f"axis.{axis}.device": device})
+    note(f"note: {common.machine}: {axis} is {device}")
 
 
 def set_baud(
@@ -217,42 +233,40 @@ def recover(
         _list_changes(common)
         return
     address = bus_address(bus, common)
+    ended: Recovered | None = Recovered(address, "nothing is unfinished")
     if forget:
         journal = journal_of(address)
-        change = journal.unfinished() if journal is not None else None
-        if journal is not None and change is not None:
-            text = change.describe().rstrip(",")
-            confirm(f"forget {text}", writing)
+        if journal is not None and (change := journal.unfinished()):
+            confirm(f"forget {_text(change)}", writing)
             journal.forget()
-            emit(Recovered(address, text, "forgotten"), common)
-            return
+            ended = Recovered(address, _text(change), "forgotten")
     else:
         with open_bus(common, address) as opened:
-            change = unfinished(opened)
-            if change is not None:
-                text = change.describe().rstrip(",")
+            if change := unfinished(opened):
                 device = opened.family.devices.blocking(opened, change.node)
                 target = Target(f"#{change.node}", opened, change.node, opened.family, device)
                 verb, facts = change.verb, change.facts
-                outcome = carry_out(writing, target, lambda one: one.recover(verb, facts), f"end {text}")
-                if outcome is not None:
-                    emit(Recovered(change.bus, text, OUTCOMES.get(outcome, outcome)), common)
-                return
-    emit(Recovered(address, "nothing is unfinished"), common)
+                question = f"end {_text(change)}"
+                outcome = carry_out(writing, target, lambda one: one.recover(verb, facts), question)
+                ended = outcome and Recovered(change.bus, _text(change), OUTCOMES.get(outcome, outcome))
+    if ended is not None:
+        emit(ended, common)
 
 
 def _list_changes(common: Common) -> None:
     found = everywhere()
     errors = [one for one in found if isinstance(one, MotorbusError)]
-    changes = [
-        Recovered(one.bus, one.describe().rstrip(",")) for one in found if not isinstance(one, MotorbusError)
-    ]
+    changes = [Recovered(one.bus, _text(one)) for one in found if isinstance(one, Change)]
     if changes or common.json:
         emit(changes, common)
     elif not errors:
         print("nothing is unfinished")
     if errors:
         raise errors[0]
+
+
+def _text(change: Change) -> str:
+    return change.describe().rstrip(",")
 
 
 # -- backup, restore -----------------------------------------------------------------------------------------------
@@ -278,15 +292,10 @@ def backup(device: str, file: Path, /, *, common: Common = Common()) -> None:
             values = _read_settings(target)
             names = tuple(values)
             identity = target.device.identify()
-            data = {
-                "format": 1,
-                "family": target.family.name,
-                "model": identity.model,
-                "firmware": identity.firmware,
-                "map": map_of(target).name,
-                "values": values,
-            }
-            text = json.dumps(data, indent=2) + "\n"
+            kept = Settings(
+                1, target.family.name, identity.model, identity.firmware, map_of(target).name, values
+            )
+            text = msgspec.json.format(msgspec.json.encode(kept)).decode() + "\n"
     with file.open("x", encoding="utf-8") as stream:
         stream.write(text)
     emit(Saved(target.name, str(file), names), common)
@@ -348,15 +357,13 @@ def restore(file: Path, device: str, /, *, writing: Writing = Writing(), common:
 def _parse_settings(text: str, file: Path, target: Target) -> dict[str, int]:
     """The values of a settings file for this device. Raises RequestError."""
     try:
-        data = json.loads(text)
-        values = {str(name): int(raw) for name, raw in data["values"].items()}
-        family, table = str(data["family"]), str(data["map"])
-    except (ValueError, KeyError, TypeError, AttributeError):
-        raise RequestError(f"{file} is not a file of `motorbus backup`") from None
-    known = map_of(target)
-    if (family, table) != (target.family.name, known.name):
+        saved = msgspec.json.decode(text, type=Settings)
+    except msgspec.MsgspecError as error:
+        raise RequestError(f"{file} is not a file of `motorbus backup`: {error}") from None
+    table = map_of(target).name
+    if (saved.family, saved.map) != (target.family.name, table):
         raise RequestError(
-            f"{file} is of a {family} device with map {table}",
-            expected=f"{target.family.name}, map {known.name}",
+            f"{file} is of a {saved.family} device with map {saved.map}",
+            expected=f"{target.family.name}, map {table}",
         )
-    return values
+    return saved.values

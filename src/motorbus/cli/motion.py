@@ -6,7 +6,6 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from inspect import signature
 from math import inf, pi
-from os import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -15,8 +14,9 @@ from msgspec import Struct
 
 from motorbus.cli.common import Common, Partial, Target, Writing
 from motorbus.cli.dryrun import carry_out
-from motorbus.cli.output import confirm, emit, note, print_table
+from motorbus.cli.output import confirm, emit, note
 from motorbus.cli.target import (
+    edit_machine,
     is_address,
     load_machine,
     need_machine,
@@ -27,15 +27,7 @@ from motorbus.cli.target import (
     parse_time,
 )
 from motorbus.errors import LinkError, MotorbusError, RequestError, VerificationFailed
-from motorbus.motion.commands import (
-    DeviceCommand,
-    LoopResult,
-    Move,
-    MoveResult,
-    Pose,
-    StopResult,
-    StopState,
-)
+from motorbus.motion.commands import DeviceCommand, LoopResult, Move, MoveResult, Pose, StopResult, StopState
 from motorbus.motion.moves import check_reach
 from motorbus.session.address import parse_address
 
@@ -121,34 +113,23 @@ def until_enter() -> Callable[[], bool]:
     from select import select
 
     note("Enter ends it")
-
-    def pressed() -> bool:
-        if not select([sys.stdin], [], [], 0)[0]:
-            return False
-        sys.stdin.readline()
-        return True
-
-    return pressed
+    return lambda: bool(select([sys.stdin], [], [], 0)[0] and sys.stdin.readline() is not None)
 
 
 def agree(action: str, writing: Writing, common: Common, *, ask: bool = True) -> bool:
     """Whether an action is carried out: --dry-run only shows it, else the user is asked."""
     if writing.dry_run:
         emit(Planned(action), common)
-        return False
-    if ask:
+    elif ask:
         confirm(action, writing)
-    return True
+    return not writing.dry_run
 
 
 def far_moves(robot: Robot, ways: Mapping[str, float]) -> str:
     """The axes of these ways (rad, m) that move so far that the user is asked; "" if none does."""
-    return ", ".join(
-        f"{name} by {config.show(way)}"
-        for name, way in ways.items()
-        for config in [robot.config.axes[name]]
-        if abs(way * config.ratio) > FAR
-    )
+    axes = robot.config.axes
+    far = {name: way for name, way in ways.items() if abs(way * axes[name].ratio) > FAR}
+    return ", ".join(f"{name} by {axes[name].show(way)}" for name, way in far.items())
 
 
 def _agree_to_goals(robot: Robot, goals: Mapping[str, float], writing: Writing, common: Common) -> bool:
@@ -208,19 +189,20 @@ def move(
       motorbus move lift+=5mm --speed 0.5
       motorbus move feetech:/dev/ttyACM0#3=30deg --velocity 20deg/s
     """
-    words = [goal.rpartition("=") for goal in goals]
-    if not words or not all(word and text for word, _, text in words):
-        bad = next((goal for goal, one in zip(goals, words, strict=True) if not (one[0] and one[2])), "")
-        raise RequestError(
-            f"{bad!r} is not a goal" if bad else "no goal", expected="AXIS=POSITION, as shoulder=30deg"
-        )
-    relative = words[0][0].endswith("+")
-    if any(word.endswith("+") is not relative for word, _, _ in words):
-        raise RequestError("positions and distances in one command", advice="use two commands")
+    if not goals:
+        raise RequestError("no goal", expected="AXIS=POSITION, as shoulder=30deg")
+    pairs = []
+    for goal in goals:
+        word, _, text = goal.rpartition("=")
+        if not (word and text):
+            raise RequestError(f"{goal!r} is not a goal", expected="AXIS=POSITION, as shoulder=30deg")
+        if word.endswith("+") is not goals[0].rpartition("=")[0].endswith("+"):
+            raise RequestError("positions and distances in one command", advice="use two commands")
+        pairs.append((word.removesuffix("+"), text))
+    relative = "+=" in goals[0]
     if no_wait and (duration or relative):
         raise RequestError("--no-wait goes without --duration and +=")
     seconds = parse_time(duration)
-    pairs = [(word.removesuffix("+"), text) for word, _, text in words]
     with open_robot(common, join_addresses([word for word, _ in pairs]), velocity) as robot:
         found: dict[str, float] = {}
         for word, text in pairs:
@@ -242,12 +224,11 @@ def move(
 
 def join_addresses(words: Sequence[str]) -> list[str]:
     """The words; addresses of one bus as one address."""
-    addresses = [word for word in dict.fromkeys(words) if is_address(word)]
-    buses = {word.partition("#")[0] for word in addresses}
-    if len(buses) != 1 or len(addresses) < 2:
-        return list(dict.fromkeys(words))
-    ids = "+".join(word.partition("#")[2] for word in addresses)
-    return [f"{buses.pop()}#{ids}", *(word for word in words if not is_address(word))]
+    words = list(dict.fromkeys(words))
+    buses = {word.partition("#")[0] for word in words}
+    if len(words) < 2 or len(buses) != 1 or not all(map(is_address, words)):
+        return words
+    return [f"{buses.pop()}#{'+'.join(word.partition('#')[2] for word in words)}"]
 
 
 def _send_goals(robot: Robot, goals: Mapping[str, float], speed: float, fastest: float | None) -> None:
@@ -368,23 +349,19 @@ def pose(
         with open_robot(common, tuple(machine.poses[name])) as robot:
             if _agree_to_goals(robot, machine.poses[name], writing, common):
                 report(robot, robot.execute(Pose(name, speed=speed)), common)
-    else:
-        _list_poses(machine, common)
-
-
-def _list_poses(machine: MachineConfig, common: Common) -> None:
-    if common.json:
+    elif common.json:
         poses = {name: {axis: float(at) for axis, at in pose.items()} for name, pose in machine.poses.items()}
         emit(PoseList(poses), common)
-        return
-    for name, places in machine.poses.items():
-        print(f"{name}: {', '.join(f'{axis} {machine.axes[axis].show(at)}' for axis, at in places.items())}")
-    if not machine.poses:
+    elif not machine.poses:
         note("the machine file has no pose; `motorbus pose --save NAME` adds one")
+    else:
+        for name, places in machine.poses.items():
+            shown = ", ".join(f"{axis} {machine.axes[axis].show(at)}" for axis, at in places.items())
+            print(f"{name}: {shown}")
 
 
 def _save_pose(machine: MachineConfig, name: str, writing: Writing, common: Common) -> None:
-    from motorbus.motion.machine_edit import edit, pose_change
+    from motorbus.motion.machine_edit import pose_change
 
     file = Path(machine.path)
     if name in machine.poses and not writing.dry_run:
@@ -395,13 +372,10 @@ def _save_pose(machine: MachineConfig, name: str, writing: Writing, common: Comm
         change = pose_change(robot.config, name, places)
     if unknown:
         note(f"note: the position of {', '.join(unknown)} is not known: left out")
-    text = edit(file.read_text("utf-8"), change)
     if writing.dry_run:
         note(f"note: {file} stays as it is")
     else:
-        new = file.with_name(f".{file.name}.new")
-        new.write_text(text, "utf-8", newline="")
-        replace(new, file)
+        edit_machine(file, change)
     emit(SavedPose(name, str(file), places), common)
 
 
@@ -477,29 +451,17 @@ def stop(
     """
     done, errors = _visit(common, targets, "stop", lambda target: target.device.stop())
     states = {name: StopState(getattr(promise, "value", str(promise))) for name, promise in done.items()}
-    moving = []
-    if verify:
-        for words in _by_bus(common, targets):
-            try:
-                with open_robot(common, words) as robot:
-                    seen = robot.stop(verify=True).axes
-            except MotorbusError as error:
-                errors.append(error)
-            else:
-                states |= seen
-                moving += [name for name, state in seen.items() if state.at_rest is False]
-    if states and common.json:
+    for words in _by_bus(common, targets) if verify else ():
+        try:
+            with open_robot(common, words) as robot:
+                states |= robot.stop(verify=True).axes
+        except MotorbusError as error:
+            errors.append(error)
+    if states:
         emit(StopResult(states), common)
-    elif states:
-        print_table(
-            [
-                [name, one.promise if one.at_rest is None else "at rest" if one.at_rest else "not at rest"]
-                for name, one in states.items()
-            ]
-        )
+    moving = [name for name, state in states.items() if state.at_rest is False]
     if moving:
-        errors.insert(0, VerificationFailed(f"{', '.join(moving)}: not seen at rest within 1 s"))
-        raise with_others(errors)
+        raise with_others([VerificationFailed(f"{', '.join(moving)}: not seen at rest within 1 s"), *errors])
     _raise_all(done, errors)
 
 
@@ -561,7 +523,7 @@ def with_others(errors: Sequence[MotorbusError]) -> MotorbusError:
 
 def _raise_all(done: Mapping[str, Any], errors: Sequence[MotorbusError]) -> None:
     """Raise the errors: Partial if some devices did it."""
-    if errors and not done:
-        raise with_others(errors)
-    if errors:
+    if errors and done:
         raise Partial("; ".join(error.summary for error in errors), advice=errors[0].advice)
+    if errors:
+        raise with_others(errors)

@@ -27,14 +27,16 @@ def emit(result: Any, common: Common) -> None:
     if common.json:
         print_json(result)
     elif isinstance(result, list | tuple):
-        print_table(_rows(result))
+        for line in table_lines(_rows(result)):
+            print(line)
+        sys.stdout.flush()
     else:
         _print_struct(result)
 
 
 as_json = False  # of the command that runs
 _drawn: list[int] = []  # lines of the last table on the terminal
-_noted: set[str] = set()  # by `note_once`
+_noted: set[str] = set()  # of `note` in this command
 
 
 def begin(*, json: bool) -> None:
@@ -62,10 +64,6 @@ def print_json(result: Any, file: TextIO | None = None) -> None:
 
 
 def _print_struct(result: Any) -> None:
-    print("\n".join(_struct_lines(result)), flush=True)
-
-
-def _struct_lines(result: Any) -> list[str]:
     values, tables = [], []
     units = _units(type(result))
     for name in result.__struct_fields__:
@@ -76,11 +74,11 @@ def _struct_lines(result: Any) -> list[str]:
             values += [[f"{key.replace('_', ' ')}:", show(one)] for key, one in value.items()]
         elif value not in (None, "", (), []):
             values.append([name.replace("_", " ") + ":", show(value, units.get(name, ""))])
-    lines = _align(values)
+    lines = table_lines(values)
     for table in tables:
         rows = _rows(table.values(), list(table)) if isinstance(table, Mapping) else _rows(table)
         lines += [*([""] if lines else []), *table_lines(rows)]
-    return lines
+    print("\n".join(lines), flush=True)
 
 
 def _is_table(value: object) -> bool:
@@ -136,18 +134,12 @@ def show(value: Any, unit: str = "", *, bare: bool = False) -> str:
     return escape(str(value), None)
 
 
-def print_table(rows: Sequence[Sequence[str]]) -> None:
-    """Print rows in columns; the first row is the head."""
-    if rows:
-        print("\n".join(table_lines(rows)), flush=True)
-
-
 def table_lines(rows: Sequence[Sequence[str]]) -> list[str]:
     """The lines of a table; the last column is wrapped to the terminal, no other one is cut."""
     import shutil
     import textwrap
 
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     indent = sum(widths[:-1]) + 2 * len(widths[:-1])
     room = max(shutil.get_terminal_size().columns - indent, 20) if sys.stdout.isatty() else 10_000
     lines = []
@@ -160,25 +152,17 @@ def table_lines(rows: Sequence[Sequence[str]]) -> list[str]:
     return lines
 
 
-def _align(pairs: Sequence[Sequence[str]]) -> list[str]:
-    return table_lines(pairs) if pairs else []
-
-
 # -- stderr --------------------------------------------------------------------------------------------------------
 
 
-def note(text: str) -> None:
-    """Print a note on stderr; a closed stderr is ignored."""
+def note(text: str, *, once: bool = False) -> None:
+    """Print a note on stderr; `once` in a command. A closed stderr is ignored."""
+    if once and text in _noted:
+        return
+    _noted.add(text)
     with suppress(OSError, ValueError):
         parts = [escape(part) for part in _PARTS.split(text)]
         print("\n".join(parts), file=sys.stderr, flush=True)
-
-
-def note_once(text: str) -> None:
-    """Print a note unless the same command has printed it."""
-    if text not in _noted:
-        _noted.add(text)
-        note(text)
 
 
 def escape(text: str, limit: int | None = LONGEST) -> str:
