@@ -211,7 +211,7 @@ def _info(target: Target, config: AxisConfig | None, *, registers: bool) -> Info
         str(getattr(mode, "value", mode)),
         low,
         high,
-        tuple(_in_shell(text, target) for text in blocked),
+        tuple(in_shell(text, target) for text in blocked),
         _axis_limits(config),
         "" if config is None else config.exit_action,
         (config.estop if config is not None else "") or next(iter(target.family.link.stops), "stop"),
@@ -220,7 +220,7 @@ def _info(target: Target, config: AxisConfig | None, *, registers: bool) -> Info
     )
 
 
-def _in_shell(text: str, target: Target) -> str:
+def in_shell(text: str, target: Target) -> str:
     """A fix that names a device method, with the command in its place."""
     for method, command in FIXES.items():
         text = text.replace(method, f"`motorbus {command.format(address_of(target))}`")

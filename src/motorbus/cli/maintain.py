@@ -352,6 +352,8 @@ def restore(file: Path, device: str, /, *, writing: Writing = Writing(), common:
         if wrong:
             raise Partial(f"{target.name}: {', '.join(wrong)} read back another value")
         emit(Saved(target.name, str(file), tuple(changed)), common)
+        if not changed:
+            note(f"{target.name} has these settings already: nothing was written")
 
 
 def _parse_settings(text: str, file: Path, target: Target) -> dict[str, int]:

@@ -157,13 +157,17 @@ def report(robot: Robot, result: MoveResult | LoopResult, common: Common) -> Non
     else:
         places = dict(result.positions)
         how = f"{result.cycles} cycles"
-    for name, place in places.items():
-        shown = "position not known" if place is None else robot.config.axes[name].show(place)
-        is_estimated = robot.axes[name].status.position is None and place is not None
-        print(f"{name}: {shown}{' (estimated)' if is_estimated else ''}")
+    _print_positions(robot, places)
     print(f"{result.duration:.2f} s, {how}", flush=True)
     for text in getattr(result, "notes", ()):
         note(f"note: {text}")
+
+
+def _print_positions(robot: Robot, places: Mapping[str, float | None]) -> None:
+    for name, place in places.items():
+        shown = "position not known" if place is None else robot.config.axes[name].show(place)
+        is_estimated = robot.axes[name].status.position is None and place is not None
+        print(f"{name}: {shown}{' (estimated)' if is_estimated else ''}", flush=True)
 
 
 # -- move, jog, home -------------------------------------------------------------------------------------------
@@ -312,7 +316,11 @@ def home(
         action = f"move {', '.join(moved) or 'no axis'} until the reference switch is active"
         if agree(action, writing, common, ask=bool(moved)):
             with robot.attended():
-                emit(HomeResult(robot.home(names, timeout=limit, velocity=speed)), common)
+                positions = robot.home(names, timeout=limit, velocity=speed)
+            if common.json:
+                emit(HomeResult(positions), common)
+            else:
+                _print_positions(robot, positions)
 
 
 # -- pose ------------------------------------------------------------------------------------------------------
@@ -376,7 +384,10 @@ def _save_pose(machine: MachineConfig, name: str, writing: Writing, common: Comm
         note(f"note: {file} stays as it is")
     else:
         edit_machine(file, change)
-    emit(SavedPose(name, str(file), places), common)
+    if common.json:
+        emit(SavedPose(name, str(file), places), common)
+    else:
+        _print_positions(robot, places)
 
 
 # -- torque, stop ----------------------------------------------------------------------------------------------
@@ -457,8 +468,11 @@ def stop(
                 states |= robot.stop(verify=True).axes
         except MotorbusError as error:
             errors.append(error)
-    if states:
+    if states and common.json:
         emit(StopResult(states), common)
+    for name, one in () if common.json else states.items():
+        at_rest = "at rest" if one.at_rest else "not at rest"
+        print(f"{name}: {one.promise if one.at_rest is None else at_rest}", flush=True)
     moving = [name for name, state in states.items() if state.at_rest is False]
     if moving:
         raise with_others([VerificationFailed(f"{', '.join(moving)}: not seen at rest within 1 s"), *errors])

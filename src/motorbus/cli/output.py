@@ -70,9 +70,7 @@ def _print_struct(result: Any) -> None:
         value = getattr(result, name)
         if _is_table(value):
             tables.append(value)
-        elif isinstance(value, Mapping):
-            values += [[f"{key.replace('_', ' ')}:", show(one)] for key, one in value.items()]
-        elif value not in (None, "", (), []):
+        elif value not in (None, "", (), [], {}):
             values.append([name.replace("_", " ") + ":", show(value, units.get(name, ""))])
     lines = table_lines(values)
     for table in tables:
@@ -127,8 +125,10 @@ def show(value: Any, unit: str = "", *, bare: bool = False) -> str:
         places = _PLACES.get(unit.partition("/")[0])
         text = f"{value:.6g}" if places is None else f"{value:.{places}f}"
         return text if bare or not unit else f"{text} {unit}"
+    if isinstance(value, int) and unit and not bare:
+        return f"{value} {unit}"
     if isinstance(value, Mapping):
-        return ", ".join(f"{name} {show(one)}" for name, one in value.items())
+        return ", ".join(f"{name} {show(one) or 'unknown'}" for name, one in value.items())
     if isinstance(value, list | tuple):
         return ", ".join(show(one, unit) for one in value)
     return escape(str(value), None)
