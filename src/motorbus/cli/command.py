@@ -145,14 +145,15 @@ def _usage(name: str, function: Any, what: str) -> RequestError:
 def _value(parameter: Any, text: str) -> Any:
     """A word as the type of this parameter. A bare number is in the API unit."""
     text, kind = text.strip(), str(parameter.annotation)
+    if kind.startswith("float") and parameter.name in QUANTITIES:
+        return units.parse(text, QUANTITIES[parameter.name])
     try:
         if "bool" in kind:
             return {"yes": True, "no": False, "on": True, "off": False, "1": True, "0": False}[text]
         if kind.startswith("int"):
             return units.whole(text)
         if kind.startswith("float"):
-            quantity = QUANTITIES.get(parameter.name)
-            return units.parse(text, quantity) if quantity else units.real(text)
+            return units.real(text)
     except (ValueError, KeyError):
         form = "yes or no" if "bool" in kind else "a whole number" if kind.startswith("int") else "a number"
         raise RequestError(f"{parameter.name}: {text!r} is not possible", expected=form) from None
