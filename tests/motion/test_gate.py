@@ -14,7 +14,7 @@ from motorbus.core.setpoint import Deferred, Setpoint, Stays
 from motorbus.errors import LimitExceeded, MotorbusError, NotHomed, Refused
 from motorbus.motion.gate import SafetyGate, check_owned
 from motorbus.motion.lease import Lease
-from motorbus.motion.machine import AxisConfig, Position, Step, Velocity
+from motorbus.motion.machine import AxisConfig, Position, Velocity
 from motorbus.motion.status import AxisStatus
 
 NOW = 100.0
@@ -44,7 +44,7 @@ def make(**keys: Any) -> tuple[SafetyGate, AxisStatus]:
     usual = {"low": Position(-1, "position"), "high": Position(1, "position")}
     config = AxisConfig(device="b#1", max_velocity=Velocity(1.0, "velocity"), **{**usual, **keys})
     axis = AxisStatus("a", config)
-    axis.position, axis.at, axis.read = 0.5, NOW, lambda: replace(goal(0.0))
+    axis.position, axis.at = 0.5, NOW
     return SafetyGate(Bus(), [axis]), axis  # type: ignore[arg-type]
 
 
@@ -68,7 +68,7 @@ def at(gate: SafetyGate, axis: AxisStatus, **values: Any) -> None:
         setattr(axis, name, value)
 
 
-STEP = {"max_step": Step(0.2, "position")}
+STEP = {"max_step": Position(0.2, "position")}
 TABLE: list[tuple[dict[str, Any], dict[str, Any], Request[Any], str]] = [
     # keys of the axis, what is known of it, request, reason ("" passes)
     ({}, {}, goal(0.9), ""),
@@ -106,10 +106,10 @@ TABLE: list[tuple[dict[str, Any], dict[str, Any], Request[Any], str]] = [
     ({}, {}, goal(0.5, "current"), "unattended"),
     ({}, {}, goal(0.4, "relative"), ""),
     ({}, {}, goal(0.6, "relative"), "limits"),
-    ({}, {"position": None, "read": None}, goal(0.1, "relative"), "homed"),
-    (no_limits(), {"position": None, "read": None}, goal(9.0, "relative"), ""),
-    ({}, {"position": None, "read": None, "estimate": 0.9}, goal(0.2, "relative"), "limits"),
-    ({}, {"position": None, "read": None, "estimate": 0.9}, goal(-0.2, "relative"), ""),
+    ({}, {"position": None, "measured": False}, goal(0.1, "relative"), "homed"),
+    (no_limits(), {"position": None, "measured": False}, goal(9.0, "relative"), ""),
+    ({}, {"position": None, "measured": False, "estimate": 0.9}, goal(0.2, "relative"), "limits"),
+    ({}, {"position": None, "measured": False, "estimate": 0.9}, goal(-0.2, "relative"), ""),
     ({}, {}, goal(0.0, lane=EVERY_LANE), "limits"),
     ({}, {}, goal(0.0, lane=EVERY_LANE, stays=Stays.STILL), ""),
     ({}, {}, goal(3.0, node=2, ends=(0.0, 4.0)), ""),
@@ -206,7 +206,8 @@ def test_after_a_reconnect_nothing_is_known() -> None:
     gate._bus.reconnect()  # type: ignore[attr-defined]
     assert axis.position is None
     assert check_owned([(axis, owner)], None, latched=False) is not None
-    assert len(gate.required_reads(goal(0.6))) == 1
+    with pytest.raises(Refused, match="not known"):
+        gate.check(goal(0.6), NOW)
 
 
 def test_positions_that_no_motor_can_reach_are_suspect_until_a_second_one_agrees() -> None:
@@ -222,7 +223,7 @@ def test_positions_that_no_motor_can_reach_are_suspect_until_a_second_one_agrees
 
 def test_a_stop_in_motion_loses_an_estimate() -> None:
     gate, axis = make()
-    axis.position, axis.read, axis.estimate = None, None, 0.2
+    axis.position, axis.measured, axis.estimate = None, False, 0.2
     gate.stopped(())
     assert axis.estimate == 0.2
     gate.check(goal(0.1, "relative"), NOW)

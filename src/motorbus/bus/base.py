@@ -225,8 +225,8 @@ class BaseBus:
         before, failure = engine.rate, None
         try:
             if tune.rate:
-                self.link.tune(tune.rate, tune.listen_only or engine.always_listening)
-                engine.set_rate(tune.rate, listen_only=tune.listen_only)
+                self.link.tune(tune.rate)
+                engine.set_rate(tune.rate)
         except LinkLost as error:
             task.tree.ready.append((task, None, error))
             raise
@@ -299,7 +299,7 @@ class BaseBus:
             function()
         if link.rate != engine.rate:
             with contextlib.suppress(MotorbusError):
-                link.tune(engine.rate, engine.listening)
+                link.tune(engine.rate)
         return True
 
     def _wait_without_link(self, until: float) -> None:

@@ -47,7 +47,7 @@ class DeviceLimits:
                 advice="use a move, or a write by register name; nothing was sent",
             )
         for setpoint in request.setpoints:
-            _check(setpoint)
+            check_limits(setpoint)
 
     def required_reads(self, request: Request[Any], /) -> Sequence[Runnable[Any]]:
         return ()
@@ -56,7 +56,8 @@ class DeviceLimits:
         return
 
 
-def _check(setpoint: Setpoint) -> None:
+def check_limits(setpoint: Setpoint) -> None:
+    """Raise LimitExceeded for a setpoint outside the limits that it carries, or without limits."""
     value, low, high = setpoint.value, setpoint.low, setpoint.high
     if not isfinite(value):
         raise _refused(setpoint, f"{value} is not a finite number", "", "give a number")

@@ -226,10 +226,10 @@ class EmergencyStop:
         """A scan may be trying another rate: the nodes are stopped at the rate at which they answered last."""
         engine = self.bus.engine
         rate = engine.nodes.rate
-        if (engine.rate, engine.listening) != (rate, engine.always_listening):
+        if engine.rate != rate:
             with contextlib.suppress(LinkError):
-                self.bus.link.tune(rate, engine.always_listening)
-                engine.set_rate(rate, listen_only=False)
+                self.bus.link.tune(rate)
+                engine.set_rate(rate)
 
     # -- the thread --------------------------------------------------------------------------------------------
 

@@ -19,8 +19,7 @@ from motorbus.motion.status import AxisStatus
 class Axis:
     """One axis: its configuration, its device and what that can do, what is known of it.
 
-    `limits` are those of the device (rad); `top_velocity` is what its model can do (rad/s of the device), None if
-    unknown.
+    `limits` are those of the device (rad), None if unknown.
     """
 
     name: str
@@ -31,7 +30,6 @@ class Axis:
     status: AxisStatus
     model: str = ""
     limits: tuple[float, float] | None = None
-    top_velocity: float | None = None
 
     def require(self, *capabilities: str) -> None:
         """Raise RequestError if its device lacks one of these functions."""
@@ -103,6 +101,11 @@ async def read_state(axis: Axis) -> None:
         status.state = state
         if state.position is None or status.take(state.position, state.at):
             return
-    for _ in range(2 if "position" in axis.driver else 0):  # a suspect position is read again
-        if status.take(await axis.driver.position(axis.device), axis.bus.now()):
+    await read_position(axis)
+
+
+async def read_position(axis: Axis) -> None:
+    """Procedure: read its position, a suspect one again; nothing without one."""
+    for _ in range(2 if axis.status.measured else 0):
+        if axis.status.take(await axis.driver.position(axis.device), axis.bus.now()):
             return

@@ -7,10 +7,10 @@ from math import inf, isfinite
 from typing import Any, Final
 
 from motorbus.bus.base import BaseBus
+from motorbus.bus.interlock import check_limits
 from motorbus.core.family import IdChanged
 from motorbus.core.request import EVERY_LANE, Effect, Priority, Request
 from motorbus.core.setpoint import Setpoint, Stays
-from motorbus.core.steps import Runnable
 from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, NotHomed, Refused
 from motorbus.motion.lease import Lease, lease_lost
 from motorbus.motion.status import FRESH, AxisStatus
@@ -45,16 +45,20 @@ def finite(gate: SafetyGate, axis: AxisStatus, setpoint: Setpoint, now: float) -
 def position_fresh(
     gate: SafetyGate, axis: AxisStatus, setpoint: Setpoint, now: float
 ) -> MotorbusError | None:
-    """A goal is judged by a believable position of the last 0.5 s; the bus reads before it asks again."""
-    if axis.read is None or setpoint.quantity not in ("position", "relative"):
+    """A goal is judged by a believable position of the last 0.5 s."""
+    if not axis.measured or setpoint.quantity not in ("position", "relative"):
         return None
     if axis.suspect is not None:
         return Refused(
             f"{axis.name}: its last position is implausible", reason="suspect", advice="read it again"
         )
     if now - axis.at > FRESH:
+        age = "not known" if axis.position is None else f"{now - axis.at:.1f} s old"
         return Refused(
-            f"{axis.name}: its position is not known", reason="stale", advice="check that it answers"
+            f"{axis.name}: its position is {age}",
+            reason="stale",
+            expected=f"at most {FRESH} s old",
+            advice="read it before the goal is sent: robot.positions()",
         )
     return None
 
@@ -177,7 +181,7 @@ class SafetyGate:
         for setpoint in moving:
             axis = self.axes.get(setpoint.node)
             if axis is None:
-                _check_device_limits(setpoint)
+                check_limits(setpoint)
                 continue
             self.update(axis)
             for check in CHECKS:
@@ -203,7 +207,7 @@ class SafetyGate:
             return
         axis.moving = True
         axis.endless = setpoint.quantity in ENDLESS and bool(setpoint.value)
-        if axis.read is None:
+        if not axis.measured:
             axis.estimate = None
 
     def _stops(self, node: int) -> int:
@@ -220,31 +224,20 @@ class SafetyGate:
                 advice="write the goals again",
             )
 
-    def required_reads(self, request: Request[Any]) -> list[Runnable[Any]]:
-        """Reads of the axes whose position is too old or too doubtful to judge the goal by."""
-        now = self._bus.now()
-        reads = {}
-        for setpoint in request.setpoints if request.effect is Effect.MOTION else ():
-            axis = self.axes.get(setpoint.node)
-            if axis is None or axis.read is None or setpoint.stays is not None:
-                continue
-            if setpoint.quantity not in ("position", "relative"):
-                continue
-            self.update(axis)
-            if axis.suspect is not None or now - axis.at > FRESH:
-                reads[axis.node] = axis.read
-        return [read() for read in reads.values()]
+    def required_reads(self, request: Request[Any]) -> tuple[()]:
+        """Nothing: who moves reads first, and a goal without a fresh position is refused."""
+        return ()
 
     def update(self, axis: AxisStatus) -> None:
         """Take the last position that the bus has read, once."""
         reading = self._bus.positions.get(axis.node)
-        if reading is None or reading[1] is axis.response:
+        if reading is None or reading[1].at <= axis.seen:
             return
-        request, axis.response = reading
-        if callable(request.reports_position) and reading[1].at > axis.at:
-            angle = request.reports_position(reading[1]).get(axis.node)
+        request, response = reading
+        if callable(request.reports_position):
+            angle = request.reports_position(response).get(axis.node)
             if angle is not None:
-                axis.take(angle, reading[1].at)
+                axis.take(angle, response.at)
 
     def stopped(self, nodes: Sequence[int]) -> None:
         """A stop of these nodes (none: all) will be sent: each source of goals loses them. From any thread."""
@@ -263,16 +256,6 @@ class SafetyGate:
         for axis in self.axes.values():
             axis.owner += 1
             axis.forget()
-
-
-def _check_device_limits(setpoint: Setpoint) -> None:
-    """A device that is no axis of the machine: the limits that its driver knows."""
-    low, high = setpoint.low, setpoint.high
-    if isfinite(setpoint.value) and low is not None and high is not None and low <= setpoint.value <= high:
-        return
-    raise LimitExceeded(
-        f"node {setpoint.node}: {setpoint.value:.6g} is outside {low} to {high}", node=setpoint.node
-    )
 
 
 def check_owned(

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import inf
 from typing import Final
 
 from motorbus.core.family import State
-from motorbus.core.steps import Runnable
 from motorbus.errors import Refused
 from motorbus.motion.machine import AxisConfig
 
@@ -22,15 +20,16 @@ class AxisStatus:
     `owner` counts the stops, torque-offs and new sources of goals. A source keeps the number that `claim` gave it; its
     goals are refused when the number has changed. `estimate` is the position of an axis whose device reports none,
     None where it is unknown. `engaged`: torque was given from here. `moving`: a goal was sent and no stop since.
-    `endless`: its motion has no end of its own. `read` reads the position.
+    `endless`: its motion has no end of its own. `measured`: its device reports its position; the last reading was
+    `seen` at that time, `position` is the last sound one.
     """
 
     __slots__ = (
-        "at", "config", "endless", "engaged", "estimate", "fault", "high", "low", "moving", "name", "node", "owner",
-        "position", "read", "response", "state", "suspect",
+        "at", "config", "endless", "engaged", "estimate", "fault", "high", "low", "measured", "moving", "name", "node",
+        "owner", "position", "seen", "state", "suspect",
     )  # fmt: skip
 
-    def __init__(self, name: str, config: AxisConfig) -> None:
+    def __init__(self, name: str, config: AxisConfig, *, measured: bool = True) -> None:
         self.name: Final = name
         self.config: Final = config
         self.node: Final = config.node
@@ -39,8 +38,8 @@ class AxisStatus:
         self.at = -inf
         self.suspect: float | None = None
         self.estimate: float | None = None
-        self.response: object = None  # the last one that `position` was taken from
-        self.read: Callable[[], Runnable[float]] | None = None
+        self.seen = -inf
+        self.measured = measured
         self.state: State | None = None  # its last sample, except for the position
         self.fault = ""
         self.owner = 0
@@ -56,6 +55,7 @@ class AxisStatus:
 
         An implausible reading is suspect until a second one agrees with it.
         """
+        self.seen = at
         before, age = self.position, at - self.at
         if before is None or abs(angle - before) <= JITTER + FASTEST * min(age, FRESH):
             is_sound = True
