@@ -9,7 +9,11 @@ from pathlib import Path
 
 from scripts.interpreters import ROOT, candidates, runs
 
-RELEASES = {"0.4.4": ((3, 11), "peers.txt"), "0.6.1": ((3, 12), "lerobot-0.6.txt")}
+RELEASES = {
+    # lerobot-setup-motors of 0.4 knows no plugins; its recorder needs packages that these tests do not install
+    "0.4.4": ((3, 11), "peers.txt", "not setup_motors and not record"),
+    "0.6.1": ((3, 12), "lerobot-0.6.txt", ""),
+}
 
 
 def environment(release: str, path: str, locked: str) -> Path:
@@ -46,13 +50,23 @@ def _lines_of(name: str, text: str) -> str:
 def main() -> int:
     """Exit code 1 when a release fails; a release whose Python is missing is reported as NOT RUN."""
     failed = False
-    for release, (version, locked) in RELEASES.items():
+    for release, (version, locked, chosen) in RELEASES.items():
         path = next((path for path in candidates(version) if runs(path, version)), None)
         if path is None:
             print(f"LeRobot {release}: NOT RUN (no Python {version[0]}.{version[1]} here)")
             continue
         folder = environment(release, path, locked)
-        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests/interop/lerobot"]
+        command = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-q",
+            "-p",
+            "no:cacheprovider",
+            "-k",
+            chosen,
+            "tests/interop/lerobot",
+        ]
         print(f"LeRobot {release} on {path}", flush=True)
         ended = subprocess.run(command, cwd=ROOT, env={**os.environ, "MOTORBUS_LEROBOT": str(folder)})
         failed |= ended.returncode != 0

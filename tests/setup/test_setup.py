@@ -65,7 +65,8 @@ def test_two_new_servos_at_once_are_refused() -> None:
         user.answers["shoulder"] = user.answers["elbow"] = user.answers["wrist"] = "skip"
         assert run(number(bus, SO101), user) == ()
         assert "2 servos answer, with the ids 1, 9" in user.notes[0]
-        assert sim[1].id == 1 and sim[9].id == 9
+        assert sim[1].id == 1
+        assert sim[9].id == 9
 
 
 # -- calibrate -------------------------------------------------------------------------------------------------
@@ -105,7 +106,8 @@ def test_a_sweep_that_gives_no_calibration_is_refused(sweep: tuple[int, int], pr
         user = User(sim, sweep={**SWEEP, 2: sweep})
         user.before = {"middle pose": lambda: user.sweep.update({2: (-800, 800)} if user.notes else {})}
         run(calibrate(bus, SO101), user)
-        assert user.notes[0].startswith("shoulder_lift") and problem in user.notes[0]
+        assert user.notes[0].startswith("shoulder_lift")
+        assert problem in user.notes[0]
 
 
 def test_a_silent_joint_ends_the_sweep_with_its_name() -> None:

@@ -63,7 +63,7 @@ def machine_of(
         reach = (one.range_max - one.range_min) / 2 * 360 / TURN
         axes[joint.name] = {
             "device": f"arm#{one.id}",
-            "zero": f"{(one.range_min + one.range_max) / 2} raw",
+            "zero": f"{(one.range_min + one.range_max) / 2 * 360 / TURN} deg",
             "low": f"{-reach} deg",
             "high": f"{reach} deg",
             "max_velocity": f"{max_velocity} deg/s",

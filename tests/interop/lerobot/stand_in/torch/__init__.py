@@ -10,12 +10,12 @@ import importlib.util
 import sys
 from importlib.machinery import ModuleSpec
 from types import ModuleType
-from typing import Any
+from typing import Any, ClassVar
 
 ALWAYS = ("torch", "torchvision", "einops", "cv2")
 IF_MISSING = (
-    "accelerate", "av", "datasets", "gymnasium", "imageio", "jsonlines", "pandas", "PIL", "pyarrow", "pynput",
-    "rerun", "torchcodec", "wandb",
+    "accelerate", "av", "datasets", "diffusers", "gymnasium", "imageio", "jsonlines", "pandas", "PIL", "pyarrow", "pynput",
+    "rerun", "torchcodec", "transformers", "wandb",
 )  # fmt: skip
 __version__ = "2.7.0"
 
@@ -48,7 +48,7 @@ def _class(name: str) -> Any:
 
 
 class _Module(ModuleType):
-    __path__: list[str] = []
+    __path__: ClassVar[list[str]] = []
 
     def __getattr__(self, name: str) -> Any:
         return _class(name)
