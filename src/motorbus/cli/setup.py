@@ -73,7 +73,8 @@ def setup(*, arm: Arm = Arm(), common: Common = Common()) -> None:
         run(number_servos(bus, preset), face)
         _check_present(bus, preset)
         found = {joint.name: read_calibration(bus, joint) for joint in preset.joints}
-        if any((one.homing_offset, one.range_min, one.range_max) == UNSET for one in found.values()):
+        swept = [found[joint.name] for joint in preset.joints if not joint.full_turn]
+        if any((one.homing_offset, one.range_min, one.range_max) == UNSET for one in swept):
             found = run(sweep(bus, preset), face)
         signs = run(verify_joints(bus, preset), face)
         _write(common, preset, _with_signs(found, signs), address, arm)

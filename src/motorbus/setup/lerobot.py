@@ -58,32 +58,6 @@ def dump(calibration: Mapping[str, JointCalibration]) -> str:
     return msgspec.json.format(msgspec.json.encode(calibration), indent=4).decode()
 
 
-# -- values as LeRobot has them --------------------------------------------------------------------------------
-
-
-def degrees(one: JointCalibration, count: float) -> float:
-    """A position in the degrees of LeRobot: 0 in the middle of the range."""
-    return (count - (one.range_min + one.range_max) / 2) * 360 / STEPS
-
-
-def count_of_degrees(one: JointCalibration, angle: float) -> float:
-    """The count of a position in degrees."""
-    return angle * STEPS / 360 + (one.range_min + one.range_max) / 2
-
-
-def percent(one: JointCalibration, count: float, low: float) -> float:
-    """A position within the range as `low` (0 or -100) to 100; reversed with drive_mode 1."""
-    bounded = min(max(count, one.range_min), one.range_max)
-    share = (bounded - one.range_min) / (one.range_max - one.range_min)
-    return low + (1 - share if one.drive_mode else share) * (100 - low)
-
-
-def count_of_percent(one: JointCalibration, value: float, low: float) -> float:
-    """The count of a position from `low` (0 or -100) to 100."""
-    share = (min(max(value, low), 100.0) - low) / (100 - low)
-    return one.range_min + (1 - share if one.drive_mode else share) * (one.range_max - one.range_min)
-
-
 # -- which arm is it -------------------------------------------------------------------------------------------
 
 

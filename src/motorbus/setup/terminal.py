@@ -32,8 +32,9 @@ class Terminal:
         return self._ask(step)
 
     def _ask(self, prompt: Prompt) -> str:
-        choices = " / ".join(prompt.choices) or "Enter"
-        _print(f"{prompt.text} [{choices}] ")
+        first, *others = prompt.choices or ("",)
+        enter = f"Enter: {first}" if others else "Enter"
+        _print(f"{prompt.text} [{' / '.join([enter, *others])}] ")
         line = self._read_line(wait=True)
         assert line is not None
         return line

@@ -154,6 +154,17 @@ def counts(simulator: Simulator) -> list[int]:
     return [node["raw_position"] for node in nodes(simulator)]
 
 
+def test_values_are_those_of_lerobot(lerobot: Lerobot) -> None:
+    """Of 1,000 random joints; its own goals are cut to whole counts."""
+    shown = subprocess.run(
+        [str(Path(ENVIRONMENT, "bin", "python")), str(Path(__file__).with_name("arithmetic.py"))],
+        env=lerobot.environment, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    worst = json.loads(shown.stdout)
+    assert worst["value"] < 1e-9
+    assert worst["count"] < 1
+
+
 def test_teleoperate(lerobot: Lerobot, arms: tuple[Simulator, Simulator]) -> None:
     """The follower ends where the leader was put, limp, with 1 % corrupt replies on its line."""
     follower, leader = arms

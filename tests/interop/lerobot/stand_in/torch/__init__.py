@@ -14,8 +14,8 @@ from typing import Any, ClassVar
 
 ALWAYS = ("torch", "torchvision", "einops", "cv2")
 IF_MISSING = (
-    "accelerate", "av", "datasets", "diffusers", "gymnasium", "imageio", "jsonlines", "pandas", "PIL", "pyarrow", "pynput",
-    "rerun", "torchcodec", "transformers", "wandb",
+    "accelerate", "av", "datasets", "diffusers", "gymnasium", "imageio", "jsonlines", "pandas", "PIL", "pyarrow",
+    "pynput", "rerun", "torchcodec", "transformers", "wandb",
 )  # fmt: skip
 __version__ = "2.7.0"
 
