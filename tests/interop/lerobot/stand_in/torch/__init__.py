@@ -10,7 +10,7 @@ import importlib.util
 import sys
 from importlib.machinery import ModuleSpec
 from types import ModuleType
-from typing import Any, ClassVar
+from typing import Any
 
 ALWAYS = ("torch", "torchvision", "einops", "cv2")
 IF_MISSING = (
@@ -48,8 +48,6 @@ def _class(name: str) -> Any:
 
 
 class _Module(ModuleType):
-    __path__: ClassVar[list[str]] = []
-
     def __getattr__(self, name: str) -> Any:
         return _class(name)
 
