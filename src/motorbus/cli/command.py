@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping
-from dataclasses import asdict, is_dataclass
-from enum import Enum
 from typing import Any, Final
 
+import msgspec
 from msgspec import Struct
 
 from motorbus.cli.common import Common, Target, Writing
@@ -161,17 +160,11 @@ def _value(parameter: Any, text: str) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """A result as plain data."""
+    """A result as plain data; of a named tuple with its names."""
     if hasattr(value, "_asdict"):
-        return {name: _plain(one) for name, one in value._asdict().items()}
-    if isinstance(value, Enum):
-        return value.name.lower()
-    if is_dataclass(value) and not isinstance(value, type):
-        return _plain(asdict(value))
+        value = value._asdict()
     if isinstance(value, Mapping):
         return {str(name): _plain(one) for name, one in value.items()}
     if isinstance(value, list | tuple):
         return [_plain(one) for one in value]
-    if isinstance(value, bytes):
-        return value.hex(" ").upper()
-    return value if isinstance(value, int | float | str) or value is None else str(value)
+    return msgspec.to_builtins(value, enc_hook=str)
