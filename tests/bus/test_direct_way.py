@@ -240,7 +240,4 @@ def test_an_error_of_one_call_ends_no_other_one(clock: str) -> None:
 class _Admit:
     def check(self, request: Request[Any], now: float) -> None: ...
 
-    def required_reads(self, request: Request[Any]) -> tuple[()]:
-        return ()
-
     def stopped(self, nodes: object) -> None: ...

@@ -119,9 +119,6 @@ def test_a_caller_may_set_another_interlock() -> None:
         def check(self, request: Any, now: float, /) -> None:
             raise LimitExceeded("nothing moves")
 
-        def required_reads(self, request: Any, /) -> tuple[()]:
-            return ()
-
         def stopped(self, nodes: Any, /) -> None:
             return
 

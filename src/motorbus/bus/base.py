@@ -27,8 +27,6 @@ from motorbus.link.memory import MemoryLink
 
 IDLE = 0.25
 """s; the longest wait for data before the caller looks at its procedure again."""
-
-
 DRAIN: Final = 32
 """Reads by which a late host takes what is there before it takes the rest for late."""
 
@@ -126,11 +124,6 @@ class BaseBus:
         """s on the clock of the link."""
         return self.link.now()
 
-    @property
-    def waits_for_stop(self) -> bool:
-        """An emergency stop in another thread needs the turn, and nothing is in flight."""
-        return self.engine.stopping and not self.engine.in_flight
-
     def check_thread(self) -> None:
         """Raise RequestError for a second thread on a simulated bus in virtual time; an emergency stop may."""
         if isinstance(self.link, MemoryLink) and self.link.virtual:
@@ -155,41 +148,29 @@ class BaseBus:
             while (moment := self._send_next(trees, now)) == 0.0:
                 pass
         except LinkError as error:
-            self._fail(self._lost(error), trees)
+            self._fail(self.lost(error), trees)
         self.hand_over()
         return moment
 
     def _send_next(self, trees: Sequence[Tree[Any]], now: float) -> float:
         """Send the first that may leave and return 0; else the moment (s) from which one may, inf if unknown."""
         engine, moment = self.engine, inf
-        waiting = trees[0].sending if len(trees) == 1 else in_order(trees)
-        for one in waiting:
-            tree = one.task.tree
+        for one in in_order(trees):
             if not self._may_use_bus(one):
                 continue
             if isinstance(one, Pause):
                 if engine.in_flight:  # what is behind it waits, too
                     break
-                tree.sending.remove(one)
+                one.task.tree.sending.remove(one)
                 self._end_pause(one)
                 return 0.0
             if len(engine.in_flight) >= engine.window:
                 break
-            if blocked := engine.is_blocked(one, now):
+            if blocked := engine.blocked_until(one, now):
                 moment = min(moment, blocked)
                 continue
-            tree.sending.remove(one)
-            try:
-                if engine.needs_sync(one):
-                    engine.check_stops(one.request, one.since, one.stop_since)
-                    tree.send_back(one)
-                    return 0.0
-                engine.check(one.request, one.since, one.stop_since, now)
-            except Exception as error:  # also of the gate or of the driver
-                one.error = error
-                tree.end(one)
-            else:
-                self._write(tree, one, now)
+            one.task.tree.sending.remove(one)
+            self._send(one, now)
             return 0.0
         return moment
 
@@ -199,11 +180,21 @@ class BaseBus:
         owner = self.engine.exclusive
         return not self.engine.stopping and (owner is None or owner is one.task.owner)
 
-    def _write(self, tree: Tree[Any], attempt: Attempt, now: float) -> None:
-        engine = self.engine
+    def _send(self, attempt: Attempt, now: float) -> None:
+        engine, tree, request = self.engine, attempt.task.tree, attempt.request
+        try:
+            if engine.needs_sync(attempt):
+                engine.check_stops(request, attempt.since, attempt.stop_since)
+                tree.send_back(attempt)
+                return
+            engine.check(request, attempt.since, attempt.stop_since, now)
+        except Exception as error:  # also of the gate or of the driver
+            attempt.error = error
+            tree.end(attempt)
+            return
         engine.begin(attempt, now)
         try:
-            self.link.write(attempt.request.wire)
+            self.link.write(request.wire)
         except LinkLost as error:
             if not attempt.in_flight:
                 attempt.error = error
@@ -218,21 +209,20 @@ class BaseBus:
     def _end_pause(self, pause: Pause) -> None:
         """Nothing is in flight: set the rate, or give the bus to the task of this pause."""
         engine, task, tune = self.engine, pause.task, pause.tune
+        before, failure = engine.rate, None
         if tune is None:
             engine.exclusive = task
             task.tree.ready.append((task, None, None))
             return
-        before, failure = engine.rate, None
         try:
             if tune.rate:
                 self.link.tune(tune.rate, tune.listen_only or engine.always_listening)
                 engine.set_rate(tune.rate, listen_only=tune.listen_only)
-        except LinkLost as error:
-            task.tree.ready.append((task, None, error))
-            raise
         except MotorbusError as error:
             failure = error
         task.tree.ready.append((task, before, failure))
+        if isinstance(failure, LinkLost):
+            raise failure
 
     def hand_over(self) -> None:
         """Give every attempt that has ended to the task that waits for it."""
@@ -254,22 +244,20 @@ class BaseBus:
         """
         engine, link = self.engine, self.link
         if engine.gone is not None:
-            self._wait_without_link(until)
+            if isinstance(link, Renewable) and self.reconnects:
+                link.rest(min(until, link.now() + IDLE))
             return
         try:
             looked = link.now()
             deadline = engine.next_deadline()
-            overdue = looked >= deadline
             chunks = link.read(min(until, deadline, looked + IDLE))
-            reads = (
-                0 if not overdue else DRAIN if engine.latency < DIRECT else 1
-            )  # an adapter gives all at once
-            while reads and chunks and (more := link.read(-inf)):
+            reads = DRAIN if engine.latency < DIRECT else 1  # an adapter gives all at once
+            while reads and chunks and looked >= deadline and (more := link.read(-inf)):
                 chunks = [*chunks, *more]
                 reads -= 1
             engine.feed(chunks, link.now(), looked)
         except LinkError as error:
-            self._fail(self._lost(error), trees)
+            self._fail(self.lost(error), trees)
         self.hand_over()
 
     def next_event(self, moment: float) -> float:
@@ -277,9 +265,10 @@ class BaseBus:
         due = self.link.due() if isinstance(self.link, MemoryLink) else inf
         return max(min(moment, self.engine.next_deadline(), due), self.now())
 
-    def _lost(self, error: LinkError) -> LinkError:
+    def lost(self, error: LinkError) -> LinkError:
+        """The link failed: all that waits fails with this error."""
         if isinstance(error, LinkLost):
-            error = failures.reconnecting(error) if self.reconnects else failures.final(error)
+            error = failures.lost(error, reconnects=self.reconnects)
         self.engine.lost(error)
         return error
 
@@ -292,7 +281,7 @@ class BaseBus:
         try:
             link.renew(engine.losses)
         except LinkError as error:
-            self._lost(error)
+            self.lost(error)
             return False
         engine.reconnected(link.now(), link.latency)
         for function in self._on_reconnect:
@@ -301,10 +290,6 @@ class BaseBus:
             with contextlib.suppress(MotorbusError):
                 link.tune(engine.rate, engine.listening)
         return True
-
-    def _wait_without_link(self, until: float) -> None:
-        if isinstance(self.link, Renewable) and self.reconnects:
-            self.link.rest(min(until, self.link.now() + IDLE))
 
     # -- observers ---------------------------------------------------------------------------------------------
 
@@ -356,10 +341,6 @@ class BaseBus:
         """Call this function each time the lost port was opened again, before anything is sent."""
         self._on_reconnect.append(function)
 
-    def required_reads(self, request: Request[Any]) -> Sequence[Runnable[Any]]:
-        """The reads that the interlock needs before it can check this request."""
-        return () if self.interlock is None else self.interlock.required_reads(request)
-
     def watch(self, procedure: Runnable[Any]) -> Tree[Any]:
         """Step this procedure whenever the bus is used, in virtual time, until `unwatch`."""
         tree: Tree[Any] = Tree(self.engine, procedure, now=self.now, report=self.event_sink(None))
@@ -397,7 +378,7 @@ class BaseBus:
         Motion and torque are refused with Interrupted until `reset()`. May be called from any thread, but not from a
         signal handler (see `trigger_estop`). Raises LinkLost when the bus is closed.
         """
-        return self.stopper.estop()
+        return self.stopper.stop()
 
     def trigger_estop(self) -> None:
         """Request an emergency stop and return at once; for signal handlers.

@@ -10,10 +10,9 @@ from typing import Any, Self, TypeVar
 from motorbus.bus.attempt import Attempt
 from motorbus.bus.base import BaseBus
 from motorbus.bus.engine import PENDING
-from motorbus.bus.interrupts import ELSEWHERE, INTERRUPTS, MAIN, interrupts
-from motorbus.bus.nodes import GATED
-from motorbus.bus.running import TURN_TIMEOUT, Part, run_here, run_parts
-from motorbus.bus.tasks import STEPPING, Notify, Tree, check_outside, decode
+from motorbus.bus.interrupts import ELSEWHERE, INTERRUPTS, MAIN
+from motorbus.bus.running import Part, run_here, run_on, run_parts
+from motorbus.bus.tasks import STEPPING, Notify, check_outside, decode
 from motorbus.core.register import shown
 from motorbus.core.request import Priority, Request, Response
 from motorbus.core.steps import Runnable, discard, gather
@@ -33,9 +32,12 @@ class Bus(BaseBus):
 
         Raises what the procedure raises; a signal is raised when the procedure has cleaned up.
         """
+        since = self.engine.nodes.epoch
         if isinstance(procedure, Request):
-            return self._carry_out(procedure)  # type: ignore[no-any-return]
-        return run_here(self, procedure, report)
+            value = self._carry_out(procedure, None, since)
+            if value is not PENDING:
+                return value  # type: ignore[no-any-return]
+        return run_here(self, procedure, report, since)
 
     def exchange(
         self, requests: Sequence[Request[Any]], tolerated: tuple[type[Exception], ...] = ()
@@ -46,29 +48,48 @@ class Bus(BaseBus):
         An error of a `tolerated` type becomes the value of its request; any other is raised, and requests behind it
         have not been sent.
         """
-        values = exchange_on({self: requests}, tolerated)[self]
-        if isinstance(values, MotorbusError):
-            raise values
-        return values  # type: ignore[no-any-return]
+        _check_requests(requests)
+        since = self.engine.nodes.epoch
+        order = requests[0] if len(requests) == 2 else None
+        if len(requests) == 1 or (order and order.expected == () and type(order.wire) is bytes):
+            value: Any
+            try:
+                value = self._carry_out(requests[-1], order, since)
+            except tolerated as error:
+                value = error
+            if value is not PENDING:
+                sent = [decode(order, Response((), (), self.now()))] if order else []
+                return [*sent, value]
+        return run_here(self, carry_out_batch(requests, tolerated), None, since)
 
-    def _carry_out(self, request: Request[T]) -> T:
-        """The value of a single request, which is sent at once where it can be."""
+    # -- a single request, without a task ------------------------------------------------------------------------
+
+    def _carry_out(self, request: Request[Any], order: Request[Any] | None, since: int) -> Any:
+        """The value of a request that is sent at once, an order without replies in front of it.
+
+        `PENDING` where it cannot be sent at once; nothing was sent then.
+        """
         if STEPPING.active:
             check_outside()
         if self.link.virtual:
             self.check_thread()
         signals = INTERRUPTS if get_ident() == MAIN else ELSEWHERE
-        since = self.engine.nodes.epoch
         signals.depth += 1  # as `with interrupts()`, written out for speed
         try:
-            self.turn.acquire(request.priority)
+            self.turn.acquire(request.priority if order is None else order.priority)
             try:
-                attempt = self.start(request, None, since)
-                if attempt is not None and (value := self.finish(attempt)) is not PENDING:
-                    return value  # type: ignore[no-any-return]
-                part, tree = self.continue_with(request, attempt, since)
+                attempt = self._start(request, order, since)
+                if attempt is None:
+                    return PENDING
+                value = self._finish(attempt)
+                if value is not PENDING:
+                    return value
+                part = Part(self)
+                tree = part.add(request, since=since)
+                tree.continue_from(attempt)
+                self.hand_over()
             except LinkLost as error:
-                self._lost(error)
+                self.lost(error)
                 raise
             finally:
                 self.turn.release()
@@ -79,13 +100,8 @@ class Bus(BaseBus):
             if signals.pending is not None and not signals.depth:
                 signals.raise_pending()
 
-    # -- a single request, without a task; the caller holds the turn ---------------------------------------------
-
-    def start(self, request: Request[Any], order: Request[Any] | None, since: int) -> Attempt | None:
-        """Send this request at once, an order without replies in front of it; None where it must wait.
-
-        Raises what forbids the request.
-        """
+    def _start(self, request: Request[Any], order: Request[Any] | None, since: int) -> Attempt | None:
+        """Send these at once, or None; the caller holds the turn. Raises what forbids a request without an order."""
         engine, link = self.engine, self.link
         now = link.now()
         if self.watches or not engine.is_free(now):
@@ -98,18 +114,21 @@ class Bus(BaseBus):
             self.hand_over()
             return None
         wire: Any = request.wire
-        if request.effect:
-            if self._reads_first(request):
-                return None
-            engine.check(request, since, since, now)
-        if order is not None:
-            if self._reads_first(order):
-                return None
-            try:
+        try:
+            if request.effect:
+                engine.check(request, since, since, now)
+            if order is not None:
                 engine.check(order, since, since, now)
-            except MotorbusError:  # the general path says so
-                return None
-            engine.begin_order(order, now)
+        except MotorbusError:
+            if order is None:
+                raise
+            return None  # the task says which one is refused
+        if order is not None:
+            if order.priority is Priority.STOP:
+                engine.note_stop(order)
+            first = Attempt(order)
+            engine.begin(first, now)
+            engine.written(first)
             wire = order.wire + wire
         if request.priority is Priority.STOP:
             engine.note_stop(request)
@@ -131,8 +150,8 @@ class Bus(BaseBus):
             engine.written(attempt)
         return attempt
 
-    def finish(self, attempt: Attempt) -> Any:
-        """Wait for the reply to what `start` sent: its value, or `PENDING` where it needs more than one look."""
+    def _finish(self, attempt: Attempt) -> Any:
+        """Wait for the reply to what `_start` sent: its value, or `PENDING` where it needs more than one look."""
         engine, link, request = self.engine, self.link, attempt.request
         if attempt.in_flight:
             chunks = link.read(attempt.deadline)
@@ -157,24 +176,6 @@ class Bus(BaseBus):
             data += b"".join(more)  # type: ignore[arg-type]  # a link gives bytes or frames
         return data
 
-    def continue_with(
-        self, procedure: Runnable[T], attempt: Attempt | None, since: int
-    ) -> tuple[Part, Tree[T]]:
-        """A task for what was not sent at once, or for a request whose attempt has no whole reply yet."""
-        part = Part(self)
-        tree = part.add(procedure, since=since)
-        if attempt is not None:
-            tree.continue_from(attempt)
-            self.hand_over()
-        return part, tree
-
-    def _reads_first(self, request: Request[Any]) -> bool:
-        """Whether the gate must read positions first; the task makes these reads again."""
-        reads = self.required_reads(request) if request.effect in GATED else ()
-        for read in reads:
-            discard(read)
-        return bool(reads)
-
     def defer_signals(self) -> None:
         """Raise signals at the end of a request only, until this bus is closed; see `motorbus.bus.interrupts`."""
         if not self._defers_signals:
@@ -194,11 +195,6 @@ class Bus(BaseBus):
 
     def __exit__(self, *exc: object) -> None:
         self.close()
-
-
-def _may_join(order: Request[Any]) -> bool:
-    """This order may leave in one write with the next request; CAN frames are written one by one."""
-    return order.expected == () and isinstance(order.wire, bytes)
 
 
 async def carry_out_batch(
@@ -225,105 +221,26 @@ def exchange_on(
     batches: Mapping[Bus, Sequence[Request[Any]]], tolerated: tuple[type[Exception], ...] = ()
 ) -> dict[BaseBus, Any]:
     """Carry out a batch on each bus at the same time: the values of each, or its MotorbusError."""
-    check_outside()
+    for requests in batches.values():
+        _check_requests(requests)
+    if len(batches) > 1:
+        return run_on({bus: carry_out_batch(batch, tolerated) for bus, batch in batches.items()})
     found: dict[BaseBus, Any] = {}
-    started: list[_Batch] = []
-    with interrupts():
-        waiting = [_Batch(bus, requests, tolerated) for bus, requests in batches.items()]
+    for bus, batch in batches.items():
         try:
-            for batch in waiting:
-                if batch.send(TURN_TIMEOUT if started else -1.0):
-                    started.append(batch)
-            for batch in started:
-                batch.receive()
-        finally:
-            for batch in waiting:
-                batch.release()
-        run_parts([batch.part for batch in waiting if batch.part is not None], single=True)
-        for batch in waiting:
-            found[batch.bus] = batch.outcome()
+            found[bus] = bus.exchange(batch, tolerated)
+        except MotorbusError as error:
+            found[bus] = error
     return found
 
 
-class _Batch:
-    """A batch on one bus. `part` carries out what could not be sent at once or has no whole reply yet."""
-
-    def __init__(
-        self, bus: Bus, requests: Sequence[Request[Any]], tolerated: tuple[type[Exception], ...]
-    ) -> None:
-        _check_requests(requests)
-        bus.check_thread()
-        self.bus = bus
-        self.requests = requests
-        self.tolerated = tolerated
-        self.since = bus.engine.nodes.epoch
-        self.order = requests[0] if len(requests) == 2 and _may_join(requests[0]) else None
-        self.attempt: Attempt | None = None
-        self.part: Part | None = None
-        self.tree: Tree[Any] | None = None
-        self.value: Any = None
-        self._holds_turn = False
-
-    def send(self, timeout: float) -> bool:
-        """Send it at once, and hold the turn; False where that is not possible."""
-        bus, requests = self.bus, self.requests
-        self._holds_turn = bus.turn.acquire(Priority.CONTROL, timeout)
-        if self._holds_turn and (self.order is not None or len(requests) == 1):
-            try:
-                self.attempt = bus.start(requests[-1], self.order, self.since)
-            except LinkError as error:  # a part of it may have been sent
-                self.value = bus._lost(error) if isinstance(error, LinkLost) else error
-                return False
-            except MotorbusError:  # it is refused: the task says so
-                pass
-        if self.attempt is None:
-            batch = carry_out_batch(requests, self.tolerated)
-            self.part, self.tree = bus.continue_with(batch, None, self.since)
-            self.release()
-        return self.attempt is not None
-
-    def receive(self) -> None:
-        """Wait for the reply; what is more than one complete reply is left to a task."""
-        bus, attempt = self.bus, self.attempt
-        assert attempt is not None
-        try:
-            self.value = bus.finish(attempt)
-        except LinkLost as error:
-            self.value = bus._lost(error)
-        except Exception as error:
-            self.value = error
-        if self.value is PENDING:
-            self.part, self.tree = bus.continue_with(self.requests[-1], attempt, self.since)
-
-    def release(self) -> None:
-        """Give the turn back."""
-        if self._holds_turn:
-            self._holds_turn = False
-            self.bus.turn.release()
-
-    def outcome(self) -> Any:
-        """The values of the requests, or the MotorbusError that is not tolerated. Raises any other error."""
-        value = self.value if self.tree is None else self.tree.outcome()
-        if self.attempt is None:
-            return value
-        if isinstance(value, Exception) and not isinstance(value, self.tolerated):
-            if not isinstance(value, MotorbusError):
-                raise value
-            return value
-        order = self.order
-        if order is None:
-            return [value]
-        answer = Response((), (), self.attempt.sent_at)
-        return [answer if order.decode is None else order.decode(answer), value]
-
-
 def _check_requests(requests: Sequence[Any]) -> None:
-    for one in requests:
-        if not isinstance(one, Request):
-            for other in requests:
-                discard(other)
-            raise RequestError(
-                f"{shown(one)} is not a request",
-                expected="as bus.exchange([write(goals), sync_read_positions(servos)]): single requests, made before",
-                advice="use run() for a procedure; nothing was sent",
-            )
+    wrong = [one for one in requests if not isinstance(one, Request)]
+    if not wrong:
+        return
+    discard(list(requests))
+    raise RequestError(
+        f"{shown(wrong[0])} is not a request",
+        expected="as bus.exchange([write(goals), sync_read_positions(servos)]): single requests, made before",
+        advice="use run() for a procedure; nothing was sent",
+    )

@@ -31,32 +31,32 @@ async def carry_out(engine: Engine, request: Request[Any], attempt: Attempt | No
             tries += 1
             if not _may_repeat(request) or tries > RETRIES:
                 raise _error(engine, request, attempt, tries, sent)
-            engine.statistics.retried(attempt.nodes)
+            for node in attempt.nodes:
+                engine.statistics.of(node).retries += 1
         excluded: tuple[int, ...] = ()
         is_probed = False
         for node in engine.sync.doubtful(request) if must_sync(request) else ():
-            failed, probes = await _resync(engine, request, node)
-            tries += probes
-            if failed is None:
-                is_probed = True
+            if len(request.expected) > 1 and engine.sync.is_put_off(node, await Sleep(0)):  # type: ignore[arg-type]
+                excluded += (node,)  # a group does not wait for a node that was silent lately
                 continue
+            failed, probes = await _resync(engine, node)
+            is_probed = is_probed or failed is None
+            if failed is None:
+                continue
+            tries += probes
             if len(request.expected) == 1:  # type: ignore[arg-type]  # never ANY here
                 raise _error(engine, request, failed, tries, sent)
             excluded += (node,)
         if excluded and len(excluded) == len(request.expected):  # type: ignore[arg-type]
             return Response((), excluded, await Sleep(0))
-        attempt = await Attempt(request, excluded=excluded, is_probed=is_probed)
+        step = Attempt(request, excluded=excluded)
+        step.is_probed = is_probed
+        attempt = await step
         if attempt is None:  # a node came out of sync before it left
             tries += 1
             if tries > RETRIES:
-                raise _error(engine, request, _doubted(request), tries, sent)
-
-
-def _doubted(request: Request[Any]) -> Attempt:
-    """The failed attempt of a request that never left: data that were not expected came before it, each time."""
-    attempt = Attempt(request)
-    attempt.fault = "surplus"
-    return attempt
+                step.fault = "surplus"  # data that were not expected came before it, each time
+                raise _error(engine, request, step, tries, sent)
 
 
 def _may_repeat(request: Request[Any]) -> bool:
@@ -69,26 +69,19 @@ def _may_repeat(request: Request[Any]) -> bool:
     )
 
 
-async def _resync(engine: Engine, request: Request[Any], node: int) -> tuple[Attempt | None, int]:
-    """Wait for the quiet time and probe this node.
-
-    Gives the probe that failed, None when the node is in sync, and how many. A group does not wait for a node that was
-    silent lately.
-    """
+async def _resync(engine: Engine, node: int) -> tuple[Attempt | None, int]:
+    """Wait for the quiet time and probe this node: the probe that failed, None when it is in sync, and how many."""
     state, tries = engine.sync.of(node), 0
-    if len(request.expected) > 1 and engine.sync.is_put_off(node, await Sleep(0)):  # type: ignore[arg-type]
-        return Attempt(request), 0
     for tries in range(1, RETRIES + 2):
-        while (
-            pause := state.quiet_until - await Sleep(0)
-        ) > 0:  # another request may have moved it meanwhile
+        # Another request may have moved the quiet time, or probed the node, while this one slept.
+        while (pause := state.quiet_until - await Sleep(0)) > 0:
             await Sleep(pause)
-        if node not in engine.sync.out_of_sync:  # another request has probed it meanwhile
-            return None, tries - 1
+        if node not in engine.sync.out_of_sync:
+            return None, tries
         attempt = await Attempt(engine.sync.next_probe(node), is_probe=True)
         assert attempt is not None
         if not attempt.fault:
-            return None, 0
+            return None, tries
         if attempt.fault == "silence":
             break
     engine.sync.back_off(node, await Sleep(0), engine.quiet_time)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Collection, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from math import inf
 from queue import Empty, SimpleQueue
 from typing import Any, Final, TypeVar
@@ -12,6 +14,7 @@ from typing import Any, Final, TypeVar
 from motorbus.bus.base import IDLE, BaseBus, check_clocks
 from motorbus.bus.interrupts import interrupts
 from motorbus.bus.tasks import Notify, Tree, starting
+from motorbus.core.request import Request
 from motorbus.core.steps import Runnable
 from motorbus.link.stream import wait_any
 
@@ -25,13 +28,13 @@ TURN_TIMEOUT: Final = 0.002
 """Longest wait (s) for the turn of a bus while holding another's: two threads never block each other."""
 
 
-def run_here(bus: BaseBus, procedure: Runnable[T], report: Notify | None = None) -> T:
-    """Run a procedure in this thread."""
+def run_here(bus: BaseBus, procedure: Runnable[T], report: Notify | None = None, since: int = -1) -> T:
+    """Run a procedure in this thread; it was called at epoch `since`, -1: now."""
     with interrupts():
         with starting(procedure):
             part = Part(bus)
-            tree = part.add(procedure, report)
-        run_parts([part])
+            tree = part.add(procedure, report, since)
+        run_parts([part], single=isinstance(procedure, Request))
         return tree.result()
 
 
@@ -52,24 +55,20 @@ def run_on(procedures: Mapping[Any, Runnable[Any]]) -> dict[BaseBus, Any]:
 class Part:
     """The procedures of this thread on one bus. `blocked`: another thread had the turn of the bus.
 
-    `sends_at` is when (s) more may be sent. `cancellations` are thrown into the trees when this thread has the turn.
-    `calls` are those of a worker, `inbox` its next ones. An entry of `wakes` ends a sleep.
+    `sends_at` is when (s) more may be sent. `orders` are carried out when this thread has the turn. An entry of
+    `wakes` ends a sleep.
     """
 
-    def __init__(
-        self, bus: BaseBus, inbox: Collection[Any] = (), wakes: SimpleQueue[None] | None = None
-    ) -> None:
+    def __init__(self, bus: BaseBus, wakes: SimpleQueue[None] | None = None) -> None:
         bus.check_thread()
         self.bus = bus
-        self.inbox = inbox
         self.wakes: SimpleQueue[None] = wakes or SimpleQueue()
-        self.calls: Sequence[Any] = ()
         self.trees: list[Tree[Any]] = []
         self.finished = True
         """Every procedure had ended after the last `advance`."""
         self.holds_turn = self.blocked = False
         self.sends_at = inf
-        self.cancellations: list[BaseException] = []
+        self.orders: deque[Callable[[], None]] = deque()
 
     def add(self, procedure: Runnable[T], report: Notify | None = None, since: int = -1) -> Tree[T]:
         """Run this procedure, too."""
@@ -100,12 +99,8 @@ class Part:
         self.blocked = not self.holds_turn
         if self.blocked:
             return False
-        while self.cancellations:
-            error = self.cancellations.pop(0)
-            for tree in self.trees:
-                tree.cancel(error)
-        for call in self.calls:
-            call.end_as_requested()
+        while self.orders:
+            self.orders.popleft()()
         stepped = self._stepped
         while True:
             for tree in stepped:
@@ -123,6 +118,16 @@ class Part:
         """Its procedures, and what watches the bus in virtual time."""
         return [*self.trees, *self.bus.watches] if self.bus.watches else self.trees
 
+    def cancel(self, error: BaseException) -> None:
+        """Throw this into every procedure; the caller has the turn."""
+        for tree in self.trees:
+            tree.cancel(error)
+
+    @property
+    def waits_for_stop(self) -> bool:
+        """An emergency stop in another thread needs the turn, and nothing is in flight."""
+        return self.bus.engine.stopping and not self.bus.engine.in_flight
+
     @property
     def is_idle(self) -> bool:
         """Nothing is in flight, and nothing of it may be sent: it sleeps, or another thread has exclusive use."""
@@ -136,7 +141,7 @@ class Part:
         if not self.holds_turn:
             return
         listens = self.bus.engine.notification_handlers and not self.bus.turn.wanted
-        if self.finished or self.bus.waits_for_stop or (not listens and self.is_idle):
+        if self.finished or self.waits_for_stop or (not listens and self.is_idle):
             self.holds_turn = False
             self.bus.turn.release()
 
@@ -150,7 +155,7 @@ class Part:
         if self.holds_turn:
             listens = self.is_idle and bus.engine.notification_handlers and not bus.link.virtual
             bus.receive(min(moment, bus.link.now() + LISTEN_TIME) if listens else moment, self._stepped)
-        elif not bus.waits_for_stop:
+        elif not self.waits_for_stop:
             self._sleep(min(moment - bus.link.now(), self.longest_sleep))
 
     @property
@@ -160,16 +165,9 @@ class Part:
 
     def _sleep(self, seconds: float) -> None:
         """Sleep this long, or until something that a tree waits for has ended."""
-        if not self._can_advance():
+        if not self.orders and not any(tree.ready for tree in self.trees):
             with contextlib.suppress(Empty):
                 self.wakes.get(timeout=max(0.0, seconds))
-
-    def _can_advance(self) -> bool:
-        return (
-            bool(self.inbox or self.cancellations)
-            or any(tree.ready for tree in self.trees)
-            or any(call.cancellations for call in self.calls)
-        )
 
 
 def run_parts(parts: Sequence[Part], *, single: bool = False) -> None:
@@ -191,7 +189,7 @@ def run_parts(parts: Sequence[Part], *, single: bool = False) -> None:
                 wait_for(going)
             except BaseException as error:
                 for part in parts:
-                    part.cancellations.append(error)
+                    part.orders.append(partial(part.cancel, error))
             finally:
                 signals.waiting = False
     finally:
@@ -212,12 +210,11 @@ def _advance(parts: Sequence[Part]) -> list[Part]:
         holds_another = len(parts) > 1 and any(other.holds_turn for other in parts if other is not part)
         if not part.advance(TURN_TIMEOUT if holds_another else -1.0):
             going.append(part)
-    for part in parts:
-        for tree in part.trees:
-            if tree.finished and (error := tree.foreign_error()) is not None and going:
-                raise error
+    for tree in [tree for part in parts for tree in part.trees] if going else ():
+        if tree.finished and (error := tree.foreign_error()) is not None:
+            raise error
     for part in going:
-        if part.bus.waits_for_stop or not part.bus.link.virtual:
+        if part.waits_for_stop or not part.bus.link.virtual:
             part.release_turn()
     return going
 

@@ -15,6 +15,9 @@ from motorbus.core.request import ANY, Expected, Key, Request
 
 PROBES: Final = 64
 """Probes compared with what a node owes, to find one that differs."""
+BACK_OFF: Final = 0.25
+"""A silent node of a group is probed again after this part of its silence: twice at least before a control loop, which
+ends after 0.3 s without a position, gives it up."""
 LONGEST_BACK_OFF: Final = 1.0
 """s between probes of a silent node of a group."""
 
@@ -51,17 +54,13 @@ MOVES: Final = {
 class NodeSync:
     """One node: what it owes (the oldest first), and when (s) it may be asked.
 
-    `silences` are probes in a row without an answer; a group does not wait for the node before `probe_at`.
+    Its first probe without an answer was at `silent_since`; a group does not wait for it before `probe_at`.
     """
-
-    __slots__ = ("owed", "probe_at", "probes", "quiet_until", "silences", "state")
 
     def __init__(self) -> None:
         self.state = IN_SYNC
         self.owed: dict[Kind, None] = {}
-        self.quiet_until = 0.0
-        self.silences = 0
-        self.probe_at = 0.0
+        self.quiet_until = self.silent_since = self.probe_at = 0.0
         self.probes = 0
 
 
@@ -91,7 +90,7 @@ class SyncTable:
         if node.state is IN_SYNC:
             self.out_of_sync.discard(number)
             node.owed.clear()
-            node.silences = 0
+            node.silent_since = node.probe_at = 0.0
         else:
             self.out_of_sync.add(number)
         return node
@@ -114,7 +113,7 @@ class SyncTable:
         """The port was lost and is back: what any node owes may still come."""
         for number in self.nodes:
             node = self._fire(number, "doubted")
-            node.quiet_until, node.silences = quiet_until, 0
+            node.quiet_until, node.silent_since, node.probe_at = quiet_until, 0.0, 0.0
 
     def confirm(self, number: int, *, probe: bool) -> None:
         """A reply of this node was accepted. A node that owes others is in sync again only after a probe."""
@@ -134,31 +133,30 @@ class SyncTable:
         """A probe of this node whose reply it does not owe; where it owes all of them, the longest owed."""
         node = self.of(number)
         owed: dict[Kind, Request[bool]] = {}
-        first: Request[bool] | None = None
-        for _ in range(PROBES):
+        wires: set[object] = set()
+        while len(wires) < PROBES:
             probe = self.driver.probe(number, node.probes)
-            first = first or probe
-            if owed and probe.wire == first.wire:  # all probes of the family were compared
+            if probe.wire in wires:  # all probes of the family were compared
                 break
+            wires.add(probe.wire)
             node.probes += 1
             kind = kind_of(probe)
             if kind not in node.owed:
                 return probe
-            if kind not in owed:
-                owed[kind] = probe
+            owed[kind] = probe
         return next(owed[kind] for kind in node.owed if kind in owed)
 
     def back_off(self, number: int, now: float, quiet: float) -> None:
         """A probe was not answered: probe this node less often while groups are read."""
         node = self.of(number)
-        node.silences += 1
         node.quiet_until = now
-        node.probe_at = now + min(quiet * 2.0 ** min(node.silences, 10), LONGEST_BACK_OFF)
+        node.silent_since = node.silent_since or now
+        pause = max(2 * quiet, BACK_OFF * (now - node.silent_since))
+        node.probe_at = now + min(pause, LONGEST_BACK_OFF)
 
     def is_put_off(self, number: int, now: float) -> bool:
         """A group does not wait for this node now: it was silent lately."""
-        node = self.nodes[number]
-        return bool(node.silences) and now < node.probe_at
+        return now < self.nodes[number].probe_at
 
 
 def kind_of(probe: Request[bool]) -> Kind:

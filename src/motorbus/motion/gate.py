@@ -223,10 +223,6 @@ class SafetyGate:
                 advice="write the goals again",
             )
 
-    def required_reads(self, request: Request[Any]) -> tuple[()]:
-        """Nothing: who moves reads first, and a goal without a fresh position is refused."""
-        return ()
-
     def update(self, axis: AxisStatus) -> None:
         """Take the last position that the bus has read, once."""
         reading = self._bus.positions.get(axis.node)
