@@ -17,7 +17,7 @@ help:
 	@echo "make soak    the long runs; their figures are printed"
 	@echo "make bench   side by side with other libraries"
 	@echo "make docs    the documentation, into build/site"
-	@echo "make lock    resolve the dependencies anew (needs the network)"
+	@echo "make lock    resolve the dependencies again (needs the network)"
 	@echo "make clean   remove all that these verbs have made"
 
 demo: $(READY)

@@ -1,7 +1,7 @@
 """Simulated servos on a pseudo-terminal, with exact books: `python -m bench.device FAMILY BOOKS`.
 
 FEETECH servos, or KST servos behind an slcan adapter. Each read finds a servo at another position, so a value of an
-earlier read is recognised. A late reply comes when the next request is heard, before that one's own.
+earlier read is recognised. A late reply comes when the next request arrives, before that one's own.
 Prints the path of the terminal; ends when standard input does.
 """
 
@@ -54,11 +54,11 @@ class Device:
 
     def next_position(self, node: int) -> int:
         """Count a read; the position that it finds."""
-        self.books.heard[node] += 1
-        return position(self.family, node, self.books.heard[node])
+        self.books.received[node] += 1
+        return position(self.family, node, self.books.received[node])
 
     def or_late(self, reply: bytes) -> bytes:
-        """This reply, or nothing where it is late: then it is overdue when the next request is heard."""
+        """This reply, or nothing where it is late: then it is overdue when the next request arrives."""
         if self.books.late[0] and self.random.random() < LATE_SHARE:
             self.held = reply
             return b""

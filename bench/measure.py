@@ -11,7 +11,7 @@ from typing import Any
 
 from bench.workloads import GROUP_READ, GROUP_WRITE, LATE, NODES, READ, Books, position
 
-UNHEARD = 8
+MAX_PENDING = 8
 """Group writes that may be on their way to the device."""
 
 
@@ -56,7 +56,7 @@ class Course:
             return self._write(calls)
         nodes = NODES if workload == GROUP_READ else NODES[:1]
         call = self.contender.read_group if workload == GROUP_READ else self.contender.read
-        before = {node: self.books.heard[node] for node in nodes}
+        before = {node: self.books.received[node] for node in nodes}
         values, errors = [], 0
         begun = process_time()
         for _ in range(calls):
@@ -74,7 +74,7 @@ class Course:
 
     def _count_wrong(self, node: int, values: Sequence[int], at: int) -> int:
         """Values that the servo did not have at a later read than the value before."""
-        wrong, last = 0, self.books.heard[node]
+        wrong, last = 0, self.books.received[node]
         for value in values:
             due = (n for n in range(at + 1, last + 1) if position(self.contender.family, node, n) == value)
             found = next(due, None)
@@ -85,11 +85,11 @@ class Course:
     def _write(self, calls: int) -> dict[str, Any]:
         """A goal that does not arrive counts as wrong."""
         used, wrong = 0.0, 0
-        for start in range(0, calls, UNHEARD):
+        for start in range(0, calls, MAX_PENDING):
             before = [self.books.goals[node] for node in NODES]
             chosen = [
                 [1024 + (7 * number + 311 * node) % 2048 for node in NODES]
-                for number in range(start, min(start + UNHEARD, calls))
+                for number in range(start, min(start + MAX_PENDING, calls))
             ]
             prepared = [self.contender.prepare(goals) for goals in chosen]
             begun = process_time()
@@ -108,11 +108,11 @@ class Course:
         return arrived == sums
 
     def _read_late(self, calls: int) -> dict[str, Any]:
-        """A value is wrong if the servo did not have it at a read heard during the call."""
+        """A value is wrong if the servo did not have it at a read received during the call."""
         self.books.late[0] = 1
         wrong = errors = 0
         for _ in range(calls):
-            before = self.books.heard[1]
+            before = self.books.received[1]
             try:
                 (value,) = self.contender.to_counts(self.contender.read())
             except Exception:

@@ -16,9 +16,9 @@ LATE_SHARE = 0.01
 BITRATE = 500_000
 
 
-def position(family: str, node: int, heard: int) -> int:
-    """Position of a simulated servo after `heard` reads, in raw counts."""
-    at = (377 * node + 7 * heard) % SPANS[family]
+def position(family: str, node: int, received: int) -> int:
+    """Position of a simulated servo after `received` reads, in raw counts."""
+    at = (377 * node + 7 * received) % SPANS[family]
     return at - 900 if family == "kst" else at
 
 
@@ -31,7 +31,7 @@ def packet(node: int, code: int, parameters: bytes | bytearray = b"") -> bytes:
 class Books:
     """Counters in a file that the device writes and the measured process reads.
 
-    `heard`  by node: reads that the device has heard
+    `received`  by node: reads that the device has received
     `goals`  by node: sum of the goals that arrived
     `late`   one number: not 0 if some replies are to be late
     """
@@ -42,4 +42,4 @@ class Books:
             file.write_bytes(bytes(size))
         with file.open("r+b") as opened:
             counts = memoryview(mmap.mmap(opened.fileno(), size)).cast("q")
-        self.heard, self.goals, self.late = counts[:256], counts[256:512], counts[512:]
+        self.received, self.goals, self.late = counts[:256], counts[256:512], counts[512:]

@@ -1,4 +1,4 @@
-"""The same machine from asyncio: every verb is awaited, and the program goes on with other things meanwhile."""
+"""The same machine from asyncio: each method is awaited, so other tasks can run meanwhile."""
 
 from __future__ import annotations
 

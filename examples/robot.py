@@ -20,8 +20,8 @@ def main(path: str | Path = HERE) -> None:
         robot.set_position("slide", 0.0)  # it reports no position: a person has seen it there, or home it
         moved = robot.move({"shoulder": -0.3, "pan": 0.2, "slide": 0.02}, duration=1.0)
         print(moved)
-        for name, axis in moved.axes.items():
-            print(f"{name} at {axis.position:.3f}{', estimated' if axis.estimated else ''}")
+        for name, end in moved.axes.items():
+            print(f"{name} at {end.position:.3f}{', estimated' if end.estimated else ''}")
 
 
 if __name__ == "__main__":

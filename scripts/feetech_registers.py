@@ -152,7 +152,7 @@ def _alarms() -> Iterator[str]:
 
 def _phase() -> Iterator[str]:
     yield "## Phase byte\n"
-    yield "Register 18; what is said holds when the bit is set. It belongs to one servo and is never copied.\n"
+    yield "Register 18; the meaning of each bit that is set. It belongs to one servo and is never copied.\n"
     yield from _bits(PHASE_BITS)
 
 

@@ -16,7 +16,7 @@ from motorbus.core.request import Effect
 from motorbus.families.kst.profiles import PROFILES, RATES
 from motorbus.families.kst.sdo import ABORTS
 from motorbus.families.kst.simulator import OPTIONS
-from scripts.pages import kept, listed
+from scripts.pages import assumptions, kept, listed
 
 PAGE: Final = Path(__file__).resolve().parent.parent / "docs" / "reference" / "kst.md"
 FAMILY: Final = PAGE.parents[2] / "src" / "motorbus" / "families" / "kst"
@@ -209,28 +209,7 @@ def _assumptions() -> Iterator[str]:
             rows.append((name, f"{one.help}.{values}<br>Source: {one.source}."))
     yield from listed(("option", "meaning"), rows)
     yield "\nConstants that no source states:\n"
-    yield from listed(("where", "assumed"), list(_constants()))
-
-
-def _constants() -> Iterator[tuple[str, str]]:
-    """The file and the text of each line that the family marks as an assumption."""
-    for file in sorted(FAMILY.rglob("*.py")):
-        before = ""
-        for line in file.read_text(encoding="utf-8").splitlines():
-            if line.rstrip('"').endswith("# assumption"):
-                code, _, text = (
-                    line.strip().removesuffix('"""').removesuffix("# assumption").partition("  # ")
-                )
-                constant = (before if code.startswith('"""') and ": Final" in before else code).partition(
-                    ": Final"
-                )
-                name = f"`{constant[0].strip()}{constant[2]}`: " if constant[1] else ""
-                words = text or code.strip('"')
-                yield (
-                    f"`{file.relative_to(FAMILY)}`",
-                    (name + words).strip().rstrip(".").replace("|", "/") + ".",
-                )
-            before = line.strip()
+    yield from listed(("where", "assumed"), list(assumptions(FAMILY)))
 
 
 def main() -> int:

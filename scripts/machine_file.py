@@ -7,16 +7,14 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
-
-from msgspec import NODEFAULT, Struct, structs
+from typing import Any, Final, get_args, get_type_hints
 
 from motorbus.core import units
 from motorbus.motion import machine
-from motorbus.motion.machine import AxisConfig, BusConfig, Quantity
-from motorbus.motion.machine_edit import description_of, schema, split_hint
+from motorbus.motion.machine import AxisConfig, Quantity
+from motorbus.motion.machine_edit import schema
 from scripts.pages import kept, listed
 
 ROOT: Final = Path(__file__).resolve().parent.parent
@@ -36,36 +34,36 @@ def page() -> str:
 
 def _tables() -> Iterator[str]:
     columns = ("key", "meaning", "is", "default")
-    yield FIRST
-    yield from listed(columns, _rows(BusConfig))
-    yield "## `[axis.NAME]`\n"
-    yield from listed(columns, _rows(AxisConfig))
+    definitions = schema()["$defs"]
+    for title, name in (("bus", "BusConfig"), ("axis", "AxisConfig")):
+        yield f"## `[{title}.NAME]`\n"
+        yield from listed(columns, _rows(definitions[name]))
     yield "## Units\n"
     kinds = [kind for quantity in QUANTITIES for kind in quantity.kinds]
     yield from listed(("quantity", "units"), [[kind, ", ".join(units.SCALES[kind])] for kind in kinds])
 
 
-def _rows(kind: type[Struct]) -> Iterator[list[str]]:
-    hints = get_type_hints(kind, include_extras=True)
-    for field in structs.fields(kind):
-        hint = hints[field.name]
-        default = "needed" if field.default is NODEFAULT else _default(field.default)
-        yield [f"`{field.name}`", description_of(hint), _type(hint), default]
+def _rows(definition: Mapping[str, Any]) -> Iterator[list[str]]:
+    hints = get_type_hints(AxisConfig)
+    for key, value in definition["properties"].items():
+        default = "needed" if key in definition["required"] else json.dumps(value.get("default"))
+        yield [
+            f"`{key}`",
+            value.get("description", ""),
+            _type(value, hints.get(key)),
+            f"`{default}`" if default not in ("needed", "null") else default.removeprefix("null"),
+        ]
 
 
-def _default(value: object) -> str:
-    if value is None:
-        return ""
-    return f"`{json.dumps('0 deg' if isinstance(value, Quantity) else value)}`"
-
-
-def _type(hint: Any) -> str:
-    kind, _ = split_hint(hint)
-    if get_origin(kind) is Literal:
-        return " or ".join(f"`{json.dumps(word)}`" for word in get_args(kind))
-    if issubclass(kind, Quantity):
-        return " or ".join([*kind.kinds, *(["raw counts"] if kind.counts else [])])
-    return {float: "number", bool: "`true` or `false`", str: "text"}[kind]
+def _type(value: Mapping[str, Any], hint: Any) -> str:
+    kinds = [one for one in (hint, *get_args(hint)) if isinstance(one, type) and issubclass(one, Quantity)]
+    if kinds:
+        return " or ".join(kinds[0].kinds)
+    if "anyOf" in value:
+        value = next(one for one in value["anyOf"] if one.get("type") != "null")
+    if "enum" in value:
+        return " or ".join(f"`{json.dumps(word)}`" for word in value["enum"] if word is not None)
+    return {"number": "number", "boolean": "`true` or `false`", "string": "text"}[value["type"]]
 
 
 def main() -> int:

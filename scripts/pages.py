@@ -1,4 +1,4 @@
-"""What the scripts that make pages share: tables in Markdown, and writing a page or seeing that it is current."""
+"""Shared by the scripts that make pages: tables in Markdown, and writing a page or checking that it is current."""
 
 from __future__ import annotations
 
@@ -27,13 +27,19 @@ def kept(wanted: Mapping[Path, str]) -> int:
 
 
 def assumptions(folder: Path) -> Iterator[tuple[str, str]]:
-    """The file and the text of each comment below this folder that ends with `# assumption`."""
+    """The file and the text of each comment and docstring below this folder that ends with `# assumption`."""
     for file in sorted(folder.rglob("*.py")):
-        for line in file.read_text(encoding="utf-8").splitlines():
-            code, mark, rest = line.strip().partition("# assumption")
-            if not mark or rest:
-                continue
-            code, _, text = code.rpartition("# ")
-            name, constant, value = code.partition(": Final")
-            shown = f"`{name}{value.rstrip()}`: " if constant else ""
-            yield f"`{file.relative_to(folder)}`", f"{shown}{text.strip()}."
+        before = ""
+        for line in map(str.strip, file.read_text(encoding="utf-8").splitlines()):
+            text, mark, rest = line.partition("# assumption")
+            if mark and rest in ("", '"""'):
+                code = before
+                if not rest:
+                    code, _, text = text.rpartition("# ")
+                name, constant, value = code.partition(": Final")
+                shown = f"`{name}{value.rstrip()}`: " if constant else ""
+                yield (
+                    f"`{file.relative_to(folder)}`",
+                    shown + text.strip('" ').rstrip(".").replace("|", "/") + ".",
+                )
+            before = line

@@ -1,7 +1,7 @@
 """Install each library of peers.txt into a folder of its own, `.peers/NAME`.
 
-Two of them bring a module of the same name and none may lend ours a dependency, so they never share a folder.
-What cannot be had is said plainly; the tests that need it then fail, they do not pass in silence.
+Two of them have a module of the same name, so no two share a folder.
+What cannot be installed is reported; the tests that need it then fail, they do not pass in silence.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""How much of each test is run: all but the long ones, the long ones (`--soak`), or a quick few (`--quick`).
+"""Which tests run: all but the long ones, the long ones (`--soak`), or a quick few (`--quick`).
 
-A test that counts asks the fixture `rounds` how often; so the same test runs 3 000 times in `make test`, its full
-count in `make soak` and a hundred times on the other interpreters. Here is too what makes all of them together quick.
+A test that counts asks the fixture `rounds` how often: 3,000 times in `make test`, its full count in `make soak`, a
+hundred times on other interpreters.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import gc
 import os
 import signal
 from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 from typing import Protocol
 
@@ -18,14 +17,12 @@ import pytest
 from hypothesis import settings
 
 from motorbus.link import usb_adapters
-from tests.net import NET, ROOT
 
 HERE = Path(__file__).parent
 USUAL_ROUNDS = 3_000
 QUICK_ROUNDS = 100
 LONG_RUN = 3_600
-"""s that a long run may last that does not say otherwise; it ends a hang, and a slow machine is none."""
-# The golden traces pass through every command of every family.
+"""s; limit of a long run."""
 QUICK_FOLDERS = ("core", "bus", "golden")
 
 settings.register_profile("test", deadline=None, derandomize=True, max_examples=50, print_blob=True)
@@ -60,10 +57,7 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     wanted = {"soak": _is_soak, "quick": _is_quick, "test": _is_usual}[_profile(config)]
-    in_net = cache(_is_in_net)
     for item in items:
-        if in_net(item.path):
-            item.add_marker("net")
         if "rounds" in getattr(item, "fixturenames", ()) and _profile(config) == "soak":
             item.add_marker("soak")
     config.hook.pytest_deselected(items=[item for item in items if not wanted(item)])
@@ -72,18 +66,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """`-n auto`: two for each core, since tests of real ports and processes mostly wait."""
+    """`-n auto`: two for each core; tests of real ports and processes mostly wait."""
     return 2 * (os.cpu_count() or 1)
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """Tens of thousands of tests stay until the end; the collector need not go through them again and again."""
+    """The tests stay until the end; the collector need not visit them."""
     gc.collect()
     gc.freeze()
-
-
-def _is_in_net(path: Path) -> bool:
-    return any(path.is_relative_to(ROOT / part) for part in NET)
 
 
 def _is_soak(item: pytest.Item) -> bool:
@@ -134,14 +124,14 @@ def rounds(pytestconfig: pytest.Config) -> Rounds:
 
 
 class Figures(Protocol):
-    """Tells the figures of a run: what it was, then numbers and short words by name."""
+    """Prints the figures of a run: what it was, then numbers and short words by name."""
 
     def __call__(self, what: str, *, family: str = "", **figures: int | float | str) -> None: ...
 
 
 @pytest.fixture
 def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whoever answers in a process of its own may wait for a processor; costs nothing where all answer undisturbed."""
+    """Give a simulator in another process 1 s for its reply; it may wait for a processor."""
     monkeypatch.setattr(usb_adapters, "TERMINAL_LATENCY", 1.0)
 
 

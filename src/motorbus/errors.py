@@ -1,4 +1,4 @@
-"""What can go wrong, told so that the reader knows whose fault it is and what to do next.
+"""The errors of motorbus.
 
     MotorbusError
     ├── LinkError            the port: cannot open, busy, lost                    (also OSError)
@@ -10,12 +10,12 @@
     ├── WireError            bytes came that are not an answer; they are attached
     │   ├── FramingError     no frame could be made of them
     │   ├── ChecksumError    a frame, but its checksum is wrong
-    │   └── UnexpectedReply  a good frame that nobody asked for (echo, foreign, wrong content)
+    │   └── UnexpectedReply  a good frame that answers no request (echo, foreign, wrong content)
     ├── NoReply              nothing valid came in time                           (also TimeoutError)
-    ├── DeviceError          it answered and said no: `node`, `code`, `register`
+    ├── DeviceError          the device answered and refused: `node`, `code`, `register`
     ├── RequestError         the caller asked for something impossible            (also ValueError)
     ├── MotionError          motion refused or ended early
-    │   ├── Refused          what it would be judged by is stale or doubtful, or nobody may move now: `reason`
+    │   ├── Refused          the position is old or doubtful, or the axis must not move now: `reason`
     │   │   └── LimitExceeded    the goal lies outside the limits, or the limits are unknown
     │   ├── NotHomed         the reference is not known
     │   ├── Stalled          it stopped moving before it was there
@@ -25,8 +25,8 @@
     ├── VerificationFailed   written, read back, and different
     └── OutcomeUnknown       sent, and whether it took effect cannot be known
 
-Every message has up to five parts: what happened, what was sent, what came back, what was expected, the
-likely cause and what to do. The parts are attributes too, so a program need not read prose.
+A message has a summary, and what was sent, received and expected, the likely cause and what to do, where they are
+known. The parts are attributes too.
 """
 
 from __future__ import annotations
@@ -36,10 +36,9 @@ class MotorbusError(Exception):
     """Base of every error of this package. `summary` is one line; the other parts may be empty."""
 
     unmoved = False
-    """True where it is certain that nothing has moved for what was asked; False: it may have, or nobody said."""
+    """True where it is certain that nothing has moved; False: it may have."""
     so_far: object = None
-    """What there was by then of the result that was asked for, where that is of use: the trajectory that `teach` has
-    seen. None where there is nothing."""
+    """The part of the result that exists, as the trajectory that `teach` has recorded; None without one."""
 
     def __init__(
         self,
@@ -62,15 +61,15 @@ class MotorbusError(Exception):
 
     @property
     def summary(self) -> str:
-        """What happened, in one line; whoever knows more of where it was may say it anew."""
+        """What happened, in one line."""
         return str(self.args[0])
 
     @summary.setter
-    def summary(self, told: str) -> None:
-        self.args = (told,)
+    def summary(self, text: str) -> None:
+        self.args = (text,)
 
     def parts(self) -> list[tuple[str, str]]:
-        """What there is beside the summary, each with its name: what was sent, what came, and so on."""
+        """The known parts after the summary, each with its name."""
         parts = (
             ("sent", _shown(self.sent)),
             ("received", _shown(self.received)),
@@ -113,7 +112,7 @@ class LinkLost(LinkError):
 
 
 class AnotherAdapter(LinkLost):
-    """The port is gone, and another adapter has its name. Nothing was said to that one."""
+    """The port is gone, and another adapter has its name. Nothing was sent to it."""
 
 
 class WireError(MotorbusError):
@@ -156,10 +155,10 @@ class MotionError(MotorbusError):
 
 
 class Refused(MotionError):
-    """Motion was refused before anything was sent: `reason` is one word for programs.
+    """Motion was refused before anything was sent.
 
-    "limits", "step" (too far from where it is), "velocity" (too far without one), "stale" or "suspect" (of the position
-    by which it would be judged), "fault", "lease" or "unattended".
+    `reason`: "limits", "step" (too far from the present position), "velocity", "stale" or "suspect" (position),
+    "fault", "lease" or "unattended".
     """
 
     unmoved = True
@@ -172,7 +171,7 @@ class Refused(MotionError):
 class LimitExceeded(Refused):
     """The goal lies outside the limits, is not finite, or no limits are known. Nothing was sent.
 
-    `at` is when (s from the beginning) a trajectory goes beyond them first, where it is one that does.
+    `at`: the first time (s from the beginning) at which a trajectory leaves the limits; None otherwise.
     """
 
     at: float | None = None
@@ -201,7 +200,7 @@ class Faulted(MotionError):
 
 
 class Overloaded(MotionError):
-    """Its motor pushed too hard for too long without coming to its goal, or is too hot: `reason`, "load" or "heat"."""
+    """Its motor pushed too hard for too long, off its goal, or is too hot: `reason` is "load" or "heat"."""
 
     def __init__(self, summary: str, *, reason: str = "", **parts: object) -> None:
         super().__init__(summary, **parts)  # type: ignore[arg-type]
@@ -221,7 +220,7 @@ class OutcomeUnknown(MotorbusError):
 
 
 def unread(why: MotorbusError, *, node: int, what: str = "the write") -> OutcomeUnknown:
-    """The error for what has left and could not be read back: nobody tells what became of it, and `why` says why."""
+    """The error for a request that was sent and could not be read back; `why` is the cause."""
     return OutcomeUnknown(
         f"{why.summary}; whether {what} took effect is not known",
         sent=why.sent,

@@ -133,7 +133,7 @@ class Engine:
         self.wire = Wire()
         self.driver = FAMILIES[family].open()
         self.link = MemoryLink(self.wire, rate=self.driver.family.link.rate)
-        self.link.listen_only = listen_only
+        self.link.__dict__["listen_only"] = listen_only
         self.calls: dict[str, Any] = {}
         self.bus = self.open(check, latency)
         self.wire.echoes = echo

@@ -70,7 +70,7 @@ class Responder:
     def due(self) -> float | None:
         return min((at for at, _ in self._out), default=None)
 
-    def tune(self, rate: int, listen_only: bool = False) -> None:
+    def tune(self, rate: int) -> None:
         self.rate = rate
 
 

@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.core.can_frame import CanFrame
 from motorbus.core.steps import (
     Emit,
     Exclusive,
@@ -19,7 +18,6 @@ from motorbus.core.steps import (
     Progress,
     SetBitrate,
     Sleep,
-    WaitFor,
     catch,
     gather,
     with_cleanup,
@@ -185,40 +183,22 @@ def test_what_a_clean_up_failed_with_goes_with_the_cancellation_once(engine: Eng
     assert engine.result("a").__notes__ == ["it may turn", "so may this"]
 
 
-def test_while_a_bus_only_listens_requests_are_refused_and_notifications_received(can: Engine) -> None:
-    async def listen() -> list[Any]:
-        await SetBitrate(125_000, listen_only=True)
-        refused = await catch(can_read(1))
-        notice = await WaitFor(lambda one: one.node == 5, 0.1)
-        before = await SetBitrate(500_000)
-        return [refused, notice, before, await can_read(1)]
-
-    can.submit("a", listen())
-    can.deliver(CanFrame(0x585, b"\x64\0\0\0"))
-    can.advance(0.1)
-    refused, notice, before, value = can.result("a")
-    assert isinstance(refused, RequestError)
-    assert notice.kind == "report"
-    assert (before, value) == (125_000, 100)
-    assert len(can.sent()) == 1
-
-
 def test_a_rate_that_the_link_refuses_fails_the_change_only(
     can: Engine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(rate: int, listen_only: bool = False) -> None:
+    def refuse(rate: int) -> None:
         raise LinkError("this adapter cannot")
 
     monkeypatch.setattr(can.link, "tune", refuse)
     with pytest.raises(LinkError, match="cannot"):
-        can.run(SetBitrate(125_000, listen_only=True))
+        can.run(SetBitrate(125_000))
     assert can.bus.rate == 500_000
     assert can.run(can_read(1)) == 100
 
 
 def test_a_stop_is_sent_at_the_rate_at_which_nodes_answered(can: Engine) -> None:
     can.run(can_read(1, reports_position=True))
-    can.run(SetBitrate(125_000, listen_only=True))
+    can.run(SetBitrate(125_000))
     assert can.estop().acknowledged == (1,)
     assert can.bus.rate == can.wire.rate == 500_000
 

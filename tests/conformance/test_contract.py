@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import inspect
 import sys
 from functools import cache
@@ -16,7 +17,7 @@ from motorbus.core.request import ANY, Data, Effect, Expected, Priority, Request
 from motorbus.core.steps import gather
 from motorbus.errors import MotorbusError, RequestError
 from tests.support.subjects import FAMILIES, PACKAGES, line_of, possible
-from tests.support.world import IDS, World, world
+from tests.support.world import IDS, World, sent, world
 
 ROOMS = ("driver", "simulator")
 # A family has no clock, no threads and no I/O; and nothing foreign, for it is loaded below floor 3.
@@ -226,6 +227,31 @@ def test_both_faces_have_the_same_verbs(family: Family) -> None:
     assert line_of(family).writes is hasattr(blocking, "write")
     undocumented = [name for name in public(blocking) if not inspect.getdoc(getattr(blocking, name))]
     assert undocumented == []
+
+
+# --- a device on a bus of another family
+
+
+@pytest.mark.parametrize("other", list(FAMILIES))
+def test_a_device_of_another_family_is_refused(family: Family, other: str) -> None:
+    devices = FAMILIES[other].devices
+
+    async def make(bus: object) -> None:
+        devices.awaiting(bus, 1)
+
+    with world(family) as there, sent(there.bus) as frames:
+        if other == family.name:
+            devices.blocking(there.bus, 1)
+            asyncio.run(make(there.async_bus()))
+            return
+        for refused in (lambda: devices.blocking(there.bus, 1), lambda: asyncio.run(make(there.async_bus()))):
+            with pytest.raises(
+                RequestError, match=rf"bus of {family.name} devices, and this .* {other}(\n|$)"
+            ) as caught:
+                refused()
+            assert "\n" not in caught.value.summary
+            assert f"motorbus.{family.name}" in caught.value.advice
+    assert frames == []
 
 
 # --- which way the rooms import -----------------------------------------------------------------------------

@@ -1,7 +1,4 @@
-"""Driver and simulator agree about every row: what is read is what is there, what is written is there afterwards.
-
-They know nothing of each other, so this is each of them judged by the bytes of the other.
-"""
+"""Driver and simulator agree about every row: what is read is what is there, what is written is there afterwards."""
 
 from __future__ import annotations
 
@@ -35,10 +32,6 @@ def test_every_readable_row_reads_as_it_is(subject: Family) -> None:
             values = there.device(node).read(*names)
             raws = {name: table[name].to_raw(value) for name, value in values.items()}
             assert raws == {name: there.memory(node)[name] for name in names}
-
-
-def test_every_readable_row_reads_alone_as_among_others(subject: Family) -> None:
-    with world(subject) as there:
         device = there.device(NODE)
         together = device.read()
         assert set(together) == {row.name for row in there.table(NODE).values() if row.readable}
@@ -122,16 +115,7 @@ def test_what_is_out_of_range_refuses_to_be_written(writer: Family) -> None:
             for raw in (row.low - 1, row.high + 1):
                 refused(there, row.name, row.to_value(raw))
             refused(there, row.name, float("nan"))
-
-
-def test_a_name_that_does_not_exist_is_not_written(writer: Family) -> None:
-    with world(writer) as there:
         refused(there, "no_such_row", 1)
-
-
-def test_a_name_that_does_not_exist_is_not_read(subject: Family) -> None:
-    with world(subject) as there:
-        there.device(NODE).identify()
         with sent(there.bus) as frames, pytest.raises(RequestError, match="no_such_row"):
             there.device(NODE).read("no_such_row")
         assert frames == []

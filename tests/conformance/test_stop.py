@@ -79,12 +79,6 @@ def test_when_nobody_is_known_yet(subject: Family) -> None:
     assert len(frames) >= len(subject.open().stop({}).requests)
 
 
-def test_when_idle(mover: Family) -> None:
-    with world(mover) as there:
-        met(there)
-        assert_at_rest(there, there.bus.estop())
-
-
 def test_without_a_gate(mover: Family) -> None:
     with world(mover) as there:
         met(there)

@@ -34,7 +34,10 @@ def test_every_example_is_run() -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in EXPECTED if name != TEST])
-def test_an_example_runs(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_example_runs(
+    name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "argv", [name])
     runpy.run_path(str(ROOT / "examples" / name), run_name="__main__")
     out = capsys.readouterr().out
     for text in EXPECTED[name]:

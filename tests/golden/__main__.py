@@ -6,8 +6,8 @@ import argparse
 import os
 import tempfile
 
-from tests.golden.catalogue import VARIANTS
-from tests.golden.traces import write
+from tests.golden.catalogue import CASES, VARIANTS
+from tests.golden.recording import write
 
 
 def main() -> None:
@@ -20,7 +20,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         os.environ.update({f"XDG_{name}_HOME": folder for name in ("STATE", "CONFIG", "CACHE")})
         for family in asked.family:
-            print(f"{family}: {write(family)} traces")
+            print(f"{family}: {write(family, CASES)} traces")
 
 
 main()

@@ -25,10 +25,7 @@ VARIANTS = {"feetech": tuple(MODELS), "kst": PROFILES, "stepper": ("",)}
 
 EXCLUDED = {
     "feetech": {
-        "forget_answers": "memory of the driver; sends nothing",
-        "forget_settings": "memory of the driver; sends nothing",
         "note_reply": "called by the driver with a reply",
-        "learn_settings": "called by the driver with settings that were read",
         "raw": "converts a value; sends nothing",
         "refusal": "makes an error; sends nothing",
         "row": "gives a table row; sends nothing",
@@ -152,8 +149,6 @@ FEETECH_GROUP: list[tuple[Call, str]] = [
 NARROW = (call("write", min_position_limit=1.9, max_position_limit=3.0), call("enable_torque"))
 AWAY = (call("write", min_position_limit=3.2, max_position_limit=3.5),)
 """Limits that the servo stands outside of."""
-SILENT = (call("write", status_return_level=0),)
-"""From then on writes are not acknowledged."""
 TURNED = (call("calibrate", 1.0),)
 
 FEETECH_STATES: list[tuple[Call, str, tuple[Call, ...]]] = [
@@ -172,11 +167,6 @@ FEETECH_STATES: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("stop"), "unprepared", ()),
     (call("stop"), "limp", PREPARED),
     (call("disable_torque"), "unprepared", ()),
-    (call("write", acceleration=10.0), "not_acknowledged", SILENT),
-    (call("enable_torque"), "not_acknowledged", SILENT),
-    (call("move", 2.5, wait=False), "not_acknowledged", (*SILENT, call("enable_torque"))),
-    (call("disable_torque"), "not_acknowledged", SILENT),
-    (call("reg_write", goal_position=2.5), "not_acknowledged", (*SILENT, call("enable_torque"))),
     (call("position"), "offset", TURNED),
     (call("position"), "offset_in_velocity_mode", (*TURNED, *VELOCITY[:1])),
     (call("move", 8.0, wait=False), "many_turns", (call("set_multi_turn", True), call("enable_torque"))),
@@ -323,8 +313,6 @@ KST: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("provision", new_id=9, new_rate=250_000), "", ()),
     (call("set_id", 9), "", ()),
     (call("set_baud", 250_000), "", ()),
-    (call("set_reports", True), "", ()),
-    (call("set_reports", False), "off", (call("set_reports", True),)),
     (call("set_mid_point"), "", ()),
     (call("read", "negative_limit", "positive_limit"), "limits", ()),
     (call("write", negative_limit=-0.5, positive_limit=0.5), "limits", ()),
@@ -333,7 +321,6 @@ KST: list[tuple[Call, str, tuple[Call, ...]]] = [
 ]
 KST_GROUP: list[tuple[Call, str]] = [
     (shared("scan", SETTINGS, (1, 2, 3)), "ids"),
-    (shared("broadcast_read", "node_id", SETTINGS), ""),
     (shared("broadcast_write", "goal_position", 0.2, SETTINGS, nodes=(1, 2)), "goal"),
     (shared("broadcast_write", "store", SAVE, SETTINGS), "save"),
     (shared("broadcast_write", "bit_rate_code", 4, SETTINGS), "bit_rate"),
@@ -425,7 +412,6 @@ STEPPER: list[tuple[Call, str, tuple[Call, ...]]] = [
     (call("write_project", PROGRAM), "", ALIVE),
     (call("write_project", PROGRAM, save=False), "unsaved", ALIVE),
     (call("write", project=1, step_1_delay=0.5), "", ALIVE),
-    (call("save", 2), "", (call("write_project", PROGRAM, save=False),)),
     (call("clear", 3), "", ALIVE),
     (call("save_project", 2), "", SELECTED),
     (call("clear_project", 3), "", ALIVE),

@@ -7,16 +7,19 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager, suppress
 from enum import Enum
 from numbers import Real
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import motorbus
 from motorbus import MotorbusError
 from motorbus.core.family import State
 
+FOLDER = Path(__file__).parent
 DEVICE = {"feetech": "Servo", "kst": "Servo", "stepper": "Controller"}
 """Family -> its public device class."""
 CLOCK = ("at", "rounds")
@@ -26,9 +29,8 @@ Frames = list[list[Any]]
 
 
 class Call(NamedTuple):
-    """A device command `name`; with `on="family"` a function of the family that is run on the bus, with `on="kept"` one
-    that gives a function to call in each cycle of a loop: `args` are its arguments, `kwargs["values"]` is one cycle.
-    With `on="group"` a method of a group of all devices, called with `args`, and its result with `kwargs["values"]`."""
+    """A device command `name`; with `on="family"` a function of the family that is run on the bus; with `on="group"` a
+    method of a group of all devices, called with `args`, and its result with `kwargs["values"]`."""
 
     name: str
     args: tuple[Any, ...] = ()
@@ -150,6 +152,20 @@ def trace(case: Case) -> dict[str, Any]:
     if case.keep != "all":
         frames = [frame for frame in frames if frame[0] == ">" and case.keep == "requests"]
     return {"id": case.id, "frames": collapsed(frames, timed=case.polls), "result": result}
+
+
+def load(family: str) -> dict[str, dict[str, Any]]:
+    """The recorded traces of a family by id."""
+    lines = (FOLDER / f"{family}.jsonl").read_text(encoding="utf-8").splitlines()
+    return {one["id"]: one for one in map(json.loads, lines)}
+
+
+def write(family: str, cases: Sequence[Case]) -> int:
+    """Record every case of a family; give how many."""
+    traces = [trace(case) for case in cases if case.family == family]
+    lines = [json.dumps(one, ensure_ascii=False, separators=(",", ":")) + "\n" for one in traces]
+    (FOLDER / f"{family}.jsonl").write_text("".join(lines), encoding="utf-8")
+    return len(traces)
 
 
 def plain(value: Any, without: Sequence[str] = ()) -> Any:

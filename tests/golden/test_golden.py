@@ -15,13 +15,12 @@ from tests.golden.catalogue import CASES, EXCLUDED, VARIANTS
 from tests.golden.recording import (
     DEVICE,
     Case,
-    collapsed,
     difference,
+    load,
     public_commands,
     public_functions,
     trace,
 )
-from tests.golden.traces import load
 
 recorded = cache(load)
 
@@ -46,38 +45,3 @@ def test_every_public_command_has_a_case_on_every_map_and_profile(family: str) -
 @pytest.mark.parametrize("family", VARIANTS)
 def test_traces_and_cases_are_the_same_in_number_and_order(family: str) -> None:
     assert list(recorded(family)) == [case.id for case in CASES if case.family == family]
-
-
-@pytest.mark.parametrize(
-    ("frames", "short"),
-    [
-        ([[">", "a1"], ["<", "b1"], [">", "a2"]], [[">", "a1"], ["<", "b1"], [">", "a2"]]),
-        ([[">", "a1"], ["<", "b1"]] * 3, [["times", 3, ">a1", "<b1"]]),
-        ([[">", "a1"], ["<", "b1"], [">", "a1"], ["<", "b2"]], [["polls", ">a1"]]),
-        ([[">", "a1"], [">", "a2"], ["<", "b2"]] * 2, [["times", 2, ">a1", ">a2", "<b2"]]),
-        ([[">", "a1"], [">", "a2"], [">", "a1"], [">", "a2"], ["<", "b2"]], [["polls", ">a1", ">a2"]]),
-        (
-            [[">", "a1"], ["<", "b1"], [">", "a2"]] * 2 + [[">", "a1"], ["<", "b3"]],
-            [["times", 2, ">a1", "<b1", ">a2"], [">", "a1"], ["<", "b3"]],
-        ),
-        (
-            [[">", "a1"], [">", "a2"], [">", "a1"], [">", "a2"], ["<", "b2"], [">", "a1"]],
-            [["polls", ">a1", ">a2"]],
-        ),
-        (
-            [["<", "b0"], [">", "a1"], [">", "a1"], [">", "a3"]],
-            [["<", "b0"], ["times", 2, ">a1"], [">", "a3"]],
-        ),
-    ],
-)
-def test_repeated_requests_are_collapsed(frames: list[list[str]], short: list[list[Any]]) -> None:
-    assert collapsed(frames) == short
-
-
-def test_difference_names_the_first_entry_that_differs() -> None:
-    old: dict[str, Any] = {"frames": [[">", "01"], ["<", "02"]], "result": 1}
-    assert difference(old, old) == ""
-    assert "entry 1" in difference(old, {**old, "frames": [[">", "01"], ["<", "03"]]})
-    assert "entry 1 of the frames is missing now" in difference(old, {**old, "frames": [[">", "01"]]})
-    assert "entry 2 of the frames is new" in difference(old, {**old, "frames": [*old["frames"], [">", "04"]]})
-    assert "recorded 1, now 2" in difference(old, {**old, "result": 2})

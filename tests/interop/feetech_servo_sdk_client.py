@@ -63,12 +63,6 @@ class Client:
             group.addParam(node, share)
         self._good(lambda: (None, group.txPacket(), 0))
 
-    def reg_write(self, node: int, address: int, data: list[int]) -> None:
-        self._good(lambda: (None, *self.packets.regWriteTxRx(self.port, node, address, len(data), data)))
-
-    def action(self) -> None:
-        self._good(lambda: (None, self.packets.action(self.port, sdk.BROADCAST_ID), 0))
-
     def _good(self, call: Callable[[], tuple[Any, int, int]]) -> Any:
         for _ in range(TRIES):
             self.port.ser.reset_input_buffer()

@@ -39,9 +39,6 @@ class Client:
     def positions(self, nodes: list[int]) -> list[float]:
         return [float(angle) for angle in self.controller.sync_read_present_position(nodes)]
 
-    def move(self, nodes: list[int], angles: list[float]) -> None:
-        self.controller.sync_write_goal_position(nodes, angles)
-
     def read_register(self, node: int, name: str) -> int:
         return int(self.controller.read_register(node, name))
 

@@ -1,25 +1,22 @@
-"""python-canopen, unmodified, works with our simulated servos.
-
-It knows neither these servos nor us: objects, sizes and units come from the file, replies from the simulator in
-another process, by slcan.
-"""
+"""python-canopen, unmodified, uses our simulated servos: objects and units come from a file, replies by slcan."""
 
 from __future__ import annotations
 
-from functools import partial
+import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from motorbus.core.register import Coding, Register
 from motorbus.core.request import Effect
 from motorbus.families.kst.profiles import PROFILES, VERSIONS, Profile
-from tests.interop.can_bus import Way, can_bus
-from tests.interop.canopen_peer import Canopen, CanopenError
+from tests.interop.can_bus import MODULES, RATE, CanBus, can_bus
+from tests.interop.feetech.peer import Library, Script, folders
 
+HERE = Path(__file__).resolve().parent
+LIBRARY = Library("canopen", "canopen", ("canopen",))
 NODE = 0x25
-PATIENCE = 10.0
-"""s that it waits for a reply; its own 0.3 s may be short on a busy machine."""
 READ_ONLY, TOO_HIGH, NO_OBJECT = 0x06010002, 0x06090031, 0x06020000
 
 
@@ -42,13 +39,17 @@ def dictionary(profile: Profile) -> str:
     return "\n".join(lines) + "\n"
 
 
-def canopen(way: Way, profile: Profile, folder: Path) -> Canopen:
-    """The library with the objects of this profile."""
-    file = folder / f"{profile.name}.eds"
-    file.write_text(dictionary(profile), encoding="ascii")
-    peer = Canopen(way.interface, way.channel, way.kwargs, file, NODE)
-    peer.timeout(PATIENCE)
-    return peer
+class Canopen(Script):
+    """The library in its own process, with the objects of this profile: `peer.read("node_id")`."""
+
+    def __init__(self, bus: CanBus, profile: Profile, folder: Path) -> None:
+        file = folder / f"{profile.name}.eds"
+        file.write_text(dictionary(profile), encoding="ascii")
+        command = [str(HERE / "canopen_client.py"), bus.channel, str(RATE), str(file), str(NODE)]
+        super().__init__(command, os.pathsep.join([folders(LIBRARY), MODULES]))
+
+    def __getattr__(self, name: str) -> Any:
+        return lambda *arguments: self.ask(name, *arguments)
 
 
 def numbers(profile: Profile) -> list[Register]:
@@ -67,7 +68,7 @@ def numbers(profile: Profile) -> list[Register]:
 def test_reads_and_writes_every_object_by_its_name(profile: Profile, tmp_path: Path) -> None:
     with (
         can_bus(tmp_path, "0x25", profile=profile.name) as bus,
-        canopen(bus.way(), profile, tmp_path) as peer,
+        Canopen(bus, profile, tmp_path) as peer,
     ):
         for row in profile.table.values():
             if row.readable:
@@ -83,7 +84,7 @@ def test_reads_and_writes_every_object_by_its_name(profile: Profile, tmp_path: P
 
 def test_moves_a_servo_in_degrees(tmp_path: Path) -> None:
     profile = PROFILES["kst"]
-    with can_bus(tmp_path) as bus, canopen(bus.way(), profile, tmp_path) as peer:
+    with can_bus(tmp_path) as bus, Canopen(bus, profile, tmp_path) as peer:
         peer.write_phys("goal_position", 10.9)
         while peer.read("present_position") != 109:
             pass
@@ -93,28 +94,15 @@ def test_moves_a_servo_in_degrees(tmp_path: Path) -> None:
 
 def test_is_refused_as_cia_301_says(tmp_path: Path) -> None:
     profile = PROFILES["kst"]
-    with can_bus(tmp_path) as bus, canopen(bus.way(), profile, tmp_path) as peer:
-        for request, code in (
-            (partial(peer.write, "present_position", 0), READ_ONLY),
-            (partial(peer.write, "goal_position", 2000), TOO_HIGH),
-            (partial(peer.upload, 0x6005, 0), NO_OBJECT),
-        ):
-            with pytest.raises(CanopenError) as caught:
-                request()
-            assert (caught.value.kind, caught.value.code) == ("SdoAbortedError", code)
+    with can_bus(tmp_path) as bus, Canopen(bus, profile, tmp_path) as peer:
+        assert peer.write("present_position", 0) == {"abort": READ_ONLY}
+        assert peer.write("goal_position", 2000) == {"abort": TOO_HIGH}
+        assert peer.upload(0x6005, 0) == {"abort": NO_OBJECT}
         assert peer.read("node_id") == NODE
 
 
 def test_its_scanner_finds_the_nodes(tmp_path: Path) -> None:
-    with (
-        can_bus(tmp_path, ids="1,0x25,0x26,127") as bus,
-        canopen(bus.way(), PROFILES["kst"], tmp_path) as peer,
-    ):
-        found: list[int] = []
-        while found != [
-            1,
-            0x25,
-            0x26,
-            127,
-        ]:  # it gives them half a second, which a busy machine may need twice
-            found = peer.scan()
+    nodes = [1, 0x25, 0x26, 127]
+    with can_bus(tmp_path, "1,0x25,0x26,127") as bus, Canopen(bus, PROFILES["kst"], tmp_path) as peer:
+        while peer.scan() != nodes:  # it waits half a second, which is short on a busy machine
+            pass

@@ -76,9 +76,9 @@ def test_an_error_byte_above_0x7f_is_noise_to_them(library: Library, terminal: P
         one = Sdk(library, STS)
         sdk.prepare(peer, one, terminal.slave_name)
         call = one.call("read1ByteTxRx", 1, 21)
-        peer.tell("call", "handler", call.name, list(call.arguments))
+        peer.send("call", "handler", call.name, list(call.arguments))
         answer(terminal, packet)
-        assert peer.heard()[1] in (TIMEOUT, CORRUPT)
+        assert peer.receive()[1] in (TIMEOUT, CORRUPT)
     assert protocol.receiver().feed(packet) == [Reply(0, 1, packet)]
     assert protocol.decode(packet) == (1, UNDEFINED, b"\x02")
 
@@ -86,9 +86,9 @@ def test_an_error_byte_above_0x7f_is_noise_to_them(library: Library, terminal: P
 def test_rustypot_takes_an_error_byte_above_0x7f(terminal: PtyMaster) -> None:
     with Peer(RUSTYPOT) as peer:
         peer.new("controller", "Sts3215PyController", terminal.slave_name, 1_000_000, 10.0)
-        peer.tell("call", "controller", "read_raw_data_with_error", [1, 21, 1])
+        peer.send("call", "controller", "read_raw_data_with_error", [1, 21, 1])
         answer(terminal, protocol.frame(1, UNDEFINED, b"\x02"))
-        assert peer.heard() == [[2], UNDEFINED]
+        assert peer.receive() == [[2], UNDEFINED]
 
 
 @pytest.mark.parametrize("kind", [SCS, STS], ids=lambda kind: kind.model)
@@ -151,7 +151,7 @@ def done(twin: Twin, peer: Peer, owner: str, name: str, *arguments: Any) -> list
         gave: list[Any] = peer.call(owner, name, *arguments)
         if gave[-2:] == [SUCCESS, 0]:
             return gave
-        twin.hush()
+        twin.drain()
     raise AssertionError(f"{name}{arguments} gave {gave}")
 
 

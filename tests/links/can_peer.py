@@ -11,7 +11,7 @@ from select import select
 from threading import Event, Thread
 from typing import TypeAlias
 
-from motorbus.core.can_frame import REMOTE_FLAG, CanFrame
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Data
 from motorbus.link import url
 from motorbus.link.can import PythonCanLink
@@ -119,7 +119,3 @@ def some(link: CanLink, count: int = 1, seconds: float = 30.0) -> list[Data]:
     while len(frames) < count and link.now() < end:
         frames += link.read(end)
     return frames
-
-
-def remote(id: int, count: int = 0, *, extended: bool = False) -> CanFrame:
-    return CanFrame(id | REMOTE_FLAG, bytes(count), extended)

@@ -9,7 +9,7 @@ import can
 import pytest
 
 from motorbus.errors import LinkError, RequestError
-from motorbus.link.can import kernel_rate, read_address
+from motorbus.link.can import kernel_queue, kernel_rate, read_address
 from tests.links.can_peer import open_can
 
 CAN0 = read_address("can://socketcan/can0")
@@ -72,13 +72,17 @@ def kernel(rate: int = 500_000, *, up: bool = True, modes: tuple[str, ...] = ())
     return json.dumps([{"flags": flags, "linkinfo": {"info_kind": "can", "info_data": data}}])
 
 
-def test_the_kernels_rate_is_asked_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_kernels_rate_and_queue_are_asked_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     ip(tmp_path, monkeypatch, kernel(250_000))
     assert [kernel_rate(CAN0, rate, False) for rate in (0, 250_000)] == [250_000, 250_000]
     ip(tmp_path, monkeypatch, kernel(modes=("LISTEN-ONLY",)))
     assert kernel_rate(CAN0, 0, True) == 500_000
     ip(tmp_path, monkeypatch, "", code=1)
     assert kernel_rate(CAN0, 250_000, False) is None
+    assert kernel_queue("can0", tmp_path) == 0
+    (tmp_path / "class/net/can0").mkdir(parents=True)
+    (tmp_path / "class/net/can0/tx_queue_len").write_text("10\n")
+    assert kernel_queue("can0", tmp_path) == 10
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +13,10 @@ import pytest
 from motorbus.errors import LinkLost, PortBusy, PortNotFound
 from motorbus.link import usb_adapters
 from motorbus.link.lock import PortLock
-from motorbus.link.reconnect import Reconnecting, find_adapter, list_adapters, reconnecting
+from motorbus.link.reconnect import Reconnecting, find_adapter, reconnecting
+from motorbus.link.serial import ports
 from motorbus.link.url import open_link
+from motorbus.link.usb_adapters import PortInfo
 from motorbus.simulation.pty import PtyMaster
 from tests.links.other import HOLD_OPEN, other_process, run
 from tests.links.usb import usb_port
@@ -30,11 +32,12 @@ class Usb:
     def __init__(self) -> None:
         self.ports: dict[str, str] = {}
 
-    def __call__(self) -> list[Any]:
-        return [
-            usb_port(device=device, resolved_device=device, serial_number=number)
-            for device, number in self.ports.items()
+    def __call__(self) -> list[PortInfo]:
+        found = [
+            usb_port(device=one, resolved_device=one, serial_number=number)
+            for one, number in self.ports.items()
         ]
+        return ports(lambda: found)
 
 
 @pytest.fixture
@@ -185,32 +188,31 @@ def test_l13_the_lock_is_kept_while_the_port_is_gone(tmp_path: Path, master: Pty
         pass
 
 
-def test_without_a_serial_number_the_same_kind_under_the_same_name_counts(tmp_path: Path) -> None:
+def test_adapter_without_a_serial_number_has_the_same_name_and_kind(tmp_path: Path) -> None:
     path = tmp_path / "ttyUSB0"
     path.touch()
 
-    def lister(vid: int | None = 0x1A86) -> Callable[[], list[Any]]:
-        device = str(path)
-        return lambda: [
-            usb_port(device=device, resolved_device=device, vid=vid, pid=0x7523, serial_number=None)
-        ]
+    def present(vid: int) -> list[PortInfo]:
+        port = usb_port(device=str(path), resolved_device=str(path), vid=vid, pid=0x7523, serial_number=None)
+        return ports(lambda: [port])
 
-    mine = list_adapters(lister())[str(path)]
-    assert find_adapter("bus", str(path), mine, lister()) == str(path)
+    (mine,) = present(0x1A86)
+    assert find_adapter("bus", str(path), mine, [mine]) == str(path)
     with pytest.raises(LinkLost, match="the adapter 0403:7523"):
-        find_adapter("bus", str(path), mine, lister(0x0403))
+        find_adapter("bus", str(path), mine, present(0x0403))
     with pytest.raises(PortNotFound):
-        find_adapter("bus", str(path), mine, list)
-    assert find_adapter("bus", str(path), None, list) == str(path)
+        find_adapter("bus", str(path), mine, [])
+    assert find_adapter("bus", str(path), None, []) == str(path)
 
 
 def test_the_ports_of_one_adapter_are_told_apart() -> None:
-    def lister(first: int) -> Callable[[], list[Any]]:
+    def present(first: int) -> list[PortInfo]:
         names = [f"/dev/ttyUSB{first + number}" for number in (0, 1)]
-        return lambda: [
+        found = [
             usb_port(device=name, resolved_device=name, interface_num=number)
             for number, name in enumerate(names)
         ]
+        return ports(lambda: found)
 
-    second = list_adapters(lister(0))["/dev/ttyUSB1"]
-    assert find_adapter("bus", "/dev/ttyUSB1", second, lister(1)) == "/dev/ttyUSB2"
+    _, second = present(0)
+    assert find_adapter("bus", "/dev/ttyUSB1", second, present(1)) == "/dev/ttyUSB2"

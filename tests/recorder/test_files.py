@@ -82,20 +82,16 @@ def test_bytes_as_programs_show_them(text: str) -> None:
     assert from_text(text) == DUMPED
 
 
-@pytest.mark.parametrize("name", ["line", "line.asc", "bin"])
-def test_another_ending_is_refused_before_it_is_read(name: str, tmp_path: Path) -> None:
-    with pytest.raises(RequestError, match=r"\.bin, \.raw \(bytes\)"):
-        read_bytes(tmp_path / name)
-
-
-def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+def test_other_endings_and_absent_files_are_refused(tmp_path: Path) -> None:
+    for name in ("line", "line.asc", "bin"):
+        with pytest.raises(RequestError, match=r"\.bin, \.raw \(bytes\)"):
+            read_bytes(tmp_path / name)
     with pytest.raises(FileNotFoundError):
         read_bytes(tmp_path / "line.bin")
 
 
-@pytest.mark.parametrize("suffix", TEXT)
-def test_a_byte_order_mark_is_none_of_the_bytes(suffix: str, tmp_path: Path) -> None:
-    (tmp_path / f"line{suffix}").write_text("FF 0A", encoding="utf-8-sig")
-    assert read_bytes(tmp_path / f"line{suffix}") == b"\xff\x0a"
+def test_a_byte_order_mark_is_none_of_the_bytes(tmp_path: Path) -> None:
+    (tmp_path / "line.txt").write_text("FF 0A", encoding="utf-8-sig")
+    assert read_bytes(tmp_path / "line.txt") == b"\xff\x0a"
     with pytest.raises(RequestError):
         from_text("FF \ufeff0A")

@@ -22,7 +22,6 @@ from motorbus.families.feetech import protocol as feetech
 from motorbus.families.feetech.driver.requests import read_block
 from motorbus.families.kst.driver.feedback import position
 from motorbus.families.stepper import protocol as stepper
-from tests.support.noisy_line import NoisyLine
 from tests.support.world import Bus, Queue
 
 QUEUED = 3_000
@@ -47,7 +46,7 @@ def busy(family: str, *, seed: int) -> Iterator[tuple[Bus, Queue]]:
         with motorbus.open(sim.url) as bus:
             for node in NODES[family]:
                 bus.run(bus.driver.identify(node))
-            sim.line = NoisyLine(seed, corrupt=0.2, loss=0.05, delay=0.0002)
+            sim.faults = f"seed {seed}; 20%: corrupt; 5%: drop; 100%: delay 0.0001-0.0002"
             queue = Queue(bus, requests(bus, NODES[family]))
             for _ in range(seed):
                 queue.turn(0.0007)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import motorbus
-from motorbus.errors import LimitExceeded, RequestError
+from motorbus.errors import Interrupted, LimitExceeded, RequestError
 from motorbus.families.kst import KstDriver
 from motorbus.session import lock_name, open, prepare, simulate
 from motorbus.session.opening import simulated_link
@@ -66,6 +66,7 @@ def test_settings_of_a_family_go_to_its_driver() -> None:
         ("feetech:sim:arm,latency=0", "unknown option 'latency'"),
         ("feetech:sim,latency=0", "unknown option 'latency'"),
         ("kst:sim,bitrate=-1", "not a rate in bit/s"),
+        ("feetech:sim,colour=red", "unknown option 'colour'"),
     ],
 )
 def test_what_cannot_be_is_refused(address: str, message: str) -> None:
@@ -112,20 +113,11 @@ def test_a_bus_without_a_robot_holds_the_limits_of_its_devices(family: str) -> N
         assert servo.position() == start
         servo.move(start + 0.2)
         assert servo.position() == pytest.approx(start + 0.2, abs=0.02)
-
-
-def test_a_caller_may_set_another_interlock() -> None:
-    class Nothing:
-        def check(self, request: Any, now: float, /) -> None:
-            raise LimitExceeded("nothing moves")
-
-        def stopped(self, nodes: Any, /) -> None:
-            return
-
-    with simulate("feetech") as sim, open(sim.url, interlock=Nothing()) as bus:
-        servo = motorbus.feetech.Servo(bus, 1)
-        with pytest.raises(LimitExceeded, match="nothing moves"):
-            servo.enable_torque()
+        assert bus.estop().acknowledged == (1,)
+        with pytest.raises(Interrupted):
+            servo.move(start)
+        bus.reset()
+        servo.move(start)
 
 
 def test_a_one_shot_command_needs_no_real_time() -> None:

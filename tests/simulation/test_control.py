@@ -7,7 +7,7 @@ import os
 import socket
 import stat
 from collections.abc import Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import closing, contextmanager
 from math import radians
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from motorbus.errors import PortBusy, RequestError
 from motorbus.families.feetech.simulator import simulate
 from motorbus.session import open as open_bus
 from motorbus.session import simulate as simulate_bus
-from motorbus.simulation.control import HELP, MAX_CLIENTS, MAX_LINE, WORDS, ControlSocket, carry_out
+from motorbus.simulation.control import WORDS, ControlSocket, carry_out
 from motorbus.simulation.pty import PtyMaster
 from motorbus.simulation.server import Server, ServerThread
 from tests.simulation.programs import LIMIT
@@ -51,13 +51,6 @@ def connected(path: Path) -> Iterator[socket.socket]:
         connection.settimeout(LIMIT)
         connection.connect(os.fspath(path))
         yield connection
-
-
-def ask(connection: socket.socket, line: str) -> dict[str, Any]:
-    connection.sendall(line.encode() + b"\n")
-    with connection.makefile() as replies:
-        reply: dict[str, Any] = json.loads(replies.readline())
-        return reply
 
 
 # Orders.
@@ -94,14 +87,10 @@ def test_an_order_that_is_refused(line: str, message: str) -> None:
     assert bus.nodes[1].plugged
 
 
-def test_help_names_every_word() -> None:
-    assert order(simulate((1,)), "help") == {"ok": True, "help": HELP}
-    assert all(f"{word} ID" in HELP for word in WORDS)
-
-
-def test_status_shows_every_device() -> None:
-    reply = order(simulate((2, 1)), "status")
-    assert [node["id"] for node in reply["nodes"]] == [1, 2]
+def test_help_and_status() -> None:
+    help_ = order(simulate((2, 1)), "help")["help"]
+    assert all(f"{word} ID" in help_ for word in WORDS)
+    assert [node["id"] for node in order(simulate((2, 1)), "status")["nodes"]] == [1, 2]
 
 
 def test_plugs_and_power() -> None:
@@ -156,23 +145,7 @@ def test_a_pushed_shaft_turns_and_returns_with_torque(model: str) -> None:
         assert servo.position() == pytest.approx(start, abs=0.02)
 
 
-@pytest.mark.parametrize("after", [0.0, 0.1, 0.5, 1.0])
-def test_a_blocked_shaft_stops_and_a_released_one_completes_its_move(after: float) -> None:
-    with simulate_bus("feetech") as sim, open_bus(sim.url) as bus:
-        servo = motorbus.feetech.Servo(bus, 1)
-        servo.enable_torque()
-        servo.move(radians(270), wait=False)
-        sim.wait(sim.now + after)
-        assert order(sim.simulator, "block 1") == OK
-        blocked = servo.position()
-        sim.wait(sim.now + 1.0)
-        assert servo.position() == pytest.approx(blocked, abs=0.002)
-        assert order(sim.simulator, "release 1") == OK
-        sim.wait(sim.now + 4.0)
-        assert servo.position() == pytest.approx(radians(270), abs=0.01)
-
-
-def test_a_blocked_servo_raises_the_overload_alarm() -> None:
+def test_a_blocked_servo_raises_the_overload_alarm_and_a_released_one_moves() -> None:
     with simulate_bus("feetech") as sim, open_bus(sim.url) as bus:
         servo = motorbus.feetech.Servo(bus, 1)
         servo.enable_torque()
@@ -188,7 +161,7 @@ def test_a_blocked_servo_raises_the_overload_alarm() -> None:
         assert servo.position() == pytest.approx(radians(200), abs=0.01)
 
 
-@pytest.mark.parametrize("settings", [{}, {"phase": 0x80 | 12}, {"angular_resolution": 3}])
+@pytest.mark.parametrize("settings", [{"phase": 0x80 | 12}, {"angular_resolution": 3}])
 def test_angles_are_those_that_the_servo_reads(settings: dict[str, int]) -> None:
     with simulate_bus("feetech", position=1500) as sim, open_bus(sim.url) as bus:
         servo = motorbus.feetech.Servo(bus, 1)
@@ -202,7 +175,7 @@ def test_angles_are_those_that_the_servo_reads(settings: dict[str, int]) -> None
         assert servo.position() == pytest.approx(before + radians(40), abs=0.01)
 
 
-def test_release_ends_a_push() -> None:
+def test_loads_and_limits_of_a_shaft_end_with_release() -> None:
     with simulate_bus("feetech") as sim, open_bus(sim.url) as bus:
         servo = motorbus.feetech.Servo(bus, 1)
         order(sim.simulator, "push 1 90deg")
@@ -210,29 +183,14 @@ def test_release_ends_a_push() -> None:
         order(sim.simulator, "release 1")
         stopped = servo.position()
         sim.wait(sim.now + 2.0)
-        assert MIDDLE < stopped < MIDDLE + radians(60)
-        assert servo.position() == stopped
-
-
-def test_a_load_shows_until_it_is_released() -> None:
-    with simulate_bus("feetech") as sim, open_bus(sim.url) as bus:
-        servo = motorbus.feetech.Servo(bus, 1)
+        assert MIDDLE < stopped == servo.position() < MIDDLE + radians(60)
         servo.enable_torque()
         for text, load in (("load 1 50%", 0.5), ("load 1 -25%", -0.25), ("release 1", 0.0)):
             assert order(sim.simulator, text) == OK
             assert servo.read("present_load")["present_load"] == pytest.approx(load, abs=0.01)
 
 
-def test_a_blocked_range_bounds_a_push() -> None:
-    with simulate_bus("feetech", position=1500) as sim, open_bus(sim.url) as bus:
-        servo = motorbus.feetech.Servo(bus, 1)
-        assert order(sim.simulator, "block 1 1deg 350deg") == OK
-        assert order(sim.simulator, "push 1 1turn") == OK
-        sim.wait(sim.now + 10.0)
-        assert servo.position() == pytest.approx(radians(350), abs=0.01)
-
-
-def test_a_device_without_physics_refuses_the_order() -> None:
+def test_devices_without_physics_refuse_orders() -> None:
     kst = families.load("kst").simulator((0x25,))
     assert order(kst, "load 0x25 50%") == OK
     assert order(kst, "heat 37 80C") == OK
@@ -258,41 +216,14 @@ def test_many_orders_in_any_pieces_are_answered_in_order(tmp_path: Path) -> None
     assert [key for key, _ in keys] == ["ok", "ok", "error", "ok"] * 50
 
 
-def test_a_program_that_does_not_read_gets_all_replies_later_and_holds_up_nobody(tmp_path: Path) -> None:
-    path, count = tmp_path / "control", 400
+def test_a_program_that_does_not_read_is_dropped(tmp_path: Path) -> None:
+    path = tmp_path / "control"
     with socket_of(path, simulate(range(1, 9))), connected(path) as silent:
-        silent.settimeout(0.5)
-        sent = b"status\n" * count
-        try:
-            while sent:
-                sent = sent[silent.send(sent) :]
-        except TimeoutError:
-            pass
-        with connected(path) as other:
-            assert ask(other, "help")["ok"] is True
-        silent.settimeout(LIMIT)
-        with silent.makefile() as replies:
-            for _ in range(count - -(-len(sent) // 7)):
-                assert '"ok": true' in replies.readline()
-
-
-def test_an_endless_order_is_refused_and_its_program_dropped(tmp_path: Path) -> None:
-    path = tmp_path / "control"
-    with socket_of(path, simulate((1,))), connected(path) as connection:
-        connection.sendall(b"x" * (MAX_LINE + 1))
-        with connection.makefile() as replies:
-            assert "at most" in json.loads(replies.readline())["error"]
-            assert replies.readline() == ""
-        with connected(path) as other:
-            assert ask(other, "help")["ok"] is True
-
-
-def test_too_many_programs_are_turned_away(tmp_path: Path) -> None:
-    path = tmp_path / "control"
-    with socket_of(path, simulate((1,))), ExitStack() as stack:
-        for _ in range(MAX_CLIENTS):
-            assert ask(stack.enter_context(connected(path)), "help")["ok"] is True
-        assert stack.enter_context(connected(path)).recv(1) == b""
+        with pytest.raises(OSError, match="roken pipe|reset"):
+            silent.sendall(b"status\n" * 100_000)
+        with connected(path) as other, other.makefile() as replies:
+            other.sendall(b"help\n")
+            assert json.loads(replies.readline())["ok"] is True
 
 
 def test_a_path_that_is_taken(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from typing import Any
 
 import pytest
@@ -104,12 +103,6 @@ def test_a_fault_prints_as_the_text_of_itself(fault: Fault) -> None:
     assert parse(str(fault)).faults == (fault,)
 
 
-@given(st.text(alphabet="0123456789.%:; seedxchangropat-unluid#\n", max_size=60))
-def test_any_text_is_a_script_or_a_request_error(text: str) -> None:
-    with suppress(RequestError):
-        assert parse(str(parse(text))).faults == parse(text).faults
-
-
 def faulty(script: str) -> FaultyBus:
     bus = FaultyBus(simulate((1, 2)), lambda seconds: None)
     bus.set(script, 0.0)
@@ -137,18 +130,13 @@ ANSWERED = Delivery(0.0, Side.HOST, REPLY)
         ("exchange 1: drop", [SENT]),
         ("100% to device: drop", [ANSWERED]),
         ("exchange 1: duplicate", [SENT, ANSWERED, ANSWERED]),
-        ("at 0 s: delay 0.5", [SENT, ANSWERED._replace(at=0.5)]),
+        ("at 0 s: delay 0.5; exchange 9: drop", [SENT, ANSWERED._replace(at=0.5)]),
         ("exchange 1: echo", [Delivery(0.0, Side.HOST, REQUEST), SENT, ANSWERED]),
         ("exchange 1: duplicate; exchange 1: delay 2", [SENT, *[ANSWERED._replace(at=2.0)] * 2]),
     ],
 )
 def test_what_a_fault_does_to_a_packet(script: str, arrived: list[Delivery]) -> None:
     assert arrivals(script)[0] == arrived
-
-
-def test_later_packets_do_not_overtake_a_delayed_one() -> None:
-    first, second, third = arrivals("exchange 1: delay 1.5", 3)
-    assert [packets[1].at for packets in (first, second, third)] == [1.5, 1.5, 2.0]
 
 
 def test_corruption_changes_one_byte_and_breaks_a_can_frame() -> None:
@@ -166,20 +154,9 @@ def test_chance_strikes_about_as_often_as_it_says_and_a_seed_repeats_it() -> Non
         return [len(packets) == 1 for packets in arrivals(script, 2000)]
 
     assert 140 < sum(lost("seed 1; 10%: drop")) < 260
+    first, second, third = arrivals("exchange 1: delay 1.5", 3)
+    assert [packets[1].at for packets in (first, second, third)] == [1.5, 1.5, 2.0], "no packet overtakes"
     assert lost("seed 1; 10%: drop") == lost("seed 1; 10%: drop") != lost("seed 2; 10%: drop")
-
-
-def test_the_bus_tells_what_happened_and_what_did_not() -> None:
-    bus = faulty("exchange 1: drop; exchange 9: drop; at 5 s: power-cycle")
-    bus.carry(Side.HOST, REQUEST, 0.0)
-    bus.carry(Side.DEVICE, REPLY, 0.0)
-    assert [str(fault) for fault in bus.pending] == ["exchange 9: drop", "at 5 s: power-cycle"]
-    bus.advance(5.0)
-    assert [(fired.at, str(fired.fault)) for fired in bus.fired] == [
-        (0.0, "exchange 1: drop"),
-        (5.0, "at 5 s: power-cycle"),
-    ]
-    assert bus.count == 2
 
 
 @pytest.mark.parametrize("script", ["at 1 s: power-cycle 9", "1%: brown-out 1 9", "1%: dorp"])
@@ -227,30 +204,18 @@ def test_an_unplugged_port_is_lost_and_back_in_time() -> None:
                 assert sim.now < lost_at + 1.0
 
 
-@pytest.mark.parametrize(
-    "script",
-    [
-        "seed 8; 2%: corrupt; 5%: delay 0.01-0.3; 3% to device: drop; 2%: duplicate",
-        "seed 9; 6%: brown-out 0.05; 6%: power-cycle; exchange 40: unplug 0.2",
-    ],
-)
-def test_the_same_script_does_the_same_again(script: str) -> None:
+def test_the_same_script_does_the_same_again() -> None:
+    script = "seed 8; 2%: corrupt; 5%: delay 0.01-0.3; 6%: brown-out 0.05; exchange 40: unplug 0.2"
+
     def run() -> list[str]:
-        told = []
+        results = []
         with simulate_bus("feetech", ids="1-3", faults=script, name="again") as sim, open_bus(sim.url) as bus:
             for node in (1, 2, 3) * 15:
                 try:
-                    told.append(f"{motorbus.feetech.Servo(bus, node).position():.6f} {sim.now:.9f}")
+                    results.append(f"{motorbus.feetech.Servo(bus, node).position():.6f} {sim.now:.9f}")
                 except MotorbusError as error:
-                    told.append(f"{error.summary} {sim.now:.9f}")
+                    results.append(f"{error.summary} {sim.now:.9f}")
             assert sim.faults.count > 0
-        return told
+        return results
 
     assert run() == run()
-
-
-def test_a_simulated_address_takes_faults() -> None:
-    with open_bus("feetech:sim,clock=virtual,faults=100%: drop") as bus:
-        assert bus.link.virtual
-        with pytest.raises(NoReply):
-            motorbus.feetech.Servo(bus, 1).position()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import queue
 import time
 import weakref
 from importlib import import_module
@@ -16,7 +17,6 @@ from motorbus.errors import LinkLost, PortBusy, PortNotFound, RequestError
 from motorbus.link.memory import MemoryLink
 from motorbus.session import open as open_bus
 from motorbus.simulation import Simulation, find
-from tests.simulation.links import QueueLink
 
 PING_1 = bytes.fromhex("FF FF 01 02 01 FB")
 PONG_1 = bytes.fromhex("FF FF 01 02 00 FC")
@@ -94,14 +94,6 @@ def test_one_host_at_a_time_and_the_next_one_finds_time_and_motors() -> None:
         sim.link()
 
 
-def test_devices_by_id() -> None:
-    with servos(1, 3) as sim:
-        sim[3].unplug()
-        assert ask(sim.link(), bytes.fromhex("FF FF 03 02 01 F9")) == []
-        with pytest.raises(RequestError, match="no device 2"):
-            sim[2]
-
-
 def test_a_line_of_a_program_may_be_set_at_any_time() -> None:
     class Lost:
         def carry(self, *_: object) -> list[Any]:
@@ -161,48 +153,74 @@ def test_a_closed_simulation_is_freed() -> None:
 # On a CAN channel.
 
 
+class QueueLink:
+    """What `link.can` would open: `arrive` puts a frame on the bus, `next_sent` takes a frame that was sent."""
+
+    latency = 0.0
+    name = "can://queue/0"
+
+    def __init__(self) -> None:
+        self.rate = 500_000
+        self.no_wire = True
+        self.closed = self.is_lost = False
+        self._arrived: queue.Queue[CanFrame] = queue.Queue()
+        self._sent: queue.Queue[object] = queue.Queue()
+
+    def arrive(self, frame: CanFrame) -> None:
+        self._arrived.put(frame)
+
+    def next_sent(self) -> object:
+        return self._sent.get(timeout=10.0)
+
+    def now(self) -> float:
+        return time.monotonic()
+
+    def write(self, data: object) -> None:
+        if self.is_lost:
+            raise LinkLost(f"{self.name} is gone")
+        self._sent.put(data)
+
+    def read(self, until: float) -> list[CanFrame]:
+        try:
+            return [self._arrived.get(timeout=max(1e-9, until - time.monotonic()))]
+        except queue.Empty:
+            return []
+
+    def fileno(self) -> None:
+        return None
+
+    def close(self) -> None:
+        self.closed = True
+
+
 @pytest.fixture
 def channel(monkeypatch: pytest.MonkeyPatch) -> QueueLink:
     """The link that opens, whatever channel is asked for."""
-    link = QueueLink(descriptor=True)
+    link = QueueLink()
     monkeypatch.setattr("motorbus.simulation.can_channel.open_can", lambda port, **options: link)
     return link
 
 
-@pytest.mark.parametrize("descriptor", [True, False])
-def test_devices_on_a_channel(descriptor: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    link = QueueLink(descriptor=descriptor)
-    monkeypatch.setattr("motorbus.simulation.can_channel.open_can", lambda port, **options: link)
-    with can_servos() as sim:
+def test_devices_on_a_channel(channel: QueueLink) -> None:
+    with can_servos(faults="exchange 3: drop") as sim:
         with sim.serve("can://virtual/here") as served:
-            link.arrive(CanFrame(0x626, READ_37.data))
-            link.arrive(READ_37)
-            assert link.next_sent() == POSITION_37
+            channel.arrive(CanFrame(0x626, READ_37.data))
+            channel.arrive(READ_37)
+            assert channel.next_sent() == POSITION_37
             for open_it in (sim.link, lambda: sim.serve("can://virtual/there")):
                 with pytest.raises(PortBusy):
                     open_it()
+            channel.arrive(READ_37)
+            sim.faults = "exchange 1: duplicate"
+            channel.arrive(READ_37)
+            assert [channel.next_sent() for _ in range(2)] == [POSITION_37] * 2
+            with pytest.raises(RequestError, match="cannot be unplugged"):
+                sim.faults = "at 1 s: unplug 1"
             with served.still():
                 sim[37].unplug()
             left = served.now()
-        assert link.closed
-        again = sim.link()
-        assert again.now() >= left
-        with pytest.raises(PortBusy):
-            sim.serve("can://virtual/here")
-
-
-def test_faults_on_a_channel_of_programs(channel: QueueLink) -> None:
-    with can_servos(faults="exchange 1: drop") as sim, sim.serve("can://virtual/here"):
-        channel.arrive(READ_37)
-        channel.arrive(READ_37)
-        assert channel.next_sent() == POSITION_37
-        sim.faults = "exchange 1: duplicate"
-        channel.arrive(READ_37)
-        assert [channel.next_sent(), channel.next_sent()] == [POSITION_37] * 2
-        with pytest.raises(RequestError, match="cannot be unplugged"):
-            sim.faults = "at 1 s: unplug 1"
-        with pytest.raises(RequestError, match="cannot be unplugged"):
-            sim.unplug(seconds=1.0)
+        assert channel.closed
+        assert sim.link().now() >= left
 
 
 def test_faults_are_refused_where_real_devices_may_be(channel: QueueLink) -> None:
@@ -231,7 +249,6 @@ def test_a_channel_that_is_lost_is_an_error_of_the_thread(channel: QueueLink) ->
         served._thread.join(10)
         with pytest.raises(LinkLost):
             served.close()
-        served.close()
 
 
 def test_a_python_can_program_of_this_process_reaches_the_servos() -> None:

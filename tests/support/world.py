@@ -56,19 +56,9 @@ def make_async_bus(
     return AsyncBus(link, driver, interlock=DeviceLimits(), report=report, journal=journal)
 
 
-def is_listening(bus: BaseBus) -> bool:
-    """The bus sends nothing."""
-    return bus.engine.listening
-
-
 def is_stopping(bus: BaseBus) -> bool:
     """An emergency stop is being sent."""
     return bus.engine.stopping
-
-
-def set_rate(bus: BaseBus, rate: int) -> None:
-    """Let the bus compute with this bit rate."""
-    bus.engine.rate = rate
 
 
 class Queue:

@@ -10,7 +10,7 @@ from struct import Struct
 from typing import Any, Final, TypeVar
 
 from motorbus.core import move as core
-from motorbus.core.access import readable_rows, writable_values
+from motorbus.core.access import readable_rows, writable_values, write_verified
 from motorbus.core.family import AxisDriver, Explanation, Health, Identity, Receiver, State, Stop
 from motorbus.core.framing import FrameReceiver
 from motorbus.core.half_duplex import HalfDuplexSerial
@@ -19,7 +19,6 @@ from motorbus.core.request import Effect, Expected, Precondition, Priority, Requ
 from motorbus.core.setpoint import Setpoint
 from motorbus.core.steps import Exclusive, catch, with_cleanup
 from motorbus.core.stream import PositionStream, read_positions
-from motorbus.core.verify import write_verified
 from motorbus.errors import DeviceError, LimitExceeded, NoReply, RequestError, UnexpectedReply
 
 from . import protocol

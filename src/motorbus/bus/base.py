@@ -216,8 +216,8 @@ class BaseBus:
             return
         try:
             if tune.rate:
-                self.link.tune(tune.rate, tune.listen_only or engine.always_listening)
-                engine.set_rate(tune.rate, listen_only=tune.listen_only)
+                self.link.tune(tune.rate)
+                engine.set_rate(tune.rate)
         except MotorbusError as error:
             failure = error
         task.tree.ready.append((task, before, failure))
@@ -288,7 +288,7 @@ class BaseBus:
             function()
         if link.rate != engine.rate:
             with contextlib.suppress(MotorbusError):
-                link.tune(engine.rate, engine.listening)
+                link.tune(engine.rate)
         return True
 
     # -- observers ---------------------------------------------------------------------------------------------
@@ -378,6 +378,8 @@ class BaseBus:
         Motion and torque are refused with Interrupted until `reset()`. May be called from any thread, but not from a
         signal handler (see `trigger_estop`). Raises LinkLost when the bus is closed.
         """
+        if not self._open:
+            raise LinkLost("the bus is closed: no stop was sent", advice="open it again, or cut the power")
         return self.stopper.stop()
 
     def trigger_estop(self) -> None:

@@ -77,7 +77,7 @@ class Engine:
         self.interlock = interlock
         self.before_motion: Callable[[], None] | None = None
         """Called when the interlock has passed a request; the bus sets it to None after the first."""
-        self.always_listening = self.listening = listen_only
+        self.listening = listen_only
         self.diagnosis: Callable[[], str] = str
         self.trace: Feed[TraceRecord] = Feed()
         self.notices: Feed[Notification] = Feed()
@@ -594,10 +594,9 @@ class Engine:
         self._forget_positions()
         self.gone = None
 
-    def set_rate(self, rate: int, *, listen_only: bool) -> None:
+    def set_rate(self, rate: int) -> None:
         """The link has this rate (bit/s) now."""
         self.rate = rate
-        self.listening = listen_only or self.always_listening
         self.receiver, self.holds_data = self.driver.receiver(), False
 
 

@@ -43,13 +43,14 @@ class DeviceLimits:
                 advice="use a move, or a write by register name; nothing was sent",
             )
         for setpoint in request.setpoints:
-            _check(setpoint)
+            check_limits(setpoint)
 
     def stopped(self, nodes: Sequence[int], /) -> None:
         return
 
 
-def _check(setpoint: Setpoint) -> None:
+def check_limits(setpoint: Setpoint) -> None:
+    """Raise LimitExceeded for a setpoint outside the limits that it carries, or without limits."""
     value, low, high = setpoint.value, setpoint.low, setpoint.high
     if not isfinite(value):
         raise _refused(setpoint, f"{value} is not a finite number", "", "give a number")

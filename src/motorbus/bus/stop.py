@@ -149,8 +149,6 @@ class EmergencyStop:
 
     def stop(self, client: str = "") -> StopOutcome:
         """Latch the engine and send the stop frames, in the calling thread. Raises what the driver raises."""
-        if self._closed:
-            raise LinkLost("the bus is closed: no stop was sent", advice="open it again, or cut the power")
         bus, engine, by = self.bus, self.bus.engine, asked_by(client)
         engine.announce_stop(by)
         try:
@@ -203,23 +201,25 @@ class EmergencyStop:
         """A scan may be trying another rate: the nodes are stopped at the rate at which they answered last."""
         engine = self.bus.engine
         rate = engine.nodes.rate
-        if (engine.rate, engine.listening) != (rate, engine.always_listening):
+        if engine.rate != rate:
             with contextlib.suppress(LinkError):
-                self.bus.link.tune(rate, engine.always_listening)
-                engine.set_rate(rate, listen_only=False)
+                self.bus.link.tune(rate)
+                engine.set_rate(rate)
 
     # -- the thread --------------------------------------------------------------------------------------------
 
     def _serve(self, server: socket.socket) -> None:
         """Stop whenever a datagram asks for it: once for all that ask now."""
-        while not self._closed:
+        while True:
             with contextlib.suppress(OSError):  # the socket was closed
                 received = [server.recvfrom(LONGEST)]
-                while select.select((server,), (), (), 0.0)[0]:
+                while received[-1][0] and select.select((server,), (), (), 0.0)[0]:
                     received.append(server.recvfrom(LONGEST))
                 clients = [one for one in received if one[0].startswith(b"estop")]
-                if clients or any(data == STOP for data, _ in received):
+                if clients or any(STOP in data for data, _ in received):
                     self._stop_for(server, clients)
+            if self._closed:
+                return
 
     def _stop_for(self, server: socket.socket, clients: Sequence[tuple[bytes, Any]]) -> None:
         client = client_name(clients[0][0].removeprefix(b"estop")) if clients else ""

@@ -129,7 +129,7 @@ def _can_lines(texts: Sequence[str], file: Path | None) -> Iterator[Logged]:
             if (one := can_log.parse_line(text)) is not None:
                 yield one
     else:
-        yield from can_log.read_lines(can_log.lines_of(sys.stdin))
+        yield from can_log.read_lines(sys.stdin)
 
 
 # -- frames --------------------------------------------------------------------------------------------------------

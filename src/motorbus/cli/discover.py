@@ -223,7 +223,7 @@ def _limits(target: Target, driver: AxisDriver) -> tuple[float, float] | None:
 
 
 def _axis_limits(config: Any) -> str:
-    if config is None or config.low is None or config.counted:
+    if config is None or config.low is None:
         return ""
     return f"{config.show(config.low)} to {config.show(config.high)}"
 

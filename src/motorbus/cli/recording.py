@@ -94,8 +94,8 @@ def replay(
         if writing.dry_run:
             trajectory.check(robot.config.axes)
         if agree(action, writing, common, ask=bool(far)):
-            options = {"speed": speed, "smooth": smooth, "repeat": repeat}
-            report(robot, robot.replay(trajectory, **options), common)
+            played = robot.replay(trajectory, speed=speed, smooth=smooth, repeat=repeat)
+            report(robot, played, common)
 
 
 def follow(

@@ -291,7 +291,7 @@ def _sample(target: Target, axes: Any, drivers: dict[str, AxisDriver]) -> Sample
     except MotorbusError as error:
         return Sample(target.name, error=error.summary)
     config, position = axes.get(target.name), state.position
-    of_axis = None if config is None or position is None or config.counted else config.from_device(position)
+    of_axis = None if config is None or position is None else config.from_device(position)
     return Sample(
         target.name,
         position,

@@ -1,11 +1,17 @@
-"""Read and write registers by name: the checks that come before anything is sent."""
+"""Read and write registers by name: the checks before anything is sent, and the check of what was written."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any, Final, TypeVar
 
 from motorbus.core.register import Register, RegisterMap, Value
-from motorbus.errors import RequestError
+from motorbus.core.steps import Runnable
+from motorbus.errors import NoReply, RequestError, VerificationFailed, WireError, unread
+
+T = TypeVar("T")
+
+TRIES: Final = 3  # of a write that reads back different
 
 
 def readable_rows(table: RegisterMap, names: tuple[str, ...]) -> list[Register]:
@@ -44,3 +50,31 @@ def writable_values(
         row.encode(raw, row.given(value))
         found.append((row, raw))
     return found
+
+
+async def check_written(
+    read: Callable[[], Runnable[T]], expected: T, *, node: int, what: str, cause: str = "", advice: str = ""
+) -> None:
+    """Read a value that was written. Raises VerificationFailed for another one, OutcomeUnknown without a reply."""
+    try:
+        found = await read()
+    except (NoReply, WireError) as error:
+        raise unread(error, node=node, what=f"the write of {what}") from error
+    if found != expected:
+        summary = f"node {node}: {what} reads back {found}, not {expected}"
+        raise VerificationFailed(summary, cause=cause, advice=advice, node=node)
+
+
+async def write_verified(
+    write: Callable[[], Runnable[object]], read: Callable[[], Runnable[T]], expected: T, **about: Any
+) -> None:
+    """Write and read back, up to three times while the value differs; `about` and errors as for `check_written`."""
+    for attempt in range(TRIES):
+        await write()
+        try:
+            await check_written(read, expected, **about)
+        except VerificationFailed:
+            if attempt == TRIES - 1:
+                raise
+        else:
+            return

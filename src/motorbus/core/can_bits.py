@@ -1,4 +1,4 @@
-"""The exact length of a CAN frame on the wire, in bits.
+"""The exact length of a CAN data frame on the wire, in bits.
 
 The number of stuff bits depends on the content; frames of many zeros, which these devices send, have more than random
 data. Classic CAN 2.0 (ISO 11898-1): start bit, identifier, control field, data and CRC-15 are stuffed. Delimiters,
@@ -11,7 +11,7 @@ import re
 from functools import lru_cache
 from typing import Final
 
-from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
+from motorbus.core.can_frame import ERROR_FLAG, CanFrame
 
 INTERFRAME: Final = 3  # bits between two frames; counted with the first
 ERROR_BITS: Final = 23
@@ -42,15 +42,11 @@ def bits(frame: CanFrame) -> int:
     """Bits on the wire, with stuff bits and interframe space; `ERROR_BITS` for an error report (`ERROR_FLAG`)."""
     if frame.id & ERROR_FLAG:
         return ERROR_BITS
-    number, remote = frame.id & 0x1FFF_FFFF, int(bool(frame.id & REMOTE_FLAG))
-    data = b"" if remote else frame.data
-    if frame.extended:  # 11 bits, two ones, 18 bits, remote, two zeros
-        head = ((number >> 18) << 2 | 0b11) << 18 | number & 0x3FFFF
-        head = (head << 1 | remote) << 2
-    else:  # 11 bits, remote, two zeros
-        head = (number << 1 | remote) << 2
-    head = head << 4 | len(frame.data)
-    stream = head << 8 * len(data) | int.from_bytes(data, "big")
+    number, data = frame.id & 0x1FFF_FFFF, frame.data
+    # 11 bits and three zeros; or 11 bits, two ones, 18 bits and three zeros
+    base = (number >> 18) << 2 | 0b11
+    head = (base << 18 | number & 0x3FFFF if frame.extended else number) << 3
+    stream = (head << 4 | len(data)) << 8 * len(data) | int.from_bytes(data, "big")
     size = _HEAD[frame.extended] + 8 * len(data)
     crc = 0
     for byte in stream.to_bytes((size + 7) // 8, "big"):  # leading zeros do not change the CRC
@@ -63,14 +59,3 @@ def bits(frame: CanFrame) -> int:
 def least(length: int, extended: bool = False) -> int:
     """Minimum bits of a frame with `length` data bytes: no stuff bits."""
     return _HEAD[extended] + 8 * length + _CRC + _TAIL
-
-
-def precedence(frame: CanFrame) -> tuple[int, ...]:
-    """Sort key of arbitration: of frames that start together, the one with the lowest key wins.
-
-    The first eleven bits of the identifier count first; at equality an 11-bit identifier wins over a 29-bit one.
-    """
-    number, remote = frame.id & 0x1FFF_FFFF, int(bool(frame.id & REMOTE_FLAG))
-    if frame.extended:
-        return (number >> 18, 1, 1, number & 0x3FFFF, remote)
-    return (number, remote, 0, 0, 0)

@@ -11,13 +11,9 @@ A device method does I/O; a plain attribute of a device never does.
 
 from __future__ import annotations
 
-import inspect
-import re
-import sys
 from collections.abc import Callable, Coroutine
-from inspect import Parameter, signature
-from types import MethodType
-from typing import Any, ClassVar, Concatenate, Generic, ParamSpec, Protocol, Self, TypeVar, overload
+from functools import wraps
+from typing import TYPE_CHECKING, Any, ClassVar, Concatenate, Generic, ParamSpec, Protocol, TypeVar, overload
 
 from motorbus.core.steps import Runnable
 from motorbus.errors import RequestError
@@ -81,77 +77,32 @@ class AsyncDevice(_Device):
     bus: AsyncRunner
 
 
-class MethodDescriptor(Generic[P, T]):
-    """Base of descriptors that make a method of a driver function; a subclass says how the method runs it.
+if TYPE_CHECKING:
 
-    The method has the signature of the driver function, which is its attribute `function`. `returns` names the types in
-    which a driver function returns its value.
-    """
+    class device_method(Generic[P, T]):  # noqa: N801 - used like a function
+        """The type of a device method: a blocking device returns the value, an async one a coroutine."""
 
-    returns: ClassVar[str] = "Request|Procedure|Runnable"
+        function: Callable[..., Runnable[T]]
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self.function = function
-        self.name = getattr(function, "__name__", "")
-        self.__doc__ = function.__doc__
-        self._methods: dict[type, Any] = {}
+        def __init__(self, function: Callable[Concatenate[Any, P], Runnable[T]]) -> None: ...
+        @overload
+        def __get__(self, device: None, owner: type) -> device_method[P, T]: ...
+        @overload
+        def __get__(self, device: BlockingDevice, owner: type) -> Callable[P, T]: ...
+        @overload
+        def __get__(self, device: AsyncDevice, owner: type) -> Callable[P, Coroutine[Any, Any, T]]: ...
+        def __get__(self, device: Any, owner: type) -> Any: ...
 
-    def __set_name__(self, owner: type, name: str) -> None:
-        self.name = name
+else:
 
-    def make_method(self) -> Callable[..., Any]:
-        """A function that calls the driver function and runs its result."""
-        raise NotImplementedError
+    def device_method(function: Callable[..., Runnable[T]]) -> Callable[..., Any]:
+        """Make a method that returns `device.bus.run(function(device, ...))`; `function` is its attribute as well."""
 
-    def bind(self, one: Any, owner: type) -> Any:
-        """The method of this object, or that of the class if `one` is None."""
-        found = self._methods.get(owner)
-        if found is None:
-            method: Any = self.make_method()
-            shown = signature(self.function)
-            first, *rest = shown.parameters.values()
-            method.__name__ = self.name
-            method.__qualname__ = f"{owner.__name__}.{self.name}"
-            method.__doc__ = self.function.__doc__
-            method.__signature__ = shown.replace(
-                parameters=[first.replace(name="self", annotation=Parameter.empty), *rest],
-                return_annotation=re.sub(
-                    rf"^(?:{self.returns})\[(.*)\]$", r"\1", str(shown.return_annotation)
-                ),
-            )
-            method.function = self.function
-            if getattr(owner, "_is_async", False) and sys.version_info >= (3, 12):
-                inspect.markcoroutinefunction(method)
-            found = self._methods[owner] = method
-        return found if one is None else MethodType(found, one)
-
-
-class device_method(MethodDescriptor[P, T]):  # noqa: N801 - used like a function
-    """Make a method that returns `device.bus.run(function(device, ...))`.
-
-    `run` of a blocking bus returns the value, `run` of an async bus a coroutine.
-    """
-
-    function: Callable[Concatenate[Any, P], Runnable[T]]
-
-    def __init__(self, function: Callable[Concatenate[Any, P], Runnable[T]]) -> None:
-        super().__init__(function)
-
-    def make_method(self) -> Callable[..., Any]:
-        function: Callable[..., Any] = self.function
-
+        @wraps(function)
         def method(self: Any, /, *args: Any, **kwargs: Any) -> Any:
             # A call without arguments costs less than one with empty ones.
             procedure = function(self, *args, **kwargs) if args or kwargs else function(self)
             return self.bus.run(procedure)
 
+        method.function = function
         return method
-
-    @overload
-    def __get__(self, device: None, owner: type) -> Self: ...
-    @overload
-    def __get__(self, device: BlockingDevice, owner: type) -> Callable[P, T]: ...
-    @overload
-    def __get__(self, device: AsyncDevice, owner: type) -> Callable[P, Coroutine[Any, Any, T]]: ...
-    def __get__(self, device: Any, owner: type) -> Any:
-        return self.bind(device, owner)

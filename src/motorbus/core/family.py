@@ -10,7 +10,6 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from enum import Enum
 from functools import cached_property
 from importlib import import_module
 from math import inf
@@ -74,15 +73,6 @@ class IdChanged(NamedTuple):
     new: int
 
 
-class Quality(Enum):
-    """Reliability of a sample."""
-
-    FRESH = "fresh"  # new and plausible
-    REPEATED = "repeated"  # an older sample again
-    CONFIRMED = "confirmed"  # implausible after the last one, but equal to a suspect one before it
-    SUSPECT = "suspect"  # implausible and not confirmed
-
-
 class State(NamedTuple):
     """One sample of a device in API units (rad, rad/s, fraction, A, V, °C); None for values it does not report."""
 
@@ -95,7 +85,6 @@ class State(NamedTuple):
     temperature: float | None = None
     moving: bool | None = None
     alarm: tuple[str, ...] = ()  # names of the alarm bits that are set
-    quality: Quality = Quality.FRESH
     refused: tuple[str, ...] = ()  # errors of values that the device refused; they are None
 
 
@@ -233,12 +222,6 @@ class Receiver(Protocol):
         """End of data: return the frames in the held bytes, and the remainder as noise."""
 
 
-class RawMemory(Protocol):
-    """The raw value of each row, by name."""
-
-    def __getitem__(self, name: str, /) -> int: ...
-
-
 class Remark(NamedTuple):
     """A note of a simulated device that no host receives: what it ignored, what a fault did."""
 
@@ -264,7 +247,7 @@ class SimulatedNode(Protocol):
     """
 
     @property
-    def memory(self) -> RawMemory: ...
+    def memory(self) -> Any: ...
 
     def unplug(self) -> None: ...
     def plug(self) -> None: ...
@@ -318,11 +301,6 @@ class AxisDriver:
 
     state: Callable[[Any], Runnable[State]] = unsupported
     position: Callable[[Any], Runnable[float]] = unsupported
-    velocity: Callable[[Any], Runnable[float]] = unsupported
-    load: Callable[[Any], Runnable[float]] = unsupported
-    current: Callable[[Any], Runnable[float]] = unsupported
-    voltage: Callable[[Any], Runnable[float]] = unsupported
-    temperature: Callable[[Any], Runnable[float]] = unsupported
     health: Callable[[Any], Runnable[Health]] = unsupported
     """For an identified device a request that can be kept."""
     enable_torque: Callable[[Any], Runnable[None]] = unsupported  # torque on without a jump
@@ -330,19 +308,13 @@ class AxisDriver:
     move: Callable[..., Runnable[Any]] = unsupported  # move(device, to, *, wait): to a position (rad)
     stop: Callable[[Any], Runnable[Any]] = unsupported
     """Decelerate and hold; returns a promise, an Enum whose name begins with HOLD, see `Stop`."""
-    move_by: Callable[..., Runnable[Any]] = unsupported
-    """move_by(device, angle, *, velocity, wait): rad from the present position."""
     jog: Callable[..., Runnable[Any]] = unsupported  # jog(device, velocity, seconds): turn for a time
     home: Callable[..., Runnable[Any]] = unsupported  # home(device, *, deadline): to the home switch
     run: Callable[..., Runnable[Any]] = unsupported  # run(device, number, *, timeout): a stored program
     limits: Callable[[Any], Runnable[tuple[float, float]]] = unsupported
     """Lowest and highest position (rad) in its settings; read if unknown."""
-    travel: Callable[[Any], Runnable[tuple[float, float] | None]] = unsupported
-    """Range (rad) in which its limits must lie; None: unknown."""
     cap_torque: Callable[[Any, float], Runnable[Any]] = unsupported
     """Limit of the torque (fraction) until power-off."""
-    cap_current: Callable[[Any, float], Runnable[Any]] = unsupported
-    """Limit of the current (A) until power-off."""
     stream: Callable[..., Runnable[PositionStream]] = unsupported
     """stream(devices, *, rate): for a control loop; rate in bit/s."""
     set_velocity: Callable[[Any, float], Runnable[Any]] = unsupported

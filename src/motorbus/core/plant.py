@@ -10,7 +10,7 @@ differences matter.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import copysign, inf, isfinite, sqrt
+from math import copysign, inf, sqrt
 from typing import NamedTuple
 
 
@@ -50,10 +50,6 @@ class Motion(NamedTuple):
         """Signed velocity at this moment (s)."""
         return self.state(at)[1]
 
-    def acceleration(self, at: float) -> float:
-        """Signed acceleration at this moment (s)."""
-        return self.state(at)[2]
-
     def state(self, at: float) -> tuple[float, float, float]:
         """Position, velocity and acceleration at this moment (s)."""
         elapsed = max(0.0, at - self.start)
@@ -91,56 +87,39 @@ def move(
     velocity: float = 0.0,
     speed: float,
     acceleration: float = inf,
-    deceleration: float | None = None,
 ) -> Motion:
     """Move to `goal` and stop there: a trapezoid of velocity, or a triangle over a short distance.
 
     With an initial `velocity` too high to stop at the goal it overshoots and returns. An initial velocity away from the
-    goal, or above `speed`, is braked first. It brakes with `deceleration`, by default `acceleration`. With infinite
-    `acceleration` the velocity changes at once. `speed` 0 brakes to a halt anywhere.
-
-    Raises ValueError for a negative speed, an acceleration of 0 or less, NaN, an infinite position or velocity, if both
-    speed and acceleration are infinite, and if only one of acceleration and deceleration is.
+    goal, or above `speed`, is braked first. With infinite `acceleration` the velocity changes at once. `speed` 0 brakes
+    to a halt anywhere.
+    The caller gives finite values, except for `acceleration`, which is above 0.
     """
-    _check(speed, acceleration, position, goal, velocity)
-    braking = acceleration
-    if deceleration is not None:
-        _check(speed, deceleration)
-        if (deceleration == inf) != (acceleration == inf):
-            raise ValueError("acceleration and deceleration are both infinite, or none is")
-        braking = deceleration
     if not speed:
-        return run(at, position, 0.0, velocity=velocity, acceleration=braking)
+        return run(at, position, 0.0, velocity=velocity, acceleration=acceleration)
     if acceleration == inf:
         distance = goal - position
         full_speed = Phase(abs(distance) / speed, position, copysign(speed, distance), 0.0)
         return Motion(at, (full_speed,) if distance else (), goal)
-    halt = position + velocity * abs(velocity) / (2 * braking)
-    if goal == halt:
-        return _braked(at, position, velocity, goal, braking)
+    halt = position + velocity * abs(velocity) / (2 * acceleration)
+    if goal == halt:  # braking at once ends exactly there
+        brake = Phase(abs(velocity) / acceleration, position, velocity, -copysign(acceleration, velocity))
+        return Motion(at, (brake,) if velocity else (), goal)
     way = copysign(1.0, goal - halt)
-    if way * velocity < 0 and braking != acceleration:  # acceleration changes where the direction does
-        first = _braked(at, position, velocity, halt, braking)
-        back = move(at, halt, goal, speed=speed, acceleration=acceleration, deceleration=braking)
-        return Motion(at, first.phases + back.phases, goal)
     square = 2 * acceleration * way * (goal - position) + velocity**2
-    share = braking / (acceleration + braking) * square
-    peak = sqrt(share) if share > 0.0 else 0.0
-    if speed < peak:
-        peak = speed
+    peak = min(speed, sqrt(max(0.0, 0.5 * square)))
     cruises = peak == speed
-    ramp_limit = acceleration if peak > way * velocity else braking
     peak *= way
     gain = peak - velocity
-    ramp, slope = abs(gain) / ramp_limit, copysign(ramp_limit, gain)
+    ramp, slope = abs(gain) / acceleration, copysign(acceleration, gain)
     reached = position + ramp * (velocity + 0.5 * slope * ramp)
-    brakes_at = goal - peak * abs(peak) / (2 * braking)
+    brakes_at = goal - peak * abs(peak) / (2 * acceleration)
     phases: tuple[Phase, ...] = (Phase(ramp, position, velocity, slope),) if ramp else ()
     # A triangle has no cruise: its difference is a rounding error, which a tiny peak would turn into a long time.
     if cruises and (cruise := (brakes_at - reached) / peak) > 0.0:
         phases += (Phase(cruise, reached, peak, 0.0),)
-    if brake := abs(peak) / braking:
-        phases += (Phase(brake, brakes_at, peak, -copysign(braking, peak)),)
+    if brake_time := abs(peak) / acceleration:
+        phases += (Phase(brake_time, brakes_at, peak, -copysign(acceleration, peak)),)
     return Motion(at, phases, goal)
 
 
@@ -148,29 +127,11 @@ def run(
     at: float, position: float, velocity_goal: float, *, velocity: float = 0.0, acceleration: float = inf
 ) -> Motion:
     """Accelerate to `velocity_goal` and keep it without end, as a wheel; 0 brakes to a halt."""
-    _check(abs(velocity_goal), acceleration, position, velocity_goal, velocity)
     change = velocity_goal - velocity
     if not change or acceleration == inf:
         return Motion(at, (), position, velocity_goal)
     ramp = Phase(abs(change) / acceleration, position, velocity, copysign(acceleration, change))
     return Motion(at, (ramp,), ramp.position_after(ramp.duration), velocity_goal)
-
-
-def _check(speed: float, acceleration: float, *finite: float) -> None:
-    if not all(map(isfinite, finite)):
-        raise ValueError("position, goal and velocity must be finite")
-    if not speed >= 0 or not acceleration > 0:
-        raise ValueError("speed must be 0 or more, acceleration more than 0")
-    if speed == acceleration == inf:
-        raise ValueError("speed and acceleration cannot both be infinite")
-
-
-def _braked(at: float, position: float, velocity: float, goal: float, acceleration: float) -> Motion:
-    """Brake at once; the stopping distance ends exactly at `goal`."""
-    if not velocity:
-        return rest(at, goal)
-    phase = Phase(abs(velocity) / acceleration, position, velocity, -copysign(acceleration, velocity))
-    return Motion(at, (phase,), goal)
 
 
 @dataclass(frozen=True, slots=True)

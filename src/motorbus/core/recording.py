@@ -24,10 +24,6 @@ RecordedEvent: TypeAlias = RecordedFrame | Noise
 class RecordingReceiver(Protocol):
     """Parses recorded data of one direction. The result does not depend on the boundaries between chunks."""
 
-    @property
-    def code_meaning(self) -> str:
-        """The meaning of `RecordedFrame.code`, in words."""
-
     def feed(self, data: Data, /) -> list[RecordedEvent]:
         """Take a chunk of bytes, or one CAN frame; return the events that are complete. Never raises."""
 

@@ -6,9 +6,9 @@ A `Request` is a step: a procedure awaits it, see `core.steps`.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from enum import Enum, IntEnum
-from typing import Any, ClassVar, Final, Generic, NamedTuple, TypeAlias, TypeVar
+from typing import Any, Final, Generic, NamedTuple, TypeAlias, TypeVar
 
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.setpoint import Deferred, Setpoint
@@ -166,10 +166,6 @@ class Request(Step[T_co]):
     """Fast path of `decode` for a request that is kept: decodes the bytes of all expected replies at once."""
     attempt: Any = field(default=None, init=False)  # that a bus keeps for a request with `decode_exact`
 
-    group: ClassVar[Any] = None
-    prechecked: ClassVar[bool] = False
-    """Every setpoint is within the limits that it carries, and none is an endless motion; see `SetpointWrite`."""
-
     @property
     def setpoint_nodes(self) -> Sequence[int]:
         """The nodes of the setpoints."""
@@ -177,9 +173,9 @@ class Request(Step[T_co]):
 
     def with_decoder(self, decode: Callable[[Response], T]) -> Request[T]:
         """The same request with another `decode`, without `decode_exact`."""
-        own = ("wire", "expected", "decode", "decode_exact", "attempt")
-        rest = [name for name in Request.__slots__ if name not in own]
-        return Request(self.wire, self.expected, decode, **{name: getattr(self, name) for name in rest})
+        given: Any = self
+        changed: Request[T] = replace(given, decode=decode, decode_exact=None)
+        return changed
 
     def convert(self, function: Callable[[T_co], T]) -> Request[T]:
         """The same request, whose value is `function` of the value of this one."""
@@ -193,69 +189,32 @@ class Request(Step[T_co]):
         return f"<Request {text}>"
 
 
-class SetpointGroup:
+class SetpointGroup(NamedTuple):
     """The common part of `SetpointWrite`s: their nodes, the conversion of raw values to setpoints, the precondition."""
 
-    __slots__ = ("nodes", "precondition", "to_setpoints")
-
-    def __init__(
-        self,
-        nodes: Sequence[int],
-        to_setpoints: Callable[[Sequence[int]], tuple[Setpoint, ...]],
-        precondition: Precondition,
-    ) -> None:
-        self.nodes: Final = nodes
-        self.to_setpoints: Final = to_setpoints
-        self.precondition: Final = precondition
+    nodes: Sequence[int]
+    to_setpoints: Callable[[Sequence[int]], tuple[Setpoint, ...]]
+    precondition: Precondition
 
 
 class SetpointWrite(Request[None]):
-    """A request of a control loop that moves several nodes and has no reply; see `Request`.
+    """A request of a control loop that moves several nodes and has no reply."""
 
-    A loop makes one in each cycle, so it costs little more than its bytes: `setpoints` are computed when a caller first
-    reads them. It is `prechecked`: each setpoint is finite and within the limits that it carries, none is endless.
-    """
+    __slots__ = ("_raws", "group")
 
-    __slots__ = ("_raws", "_setpoints", "group")
-
-    group: SetpointGroup  # type: ignore[misc]
-    precondition: Precondition  # type: ignore[misc]
-    prechecked = True
-    # Equal for all of these requests, so they are class attributes.
-    expected = ()  # type: ignore[misc]
-    lane = 0  # type: ignore[misc]
-    priority = Priority.CONTROL  # type: ignore[misc]
-    effect = Effect.MOTION  # type: ignore[misc]
-    reply_within = TimeoutClass.REPLY  # type: ignore[misc]
-    repeatable = False  # type: ignore[misc]
-    reports_position = False  # type: ignore[misc]
-    deferred = None  # type: ignore[misc]
-    decode_exact = None
-    attempt = None
-
-    def __init__(self, wire: bytes, group: SetpointGroup, raws: Sequence[int]) -> None:
-        self.wire = wire  # type: ignore[misc]
-        self.group = group
-        self.precondition = group.precondition  # type: ignore[misc]
-        self._raws = raws
-        self._setpoints: tuple[Setpoint, ...] | None = None
+    def __init__(self, wire: Data, group: SetpointGroup, raws: Sequence[int]) -> None:
+        super().__init__(
+            wire,
+            (),
+            lambda _: None,
+            priority=Priority.CONTROL,
+            effect=Effect.MOTION,
+            setpoints=group.to_setpoints(raws),
+            precondition=group.precondition,
+        )
+        self.group: Final = group
+        self._raws: Final = raws
 
     def with_group(self, group: SetpointGroup) -> SetpointWrite:
         """The same request with another group."""
-        return SetpointWrite(self.wire, group, self._raws)  # type: ignore[arg-type]  # always bytes here
-
-    @staticmethod
-    def decode(_: Response) -> None:
-        """There is no reply to decode."""
-
-    @property  # type: ignore[misc]
-    def setpoints(self) -> tuple[Setpoint, ...]:
-        """What the request asks of each node, for the gate."""
-        if self._setpoints is None:
-            self._setpoints = self.group.to_setpoints(self._raws)
-        return self._setpoints
-
-    @property
-    def setpoint_nodes(self) -> Sequence[int]:
-        """The nodes of the setpoints."""
-        return self.group.nodes
+        return SetpointWrite(self.wire, group, self._raws)

@@ -18,12 +18,20 @@ class Skipped(NamedTuple):
 
 
 class BitrateRestored(Guard):
-    """The bit rate of the bus (`rate`, bit/s) is set again at the end of the block."""
+    """The present bit rate of the bus (`rate`) is set again at the end of the block, which has its rate or this one.
+
+    Reserve the bus.
+    """
 
     rate = 0
 
+    def __init__(self, in_block: int = 0) -> None:
+        self._in_block = in_block
+
     async def enter(self) -> None:
         self.rate = await SetBitrate(0)
+        if self._in_block:
+            await SetBitrate(self._in_block)
 
     async def leave(self, error: BaseException | None) -> None:
         await SetBitrate(self.rate)

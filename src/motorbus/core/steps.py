@@ -87,14 +87,9 @@ class WaitFor(Step["Notification | None"]):
 
 @dataclass(slots=True, eq=False)
 class SetBitrate(Step[int]):
-    """Set the rate of the link (bit/s) when nothing is in flight; gives the previous rate. 0 only reads it.
-
-    With `listen_only` the link sends nothing until the next `SetBitrate`, not even the acknowledge bit of CAN: a bus of
-    unknown rate is not disturbed. A serial link has no such bit.
-    """
+    """Set the rate of the link (bit/s) when nothing is in flight; gives the previous rate. 0 only reads it."""
 
     rate: Final[int]
-    listen_only: Final[bool] = False
 
 
 class Progress(NamedTuple):

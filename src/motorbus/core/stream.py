@@ -4,21 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Final, Generic, Protocol, TypeVar
+from typing import Final, Generic, TypeVar
 
 from motorbus.core.family import Positions
-from motorbus.core.register import is_number, shown
+from motorbus.core.move import Device
+from motorbus.core.register import shown
 from motorbus.core.request import Precondition, Request, Stops
 from motorbus.core.steps import Procedure, gather
 from motorbus.errors import RequestError
-
-
-class Device(Protocol):
-    """A device of a stream."""
-
-    @property
-    def node(self) -> int: ...
-
 
 N = TypeVar("N", bound=Device)
 
@@ -72,14 +65,8 @@ class PositionStream(Generic[N]):
 
     async def start(self, speeds: Mapping[int, float]) -> None:
         """Prepare all devices at the same time; then raise the first error."""
-        for node, speed in speeds.items():
-            self._device(node)
-            if not (is_number(speed) and speed > 0):
-                raise RequestError(
-                    f"node {node}: {shown(speed)} is no speed",
-                    expected="a number above 0, in rad/s",
-                    node=node,
-                )
+        for node in speeds:
+            self._device(node)  # raises
         await gather(*[self._start(device, speeds.get(node)) for node, device in self._devices.items()])
 
     def _device(self, node: int) -> N:

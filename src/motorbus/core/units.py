@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from fractions import Fraction
 from math import isfinite, pi
 from typing import Final
 
@@ -48,7 +47,6 @@ MAX_RATE: Final = 1e6  # Hz; one byte takes longer than such a cycle on the fast
 
 _MILLIMETRES = {"length": "mm", "linear velocity": "mm/s", "linear acceleration": "mm/s²"}
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
-_RATE = re.compile(r"(\d+(?:\.\d+)?)([kM])", re.ASCII)
 _FACTORS = {"k": 1000, "M": 1_000_000}
 
 
@@ -145,12 +143,12 @@ def rate(text: object) -> int:
     Raises RequestError for text that is not a whole number of bit/s above 0.
     """
     stripped = str(text).strip()
-    short = _RATE.fullmatch(stripped)
+    factor = _FACTORS.get(stripped[-1:], 1)
     try:
-        found = Fraction(short[1]) * _FACTORS[short[2]] if short else Fraction(whole(stripped))
+        found = real(stripped[:-1]) * factor if factor > 1 else whole(stripped)
     except ValueError:
-        found = Fraction(0)
-    if found <= 0 or found.denominator != 1:
+        found = 0
+    if not (0 < found < LONG * LONG and found == int(found)):
         raise RequestError(
             f"{text} is not a rate", expected="bit/s, as 500000, 500k or 1M", advice="nothing was sent"
         )

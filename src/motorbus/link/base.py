@@ -45,8 +45,8 @@ class Link(Protocol):
         A moment in the past does not wait. The list is empty when nothing arrived.
         """
 
-    def tune(self, rate: int, listen_only: bool = False) -> None:
-        """Set the rate in bit/s; with `listen_only` a CAN adapter sends nothing from now on. Raises LinkError."""
+    def tune(self, rate: int) -> None:
+        """Set the rate in bit/s. Raises LinkError."""
 
     def fileno(self) -> int | None:
         """A descriptor that is readable when data has arrived; None where there is none."""

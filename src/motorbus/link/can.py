@@ -8,7 +8,6 @@ Some back ends ignore an unknown option, and some take another bit rate for one 
 from __future__ import annotations
 
 import contextlib
-import difflib
 import errno
 import json
 import logging
@@ -24,7 +23,7 @@ from threading import Lock
 from types import ModuleType
 from typing import Any, Final, NamedTuple
 
-from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, CanFrame
+from motorbus.core.can_frame import ERROR_FLAG, CanFrame
 from motorbus.core.request import Data
 from motorbus.errors import LinkError, LinkFull, LinkLost, MotorbusError, PortNotFound, RequestError
 from motorbus.link import usb_adapters
@@ -48,8 +47,6 @@ _WAITING: Final = ("serial", "seeedstudio")
 """Interfaces whose recv(0) waits for their serial port."""
 _FRAME_DESCRIPTOR: Final = ("socketcan", "udp_multicast")
 """Interfaces whose descriptor is readable exactly when there is a frame."""
-_KERNEL_ERRORS: Final = ("socketcan", "socketcand")
-"""Interfaces whose error frames are those of the Linux kernel."""
 _IDENTIFIER: Final = ERROR_FLAG - 1
 _FULL: Final = (errno.ENOBUFS, errno.EAGAIN)
 _FULL_TEXTS: Final = ("full", "overflow", "could not send message to one or more")
@@ -114,18 +111,13 @@ def read_address(port: str) -> CanAddress:
         lock_name = channel.partition("@")[0]
         device = "" if "://" in channel else lock_name
     if not interface or (not channel and interface in (*SERIAL_PORTS, "socketcand")):
-        raise RequestError(
-            f"{port!r} does not name an interface and its channel",
-            expected=f"can://INTERFACE/CHANNEL, as {EXAMPLES}",
-        )
-    known = python_can(port).VALID_INTERFACES
-    if interface not in known:
-        near = difflib.get_close_matches(interface, known, 1)
-        raise RequestError(
-            f"{port!r}: python-can has no interface {interface!r}",
-            advice=f"did you mean {near[0]}?" if near else f"for example {EXAMPLES}",
-        )
-    return CanAddress(port, interface, channel, options, "" if interface in SHARED else lock_name, device)
+        problem = "does not name an interface and its channel"
+    elif interface not in python_can(port).VALID_INTERFACES:
+        problem = f"python-can has no interface {interface!r}"
+    else:
+        lock_name = "" if interface in SHARED else lock_name
+        return CanAddress(port, interface, channel, options, lock_name, device)
+    raise RequestError(f"{port!r}: {problem}", expected=f"can://INTERFACE/CHANNEL, as {EXAMPLES}")
 
 
 def python_can(port: str) -> ModuleType:
@@ -175,23 +167,32 @@ class CanLink:
         self.no_wire, self.lock_name, self.device = address.no_wire, address.lock_name, address.device
         self.options = {name: _SWITCHES.get(value, value) for name, value in (options or {}).items()}
         self.connect_time = connect_time
-        listen_only = self.options.pop("listen_only", False)
+        self.rate = rate or default_rate
+        self.listen_only = bool(listen_only := self.options.pop("listen_only", False))
         if not isinstance(listen_only, bool):
             raise RequestError(f"listen_only={listen_only}: neither yes nor no", expected="yes or no")
-        self.rate, self.listen_only = rate or default_rate, listen_only
         if self.rate <= 0:
             raise RequestError(
                 f"{self.name}: the bit rate is missing", expected="bitrate=500000, for example"
             )
-        self._check_mode(listen_only)
+        if listen_only and address.interface not in LISTEN_ONLY:
+            raise LinkError(
+                f"{self.name}: {address.interface} cannot only listen: its adapter would acknowledge frames",
+                expected=f"listen_only with one of {', '.join(LISTEN_ONLY)}",
+                advice="leave out listen_only where nothing else is on the bus",
+            )
         is_kernel = address.interface == "socketcan"
         if is_kernel:
-            self._check_kernel(rate)
+            self.queue = kernel_queue(address.channel)
+            actual = kernel_rate(address, rate, listen_only)
+            if actual is None:
+                self.warnings = (f"the kernel did not tell the bit rate; {self.rate} bit/s is assumed",)
+            self.rate = actual or self.rate
         is_free = not self.lock_name or (shared and is_kernel)
         with nullcontext(PortLock(self.name)) if is_free else opening(self.lock_name, lock) as self.lock:
             self.open_port()
             try:
-                self.configure(self.rate, listen_only)
+                self.configure(self.rate)
             except BaseException:
                 self.shut()
                 raise
@@ -199,7 +200,7 @@ class CanLink:
     def open_port(self) -> None:
         """Prepare for `configure`: open the serial port of the adapter, where that is apart from its channel."""
 
-    def configure(self, rate: int, listen_only: bool) -> None:
+    def configure(self, rate: int) -> None:
         """Open the channel again, at this rate in bit/s. Raises LinkError for a rate or mode that it refuses."""
         raise NotImplementedError
 
@@ -211,46 +212,27 @@ class CanLink:
         """Send a frame; raises as `Link.write` does."""
         raise NotImplementedError
 
-    def _check_mode(self, listen_only: bool) -> None:
-        interface = self.address.interface
-        if listen_only and interface not in LISTEN_ONLY:
-            raise LinkError(
-                f"{self.name}: {interface} cannot only listen: its adapter would acknowledge frames",
-                expected=f"listen_only with one of {', '.join(LISTEN_ONLY)}",
-                advice="leave out listen_only where nothing else is on the bus",
-            )
-
-    def _check_kernel(self, rate: int) -> None:
-        """Take over the settings of a SocketCAN interface. Raises LinkError where they are not this rate and mode."""
-        self.queue = kernel_queue(self.address.channel)
-        actual = kernel_rate(self.address, rate, self.listen_only)
-        if actual is None:
-            self.warnings = (f"the kernel did not tell the bit rate; {self.rate} bit/s is assumed",)
-        self.rate = actual or self.rate
-
     def write(self, data: Data) -> None:
         assert isinstance(data, CanFrame)
         if self.listen_only:
             raise LinkError(f"{self.name} only listens and cannot send", sent=data)
         self.send(data)
 
-    def tune(self, rate: int, listen_only: bool = False) -> None:
-        before, wanted = (self.rate, self.listen_only), (rate or self.rate, listen_only)
-        if wanted == before:
+    def tune(self, rate: int) -> None:
+        if rate == self.rate:
             return
-        self._check_mode(listen_only)
         if self.address.sets_rate:
             try:
-                self.configure(*wanted)
+                self.configure(rate)
             except MotorbusError:
-                self.configure(*before)
+                self.configure(self.rate)
                 raise
         elif self.address.interface not in SHARED:
             raise LinkError(
-                f"{self.name}: its bit rate and mode cannot be changed from here",
-                advice="set them where the adapter is: `ip link set` for SocketCAN",
+                f"{self.name}: its bit rate cannot be changed from here",
+                advice="set it where the adapter is: `ip link set` for SocketCAN",
             )
-        self.rate, self.listen_only = wanted
+        self.rate = rate
 
     def trouble(self) -> str:
         """What the adapter has reported since the last call, for the error of a missing reply; "" for nothing."""
@@ -287,13 +269,13 @@ class PythonCanLink(CanLink):
             wait = f"waits up to {1000 * SERIAL_WAIT:.0f} ms for a frame, so requests are slow"
             self.warnings = (f"python-can's {interface} {wait}",)
 
-    def configure(self, rate: int, listen_only: bool) -> None:
+    def configure(self, rate: int) -> None:
         self.shut()
         address = self.address
         settings = {**self.options, **address.options}
         if address.sets_rate and "f_clock" not in settings:  # a bit timing of python-can
             settings["bitrate"] = rate
-        if listen_only:
+        if self.listen_only:
             settings.update(LISTEN_ONLY[address.interface])
         try:
             with warnings.catch_warnings():
@@ -313,7 +295,7 @@ class PythonCanLink(CanLink):
                 frames = self._receive(pause)
             if time.monotonic() >= until:
                 break
-        if self.address.interface in _KERNEL_ERRORS:
+        if self.address.interface.startswith("socketcan"):  # others have other bits
             for frame in frames:
                 if frame.id & ERROR_FLAG and frame.id & BUS_OFF:
                     raise LinkLost(
@@ -342,11 +324,7 @@ class PythonCanLink(CanLink):
 
     def send(self, frame: CanFrame) -> None:
         message = self._can.Message(
-            arbitration_id=frame.id & _IDENTIFIER,
-            data=bytearray(frame.data),
-            dlc=len(frame.data),
-            is_extended_id=frame.extended,
-            is_remote_frame=bool(frame.id & REMOTE_FLAG),
+            arbitration_id=frame.id, data=bytearray(frame.data), is_extended_id=frame.extended
         )
         if self._bus is None:
             raise lost(self.name, "it is closed")
@@ -373,13 +351,11 @@ class PythonCanLink(CanLink):
 
 
 def frame_of(message: Any) -> CanFrame | None:
-    """The frame of a python-can message; None for CAN FD and for our own frames."""
-    if message.is_fd or not message.is_rx:
+    """The frame of a python-can message; None for a remote or CAN FD frame, and for our own frames."""
+    if message.is_fd or message.is_remote_frame or not message.is_rx:
         return None
     if message.is_error_frame:
         return CanFrame(message.arbitration_id & _IDENTIFIER | ERROR_FLAG, bytes(message.data or b"")[:8])
-    if message.is_remote_frame:
-        return CanFrame(message.arbitration_id | REMOTE_FLAG, bytes(message.dlc), message.is_extended_id)
     return CanFrame(message.arbitration_id, bytes(message.data), message.is_extended_id)
 
 

@@ -27,14 +27,11 @@ class Owner(NamedTuple):
 
 def not_found(port: str, others: Sequence[PortInfo]) -> PortNotFound:
     """There is no such port; `others` are the ports of this machine."""
-    advice = "is the adapter plugged in, the simulator running? `motorbus scan` lists the ports"
-    cause = ""
+    advice, cause = "is the adapter plugged in, the simulator running? `motorbus scan` lists the ports", ""
     if os.path.islink(port):
         cause = f"it leads to {os.readlink(port)}, which is gone"
-    elif os.name != "nt" and "://" not in port and not os.path.isabs(port):
-        cause = f"it is relative to the working directory: {os.path.abspath(port)}"
-        if os.path.exists(f"/dev/{port}"):
-            advice = f"did you mean /dev/{port}? {advice}"
+    elif os.path.exists(f"/dev/{port}"):
+        advice = f"did you mean /dev/{port}? {advice}"
     return PortNotFound(
         f"{port}: there is no such port", expected=_listed(others), cause=cause, advice=advice
     )

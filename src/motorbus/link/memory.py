@@ -17,7 +17,7 @@ from motorbus.core.can_bits import bits
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import Simulator
 from motorbus.core.request import Data
-from motorbus.errors import LinkError, LinkLost, RequestError
+from motorbus.errors import LinkLost, RequestError
 from motorbus.link.base import Line, PerfectLine, Side
 
 BITS_PER_BYTE = 10  # with start and stop bits
@@ -103,8 +103,6 @@ class MemoryLink:
         with self._condition:
             now = self.now()
             self._check(now)
-            if self.listen_only:
-                raise LinkError(f"{self.name} only listens and cannot send")
             self._send(Side.HOST, data, now)
             self._condition.notify_all()
 
@@ -135,9 +133,8 @@ class MemoryLink:
             self._move_clock(until)
         return until < inf or not self.virtual
 
-    def tune(self, rate: int, listen_only: bool = False) -> None:
+    def tune(self, rate: int) -> None:
         self.rate = rate
-        self.listen_only = listen_only
         self.simulator.tune(rate)
 
     def fileno(self) -> int | None:

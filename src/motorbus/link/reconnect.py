@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from threading import Lock
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from motorbus.core.request import Data
 from motorbus.errors import AnotherAdapter, LinkLost, MotorbusError, PortNotFound
@@ -21,8 +21,9 @@ from motorbus.link import usb_adapters
 from motorbus.link.base import Link
 from motorbus.link.errors import lost
 from motorbus.link.lock import PortLock
-from motorbus.link.serial import list_ports
+from motorbus.link.serial import ports
 from motorbus.link.url import open_link
+from motorbus.link.usb_adapters import PortInfo
 
 RETRY: Final = 0.1  # s between two tries
 CONNECT_TIME: Final = 0.1  # s for a host of the network: the caller has other work
@@ -30,59 +31,32 @@ RETRY_ADVICE: Final = (
     "it is looked for again whenever something is asked for; nothing of before is sent again"
 )
 
-Lister = Callable[[], Iterable[Any]]
-"""Lists the serial ports, as `serialx.list_serial_ports` does."""
 
-
-class Adapter(NamedTuple):
-    """A USB adapter; `port` tells the ports of one adapter apart."""
-
-    vendor: int
-    product: int
-    serial_number: str
-    port: tuple[object, ...]
-
-    def __str__(self) -> str:
-        mark = f" with the serial number {self.serial_number}" if self.serial_number else ""
-        return f"the adapter {self.vendor:04x}:{self.product:04x}{mark}"
-
-
-def list_adapters(lister: Lister) -> dict[str, Adapter]:
-    """The USB adapter of each serial port that the system lists, by its device."""
-    return {
-        os.path.realpath(port.resolved_device): Adapter(
-            port.vid, port.pid or 0, port.serial_number or "", (port.interface_num, port.port_number)
-        )
-        for port in lister()
-        if port.vid is not None
-    }
-
-
-def find_adapter(name: str, device: str, wanted: Adapter | None, lister: Lister) -> str:
+def find_adapter(name: str, device: str, wanted: PortInfo | None, present: Sequence[PortInfo]) -> str:
     """The present device of an adapter that was `device`; `name` is what messages call it, None: it is not on USB.
 
     Raises PortNotFound, or AnotherAdapter when another one has taken its place.
     """
-    adapters = list_adapters(lister)
-    there = adapters.get(device)
-    if there == wanted and os.path.exists(device):
+    adapters = {os.path.realpath(port.device): port.adapter for port in present if port.adapter}
+    there, mine = adapters.get(device, ""), wanted.adapter if wanted else ""
+    if there == mine and os.path.exists(device):
         return device
     if wanted is not None and wanted.serial_number:
         for path, adapter in adapters.items():
-            if adapter == wanted:
+            if adapter == mine:
                 return path
-    if there is None or there == wanted:
-        raise PortNotFound(f"{name}: {wanted or f'the port {device}'} is not there")
+    if there in ("", mine):
+        raise PortNotFound(f"{name}: {mine or f'the port {device}'} is not there")
     raise AnotherAdapter(
         f"{name} is gone, and there is another in its place: {there}",
-        expected=str(wanted or f"the port {device}"),
+        expected=mine or f"the port {device}",
         cause="another adapter was plugged in and got the name of the lost one",
         advice="plug in the first one, or open the bus again with the right name",
     )
 
 
 class Reconnecting:
-    """A link that is reopened after a loss; see `reconnecting`. It keeps the lock of `link`.
+    """A link that is reopened after a loss, at its present rate; see `reconnecting`. It keeps the lock of `link`.
 
     `find` returns the present address, and raises PortNotFound while the port is absent, LinkLost for another adapter.
     `settings` are for `open_link`. `on_rename` is called with the new name of the lock, and with "" when another
@@ -113,7 +87,7 @@ class Reconnecting:
             link.lock = PortLock(link.lock.port)  # closing the link releases nothing
         link.name = self.name
         self._link = link
-        self.listen_only = bool(getattr(link, "listen_only", False))
+        self.listen_only: bool = getattr(link, "listen_only", False)
         self.rate: int = link.rate
         self.warnings: tuple[str, ...] = link.warnings
         self.latency: float = link.latency
@@ -121,20 +95,16 @@ class Reconnecting:
         self.read: Callable[[float], list[Data]] = link.read
         self.write: Callable[[Data], None] = link.write
         self.fileno: Callable[[], int | None] = link.fileno
+        self.trouble: Callable[[], str] = getattr(link, "trouble", str)
 
     @property
     def lock_name(self) -> str:
         """The name under which the port is locked; "" when it is not."""
         return self._lock.port if self._lock.held else ""
 
-    def tune(self, rate: int, listen_only: bool = False) -> None:
-        self._link.tune(rate, listen_only)
-        self.rate, self.listen_only = self._link.rate, listen_only
-
-    def trouble(self) -> str:
-        """What the adapter has reported since the last call."""
-        report: str = getattr(self._link, "trouble", str)()
-        return report
+    def tune(self, rate: int) -> None:
+        self._link.tune(rate)
+        self.rate = self._link.rate
 
     def close(self) -> None:
         self._closed = True
@@ -153,8 +123,10 @@ class Reconnecting:
                 raise self._loss()
             self._link.close()
             before = self._lock
+            lock = before if before.held else None
             try:
-                self._use(self._reopen())
+                settings = {**self._settings, "rate": self.rate}
+                self._use(open_link(self._find(), lock=lock, connect_time=CONNECT_TIME, **settings))
             except (MotorbusError, OSError) as error:
                 self._error = error
                 if isinstance(error, AnotherAdapter) and before.held:  # any program may open that one
@@ -168,22 +140,6 @@ class Reconnecting:
             if self._lock is not before:
                 before.release()
                 self.on_rename(self.lock_name)
-
-    def _reopen(self) -> Link:
-        """Open the port with its present rate and mode."""
-        settings = {**self._settings, "rate": self.rate}
-        if settings.get("kind") == "frames":
-            settings["options"] = {**(settings.get("options") or {}), "listen_only": self.listen_only}
-        lock = self._lock if self._lock.held else None
-        address = self._find()
-        link = open_link(address, lock=lock, connect_time=CONNECT_TIME, **settings)
-        try:
-            if self._find() == address:
-                return link
-            raise PortNotFound(f"{self.name} was exchanged while it was opened")
-        except BaseException:
-            link.close()
-            raise
 
     def rest(self, until: float) -> None:
         """See `Renewable.rest`."""
@@ -199,7 +155,7 @@ class Reconnecting:
         return LinkLost(error.summary, expected=error.expected, cause=error.cause, advice=advice)
 
 
-def reconnecting(link: Link, *, lister: Lister = list_ports, **settings: Any) -> Link:
+def reconnecting(link: Link, *, lister: Callable[[], Sequence[PortInfo]] = ports, **settings: Any) -> Link:
     """The same link, reopened after a loss; `settings` are those it was opened with, see `open_link`.
 
     Not for a pseudo-terminal opened by its number, which goes to the next terminal, nor for a port without a lock.
@@ -213,6 +169,6 @@ def reconnecting(link: Link, *, lister: Lister = list_ports, **settings: Any) ->
         return link
     if not device or is_terminal:
         return Reconnecting(link, lambda: name, settings)
-    known = list_adapters(lister).get(real)
+    known = next((port for port in lister() if port.adapter and os.path.realpath(port.device) == real), None)
     port_at: Callable[[str], str] = getattr(link, "port_at", str)
-    return Reconnecting(link, lambda: port_at(find_adapter(name, real, known, lister)), settings)
+    return Reconnecting(link, lambda: port_at(find_adapter(name, real, known, lister())), settings)

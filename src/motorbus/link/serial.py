@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 from motorbus.core.request import Data
 from motorbus.errors import LinkError, PortNotFound, RequestError
@@ -45,6 +45,8 @@ TERMIOS2 = struct.Struct("=4I20s2I")
 
 def ports(lister: Callable[[], Iterable[SerialPortInfo]] | None = None) -> list[PortInfo]:
     """The serial ports of this machine, USB adapters first."""
+    import serialx
+
     found = [
         PortInfo(
             device=port.resolved_device,
@@ -55,17 +57,11 @@ def ports(lister: Callable[[], Iterable[SerialPortInfo]] | None = None) -> list[
             manufacturer=port.manufacturer or "",
             product=port.product or "",
             guess=usb_adapters.ADAPTERS.get((port.vid, port.pid), ""),
+            part=(port.interface_num, port.port_number),
         )
-        for port in (lister or list_ports)()
+        for port in (lister or serialx.list_serial_ports)()
     ]
     return sorted(found, key=lambda port: (port.vid is None, port.device))
-
-
-def list_ports() -> list[SerialPortInfo]:
-    """The serial ports of this machine, as serialx describes them."""
-    import serialx
-
-    return list(serialx.list_serial_ports())
 
 
 class SerialLink(StreamLink):
@@ -78,9 +74,10 @@ class SerialLink(StreamLink):
     def __init__(
         self, port: str, *, rate: int, sysfs: Path = Path("/sys"), lock: PortLock | None = None
     ) -> None:
+        import fcntl
+        import termios
+
         self.name = port
-        self.rate = rate
-        self._serial: BaseSerial | None = None
         device = os.path.realpath(port)
         self.paced = not device.startswith(usb_adapters.PSEUDO_TERMINALS)
         if not os.path.exists(device):
@@ -90,36 +87,34 @@ class SerialLink(StreamLink):
         if is_memory or not stat.S_ISCHR(status.st_mode):
             raise not_a_port(port, ports())
         with opening(port, lock) as self.lock:
-            self._open(device)
+            user = find_user(device)
+            if user is not None:
+                raise busy(port, user)
+            self._serial: BaseSerial | None = _open_serial(port, device, rate)
+            try:
+                descriptor = self._serial.fileno()
+                os.set_blocking(descriptor, False)
+                self.attach(descriptor, partial(os.read, descriptor), partial(os.write, descriptor))
+                if self.paced:  # a pseudo-terminal would keep the mark while its simulator has it open
+                    with contextlib.suppress(OSError):
+                        fcntl.ioctl(descriptor, termios.TIOCEXCL)  # later opens fail, except those of root
+                self._take_rate(rate)
+            except BaseException:
+                self.close()
+                raise
         self.latency, self.warnings = usb_adapters.device_latency(device, sysfs)
 
-    def _open(self, device: str) -> None:
-        import fcntl
-        import termios
-
-        user = find_user(device)
-        if user is not None:
-            raise busy(self.name, user)
-        self._serial = _open_serial(self.name, device, self.rate)
-        try:
-            descriptor = self._serial.fileno()
-            os.set_blocking(descriptor, False)
-            self.attach(descriptor, partial(os.read, descriptor), partial(os.write, descriptor))
-            if self.paced:  # a pseudo-terminal would keep the mark while its simulator has it open
-                with contextlib.suppress(OSError):
-                    fcntl.ioctl(descriptor, termios.TIOCEXCL)  # later opens fail, except those of root
-            _check_rate(self.name, descriptor, self.rate)
-        except BaseException:
-            self.close()
-            raise
-
-    def tune(self, rate: int, listen_only: bool = False) -> None:
+    def tune(self, rate: int) -> None:
         time.sleep(max(0.0, self._idle_at - time.monotonic()))  # bytes on their way keep their rate
-        if self._serial is None:
-            raise lost(self.name, "it is closed")
         _set_rate(self.name, self._serial, rate)
+        self._take_rate(rate)
+
+    def _take_rate(self, rate: int) -> None:
+        """Keep a rate that was set. Raises LinkError when the adapter has rounded it too far."""
         self.rate = rate
-        _check_rate(self.name, self._serial.fileno(), rate)
+        actual = line_speed(self._descriptor) if sys.platform == "linux" else None
+        if actual is not None and abs(actual - rate) > TOLERANCE * rate:
+            raise unsupported_rate(self.name, rate, f"the adapter makes {actual} of it")
 
     def close(self) -> None:
         serial, self._serial = self._serial, None
@@ -143,17 +138,16 @@ class PolledLink(StreamLink):
     ) -> None:
         import serialx
 
-        remote = "://" in port
-        if remote:
-            split_address(port)
         self.name = port
         self.rate = rate
-        self.latency = REMOTE_LATENCY if remote else usb_adapters.WINDOWS_LATENCY
+        self.latency = usb_adapters.WINDOWS_LATENCY
+        if "://" in port:
+            split_address(port)  # raises
+            self.latency = REMOTE_LATENCY
         self._failure = serialx.SerialException
         self._access = Lock()
-        self._closed = False
         with opening(port, lock) as self.lock:
-            self._serial = _open_serial(port, port, rate, connect_time)
+            self._serial: BaseSerial | None = _open_serial(port, port, rate, connect_time)
         connection = getattr(self._serial, "_socket", None)
         if connection is not None:
             send_at_once(connection)
@@ -162,9 +156,8 @@ class PolledLink(StreamLink):
         buffer = bytearray(CHUNK)
         while True:
             with self._access:
-                port = self._open_port()
                 try:
-                    count = port.readinto(buffer, timeout=0)
+                    count = _opened(self.name, self._serial).readinto(buffer, timeout=0)
                 except (OSError, self._failure) as error:
                     raise lost(self.name, error) from error
             pause = until - time.monotonic()
@@ -174,38 +167,30 @@ class PolledLink(StreamLink):
 
     def send(self, data: bytes) -> int:
         with self._access:
-            port = self._open_port()
             try:
-                port.write(data, timeout=0)
+                _opened(self.name, self._serial).write(data, timeout=0)
             except TimeoutError:
                 return 0
             except (OSError, self._failure) as error:
                 raise lost(self.name, error) from error
         return len(data)
 
-    def tune(self, rate: int, listen_only: bool = False) -> None:
+    def tune(self, rate: int) -> None:
         with self._access:
-            _set_rate(self.name, self._open_port(), rate)
+            _set_rate(self.name, self._serial, rate)
         self.rate = rate
 
-    def _open_port(self) -> BaseSerial:
-        if self._closed:
-            raise lost(self.name, "it is closed")
-        return self._serial
-
     def close(self) -> None:
-        self._closed = True
         with self._access, contextlib.suppress(OSError):
-            self._serial.close()
+            serial, self._serial = self._serial, None
+            if serial is not None:
+                serial.close()
         self.lock.release()
-
-
-ByteLink: TypeAlias = SerialLink | PolledLink | TcpLink
 
 
 def open_stream(
     port: str, *, rate: int, lock: PortLock | None = None, connect_time: float | None = None
-) -> ByteLink:
+) -> SerialLink | PolledLink | TcpLink:
     """Open a device, a COM port, or a socket:// or rfc2217:// URL. `connect_time` is a time-out in s.
 
     Errors as for the classes.
@@ -254,24 +239,23 @@ def _open_error(port: str, device: str, connect_time: float, error: OSError) -> 
     return LinkError(f"{port} cannot be opened: {error.strerror or error}")
 
 
-def _set_rate(port: str, serial: BaseSerial, rate: int) -> None:
+def _opened(port: str, serial: BaseSerial | None) -> BaseSerial:
+    if serial is None:
+        raise lost(port, "it is closed")
+    return serial
+
+
+def _set_rate(port: str, serial: BaseSerial | None, rate: int) -> None:
     import serialx
 
     if rate <= 0:
         raise RequestError(f"{rate} is not a rate in bit/s")
     try:
-        serial.reconfigure_port(baudrate=rate)
+        _opened(port, serial).reconfigure_port(baudrate=rate)
     except serialx.UnsupportedSetting as error:
         raise unsupported_rate(port, rate, error) from error
     except (OSError, serialx.SerialException) as error:
         raise lost(port, error) from error
-
-
-def _check_rate(port: str, descriptor: int, rate: int) -> None:
-    """Raise LinkError when the adapter has rounded the rate too far."""
-    actual = line_speed(descriptor) if sys.platform == "linux" else None
-    if actual is not None and abs(actual - rate) > TOLERANCE * rate:
-        raise unsupported_rate(port, rate, f"the adapter makes {actual} of it")
 
 
 def line_speed(descriptor: int) -> int | None:

@@ -12,7 +12,7 @@ import time
 from typing import Final
 
 from motorbus.core import units
-from motorbus.core.can_frame import REMOTE_FLAG, CanFrame
+from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Data
 from motorbus.errors import LinkError, RequestError
 from motorbus.link.can import CanLink
@@ -44,9 +44,9 @@ CANCEL: Final = b"?\r"  # makes an unfinished line invalid
 
 _LINE: Final = re.compile(rb"([^\r\a]*)([\r\a])")
 _FRAME: Final = re.compile(
-    rb"(?:([tr])([0-7][0-9A-Fa-f]{2})|([TRx])([01][0-9A-Fa-f]{7}))([0-8])((?:[0-9A-Fa-f]{2})*)"
+    rb"(?:t([0-7][0-9A-Fa-f]{2})|[Tx]([01][0-9A-Fa-f]{7}))([0-8])((?:[0-9A-Fa-f]{2})*)"
 )
-_CAN_FD: Final = b"dDbB"  # as CANable 2 writes it
+_DROPPED: Final = b"rRdDbB"  # remote frames; CAN FD as CANable 2 writes it
 _REPLY: Final = re.compile(rb"(?:[zZAQ]?|[VNF][0-9A-Za-z]{2,8})")
 
 
@@ -54,10 +54,8 @@ class SlcanCodec:
     """Lines of slcan; nothing that arrives raises an error.
 
     `reply` is the first reply since `forget`: True for CR, False for BEL, None for none. `damaged` counts lines,
-    `refused` frames and commands.
-
-    The length of a line tells whether the adapter has appended a timestamp. A damaged length digit must not look like
-    one, so a line needs the form of the line before; two lines in a row of the other form change it.
+    `refused` frames and commands. A frame may end with a timestamp, so a damaged length digit can make a frame two
+    bytes shorter: no reply of a device has both lengths. Remote and CAN FD frames are dropped.
     """
 
     def __init__(self) -> None:
@@ -65,8 +63,6 @@ class SlcanCodec:
         self.damaged = 0
         self.refused = 0
         self._rest = b""
-        self._stamped = False
-        self._other_form = 0
 
     def forget(self) -> None:
         """Drop the reply and an unfinished line, before a command."""
@@ -75,11 +71,8 @@ class SlcanCodec:
 
     def encode(self, frame: CanFrame) -> bytes:
         """The line that sends this frame."""
-        remote = frame.id & REMOTE_FLAG
-        letter = ("R" if remote else "T") if frame.extended else ("r" if remote else "t")
-        digits = "" if remote else frame.data.hex().upper()
-        identifier = f"{frame.id & ~REMOTE_FLAG:0{8 if frame.extended else 3}X}"
-        return f"{letter}{identifier}{len(frame.data)}{digits}\r".encode()
+        head = f"T{frame.id:08X}" if frame.extended else f"t{frame.id:03X}"
+        return f"{head}{len(frame.data)}{frame.data.hex().upper()}\r".encode()
 
     def feed(self, data: bytes) -> list[CanFrame]:
         """The frames that these bytes of the adapter complete, cut anywhere."""
@@ -88,7 +81,7 @@ class SlcanCodec:
         end = 0
         for line in _LINE.finditer(text):
             end = line.end()
-            frame = self._decode(line)
+            frame = self._decode(line[1].strip(b"\n"), line[2] == b"\a")
             if frame is not None:
                 frames.append(frame)
         self._rest = text[end:]
@@ -97,38 +90,23 @@ class SlcanCodec:
             self.damaged += 1
         return frames
 
-    def _decode(self, line: re.Match[bytes]) -> CanFrame | None:
+    def _decode(self, text: bytes, refused: bool) -> CanFrame | None:
         """The frame of a line; None for a reply or a damaged line."""
-        text, refused = line[1].strip(b"\n"), line[2] == b"\a"
-        if not refused and (match := _FRAME.fullmatch(text)):
-            return self._decode_frame(match)
-        if refused or _REPLY.fullmatch(text):
-            self.reply = not refused if self.reply is None else self.reply
+        if not refused and (line := _FRAME.fullmatch(text)):
+            short, long, count, digits = line.groups()
+            if len(digits) - 2 * int(count) in (0, STAMP):
+                data = bytes.fromhex(digits[: 2 * int(count)].decode())
+                return CanFrame(int(short or long, 16), data, long is not None)
+        is_reply = _REPLY.fullmatch(text) is not None
+        if self.reply is None and (refused or is_reply):
+            self.reply = not refused
         self.refused += refused
-        self.damaged += not _REPLY.fullmatch(text) and text[:1] not in _CAN_FD
+        self.damaged += not is_reply and text[:1] not in _DROPPED
         return None
-
-    def _decode_frame(self, line: re.Match[bytes]) -> CanFrame | None:
-        standard, short, extended, long, count, digits = line.groups()
-        remote = (standard or extended) in b"rR"
-        size = int(count)
-        surplus = len(digits) - (0 if remote else 2 * size)
-        stamped = surplus == STAMP
-        if surplus in (0, STAMP):
-            self._other_form = 0 if stamped == self._stamped else self._other_form + 1
-            if self._other_form == 2:
-                self._stamped, self._other_form = stamped, 0
-        if surplus not in (0, STAMP) or self._other_form:
-            self.damaged += 1
-            return None
-        identifier = int(short or long, 16)
-        if remote:
-            return CanFrame(identifier | REMOTE_FLAG, bytes(size), extended is not None)
-        return CanFrame(identifier, bytes.fromhex(digits[: 2 * size].decode()), extended is not None)
 
 
 class SlcanLink(CanLink):
-    """An slcan adapter. Errors as for `open_stream`; RequestError too for a rate of its serial line that is none.
+    """An slcan adapter. Errors as for `open_stream`; RequestError too for an impossible rate of its serial line.
 
     The channel of its address is a port, with `@` and the rate of its serial line (bit/s). An adapter whose replies
     come later than `FIRST_REPLY` is used as one without replies: what it refuses is not noticed.
@@ -144,14 +122,14 @@ class SlcanLink(CanLink):
             raise RequestError(f"{self.name}: slcan has no option {name!r}", expected="listen_only")
         self._codec = SlcanCodec()
         port, _, text = self.address.channel.partition("@")
-        baud = _read_baud(self.name, text or DEFAULT_BAUD)
+        baud = units.rate(text or DEFAULT_BAUD)
         lock = PortLock(port)  # not acquired: this link has locked the port
         self._stream = stream = open_stream(port, rate=baud, lock=lock, connect_time=self.connect_time)
         self.latency, self.warnings, self.fileno = stream.latency, stream.warnings, stream.fileno
         if stream.paced:  # one line each way on the serial line; adapters with their own USB are faster
             self.latency += 2 * LINE_BITS / baud
 
-    def configure(self, rate: int, listen_only: bool) -> None:
+    def configure(self, rate: int) -> None:
         if rate not in RATES:
             raise LinkError(
                 f"{self.name}: slcan has no bit rate of {rate} bit/s",
@@ -166,8 +144,8 @@ class SlcanLink(CanLink):
         refusal = ""
         if self._command(RATES[rate], timeout) is False:
             refusal = f"refuses {rate} bit/s ({RATES[rate].decode()})"
-        elif self._command(b"L" if listen_only else b"O", timeout) is False:
-            refusal = "cannot only listen" if listen_only else "refuses to open its channel"
+        elif self._command(b"L" if self.listen_only else b"O", timeout) is False:
+            refusal = "cannot only listen" if self.listen_only else "refuses to open its channel"
         if refusal:
             raise LinkError(
                 f"{self.name}: the adapter {refusal}",
@@ -229,15 +207,3 @@ class SlcanLink(CanLink):
         with contextlib.suppress(LinkError):
             self._send_line(b"C\r")
         self._stream.close()
-
-
-def _read_baud(name: str, text: object) -> int:
-    """The rate of the serial line (bit/s). Raises RequestError."""
-    try:
-        return units.rate(text)
-    except RequestError as refusal:
-        raise RequestError(
-            f"{name}: {text} is not a rate of the serial line in bit/s",
-            expected=refusal.expected,
-            advice="write can://slcan/dev/ttyACM0@1000000",
-        ) from None

@@ -68,7 +68,7 @@ class TcpLink(StreamLink):
         address = ipaddress.ip_address(connection.getpeername()[0].partition("%")[0])
         self.latency = LOOPBACK_LATENCY if address.is_loopback else NETWORK_LATENCY
 
-    def tune(self, rate: int, listen_only: bool = False) -> None:
+    def tune(self, rate: int) -> None:
         if rate != self.rate:
             raise LinkError(
                 f"{self.name}: a raw socket cannot change the rate to {rate} bit/s",

@@ -27,7 +27,7 @@ class PortInfo(NamedTuple):
     """A serial port of this machine.
 
     `stable` is its name under /dev/serial/by-id, which does not depend on the order of plugging; "" where there is
-    none. `guess` says what the adapter probably is; "" for unknown ids.
+    none. `guess` says what the adapter probably is; "" for unknown ids. `part` tells the ports of one adapter apart.
     """
 
     device: str
@@ -38,6 +38,16 @@ class PortInfo(NamedTuple):
     manufacturer: str
     product: str
     guess: str
+    part: tuple[object, ...] = ()
+
+    @property
+    def adapter(self) -> str:
+        """The USB adapter with its part: equal for the same one at another place; "" for no USB adapter."""
+        if self.vid is None:
+            return ""
+        mark = f" with the serial number {self.serial_number}" if self.serial_number else ""
+        part = f", port {self.part}" if any(self.part) else ""
+        return f"the adapter {self.vid:04x}:{self.pid or 0:04x}{mark}{part}"
 
     @property
     def description(self) -> str:

@@ -19,8 +19,7 @@ from motorbus.motion.status import AxisStatus
 class Axis:
     """One axis: its configuration, its device and what that can do, what is known of it.
 
-    `limits` are those of the device (rad); `top_velocity` is what its model can do (rad/s of the device), None if
-    unknown.
+    `limits` are those of the device (rad), None if unknown.
     """
 
     name: str
@@ -31,7 +30,6 @@ class Axis:
     status: AxisStatus
     model: str = ""
     limits: tuple[float, float] | None = None
-    top_velocity: float | None = None
 
     def require(self, *capabilities: str) -> None:
         """Raise RequestError if its device lacks one of these functions."""

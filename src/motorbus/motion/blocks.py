@@ -1,7 +1,4 @@
-"""Blocks of a robot: a control loop, and the time in which the machine is attended.
-
-Both are for `with` of a `Robot` and for `async with` of an `AsyncRobot`; `run` runs a program in the way of each.
-"""
+"""Blocks of a robot for `with` (of an `AsyncRobot` for `async with`): a control loop, and an attended time."""
 
 from __future__ import annotations
 
@@ -13,65 +10,73 @@ from motorbus.errors import RequestError
 from motorbus.motion.lease import Lease, LeaseWatch, lease_lost
 from motorbus.motion.loop import ControlLoop, LoopState
 from motorbus.motion.moves import StopsIfInterrupted, stop_axes
-from motorbus.motion.program import Program, raise_first
+from motorbus.motion.program import Program, drive, drive_async, raise_first
 from motorbus.motion.shutdown import stop_bus
 from motorbus.motion.state import OpenMachine
 
 
-class Loop:
-    """A control loop of a robot, for `with`, or `async with` of an `AsyncRobot`; iterate to run its cycles.
-
-    It brakes at the end of the block; after an error it stops its axes. See `ControlLoop`.
-    """
-
-    def __init__(self, loop: ControlLoop, run: Callable[[Program[Any]], Any]) -> None:
+class _Block:
+    def __init__(self, loop: ControlLoop) -> None:
         self._loop = loop
-        self._run = run
         self.set_target = loop.set_target
         self.statistics = loop.statistics
 
-    def read(self) -> Any:
-        """Read all positions (rad, m) now, by name."""
-        return self._run(self._loop.read())
+    async def _finish(self, error: BaseException | None) -> None:
+        guard = StopsIfInterrupted(self._loop.members)
+        if error is not None:
+            self._loop.close()
+            await guard.leave(error)
+            return
+        async with guard:
+            await self._loop.leave()
 
-    def write(self, targets: Mapping[str, float], elapsed: float) -> Any:
+
+class Loop(_Block):
+    """A control loop; iterate to run its cycles. It brakes at the end; after an error it stops its axes."""
+
+    def read(self) -> Mapping[str, float]:
+        """Read all positions (rad, m) now, by name."""
+        return drive(self._loop.read())
+
+    def write(self, targets: Mapping[str, float], elapsed: float) -> Mapping[str, float]:
         """Send targets now, `elapsed` s after the last ones; gives what was sent, by name."""
-        return self._run(self._loop.write(targets, elapsed))
+        return drive(self._loop.write(targets, elapsed))
 
     def __iter__(self) -> Iterator[LoopState]:
         while True:
-            yield self._run(self._loop.cycle())
+            yield drive(self._loop.cycle())
+
+    def __enter__(self) -> Self:
+        drive(self._loop.enter())
+        return self
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        drive(self._finish(error))
+
+
+class AsyncLoop(_Block):
+    """As `Loop`, for `async with` and `async for`."""
+
+    async def read(self) -> Mapping[str, float]:
+        """Read all positions (rad, m) now, by name."""
+        return await drive_async(self._loop.read())
+
+    async def write(self, targets: Mapping[str, float], elapsed: float) -> Mapping[str, float]:
+        """Send targets now, `elapsed` s after the last ones; gives what was sent, by name."""
+        return await drive_async(self._loop.write(targets, elapsed))
 
     def __aiter__(self) -> Self:
         return self
 
     async def __anext__(self) -> LoopState:
-        state: LoopState = await self._run(self._loop.cycle())
-        return state
-
-    def __enter__(self) -> Self:
-        self._run(self._loop.enter())
-        return self
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        self._run(self._finish(error))
+        return await drive_async(self._loop.cycle())
 
     async def __aenter__(self) -> Self:
-        await self._run(self._loop.enter())
+        await drive_async(self._loop.enter())
         return self
 
     async def __aexit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        await self._run(self._finish(error))
-
-    async def _finish(self, error: BaseException | None) -> None:
-        loop = self._loop
-        guard = StopsIfInterrupted(loop.members)
-        if error is not None:
-            loop.close()
-            await guard.leave(error)
-            return
-        async with guard:
-            await loop.leave()
+        await drive_async(self._finish(error))
 
 
 class Attendance:

@@ -68,7 +68,6 @@ class Replay(Struct, frozen=True, tag="replay"):
     speed: float = 1.0
     smooth: float | None = None
     repeat: int = 1
-    skip_others: bool = False
 
 
 class Teach(Struct, frozen=True, tag="teach"):

@@ -13,7 +13,7 @@ from motorbus.motion.state import OpenMachine
 class AxisDescription(Struct, frozen=True):
     """One axis. Positions in rad (m), velocities in rad/s (m/s); `low` and `high` None without a limit.
 
-    `commands` are the functions of its device; `notes` say what the device cannot do.
+    `commands` are the functions of its device.
     """
 
     device: str
@@ -27,7 +27,6 @@ class AxisDescription(Struct, frozen=True):
     exit: str
     estop: str
     commands: tuple[str, ...]
-    notes: tuple[str, ...] = ()
 
 
 class BusDescription(Struct, frozen=True):
@@ -79,21 +78,4 @@ def _describe_axis(axis: Axis) -> AxisDescription:
         exit=config.exit_action,
         estop=config.estop or (stops[0] if stops else "stop"),
         commands=tuple(sorted(axis.driver.names)),
-        notes=tuple(notes_of(axis)),
     )
-
-
-def notes_of(axis: Axis) -> list[str]:
-    """What the machine file asks of an axis and its device cannot do."""
-    config, notes = axis.config, []
-    if axis.top_velocity is not None and abs(config.max_velocity * config.ratio) > axis.top_velocity * 1.001:
-        top = axis.top_velocity / abs(config.ratio)
-        notes.append(
-            f"{axis.name}: max_velocity {config.show(config.max_velocity)}/s is above what {axis.model} can do, "
-            f"{config.show(top)}/s"
-        )
-    if axis.limits is not None and config.low is not None and config.high is not None:
-        low, high = axis.range
-        if low > config.low + 0.01 or high < config.high - 0.01:
-            notes.append(f"{axis.name}: its device allows only {config.show(low)} to {config.show(high)}")
-    return notes

@@ -7,6 +7,7 @@ from math import inf, isfinite
 from typing import Any, Final
 
 from motorbus.bus.base import BaseBus
+from motorbus.bus.interlock import check_limits
 from motorbus.core.family import IdChanged
 from motorbus.core.request import EVERY_LANE, Effect, Priority, Request
 from motorbus.core.setpoint import Setpoint, Stays
@@ -180,7 +181,7 @@ class SafetyGate:
         for setpoint in moving:
             axis = self.axes.get(setpoint.node)
             if axis is None:
-                _check_device_limits(setpoint)
+                check_limits(setpoint)
                 continue
             self.update(axis)
             for check in CHECKS:
@@ -251,16 +252,6 @@ class SafetyGate:
         for axis in self.axes.values():
             axis.owner += 1
             axis.forget()
-
-
-def _check_device_limits(setpoint: Setpoint) -> None:
-    """A device that is no axis of the machine: the limits that its driver knows."""
-    low, high = setpoint.low, setpoint.high
-    if isfinite(setpoint.value) and low is not None and high is not None and low <= setpoint.value <= high:
-        return
-    raise LimitExceeded(
-        f"node {setpoint.node}: {setpoint.value:.6g} is outside {low} to {high}", node=setpoint.node
-    )
 
 
 def check_owned(

@@ -7,12 +7,11 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from math import inf
 from threading import Event, Thread
-from typing import Any, Final
+from typing import Final
 
 from motorbus.bus.base import BaseBus
 from motorbus.bus.running import run_on
-from motorbus.bus.tasks import Tree
-from motorbus.core.steps import Procedure, Sleep, catch
+from motorbus.core.steps import Procedure
 from motorbus.errors import Refused
 
 LOG = logging.getLogger("motorbus.motion")
@@ -60,7 +59,8 @@ def lease_lost(name: str) -> Refused:
 class LeaseWatch:
     """Stops what moves on these buses when the lease is lost, again every 0.5 s until each axis has accepted it.
 
-    A thread does that, so a program that hangs is stopped; in virtual time it runs beside the procedures of a bus.
+    A thread does that, so a program that hangs is stopped. In virtual time, which passes only while the program waits,
+    nothing does: there the gate refuses the next goal, and the movement ends by that.
     """
 
     def __init__(self, lease: Lease, buses: Iterable[BaseBus], stop: Stop) -> None:
@@ -68,24 +68,15 @@ class LeaseWatch:
         self._buses = tuple(buses)
         self._stop = stop
         self._ended = Event()
-        self._trees: list[tuple[BaseBus, Tree[Any]]] = []
 
     def start(self) -> None:
         """Begin to watch."""
-        if self._lease.seconds == inf:
-            return
-        for bus in self._buses:
-            if bus.link.virtual:
-                self._trees.append((bus, bus.watch(self._watch_bus(bus))))
-        if not self._trees:
+        if self._lease.seconds < inf and not any(bus.link.virtual for bus in self._buses):
             Thread(target=self._watch, name="motorbus lease", daemon=True).start()
 
     def end(self) -> None:
         """Stop watching."""
         self._ended.set()
-        for bus, tree in self._trees:
-            bus.unwatch(tree)
-        self._trees.clear()
 
     def _watch(self) -> None:
         going = set(self._buses)
@@ -99,12 +90,3 @@ class LeaseWatch:
             if going:
                 LOG.warning("the lease is lost, and not every axis has accepted the stop")
                 self._ended.wait(RETRY)
-
-    async def _watch_bus(self, bus: BaseBus) -> None:
-        done = False
-        while not self._ended.is_set():
-            if not self._lease.lost:
-                done = False
-            elif not done:
-                done = await catch(self._stop(bus)) is True
-            await Sleep(LOOK if done or not self._lease.lost else RETRY)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf, isfinite
 from typing import Any, Final, Literal, TypeAlias
@@ -15,9 +15,10 @@ from motorbus.core.request import Precondition, Request, SetpointGroup, Setpoint
 from motorbus.core.steps import catch, discard, gather
 from motorbus.core.stream import read_positions
 from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, NoReply, RequestError
-from motorbus.motion.axis import Axis, by_bus
+from motorbus.motion.axis import Axis, by_bus, on_axes
 from motorbus.motion.gate import check_owned
 from motorbus.motion.health import HealthMonitor
+from motorbus.motion.lease import lease_lost
 from motorbus.motion.machine import SLACK, Names
 from motorbus.motion.profile import Limits, SetpointGenerator
 from motorbus.motion.program import LOST, Exchange, OnBuses, raise_first
@@ -122,11 +123,11 @@ class BusGroup:
     reads: tuple[Request[Positions], ...]
     group: tuple[SetpointGroup, SetpointGroup] | None = field(default=None)
 
-    def requests(self, goals: Mapping[int, float]) -> Sequence[Request[Any]]:
-        """The batch of a cycle: goals (rad of the device) that leave only while the loop owns the axes, then reads."""
+    def goals(self, goals: Mapping[int, float]) -> Sequence[Request[Any]]:
+        """Requests of these goals (rad of the device), which leave only while the loop owns the axes."""
         if not goals or self.stream is None:
-            return self.reads
-        return (*map(self._owned, self.stream.goals(goals)), *self.reads)
+            return ()
+        return [self._owned(request) for request in self.stream.goals(goals)]
 
     def _owned(self, request: Request[Any]) -> Request[Any]:
         if not isinstance(request, SetpointWrite):
@@ -243,19 +244,19 @@ class ControlLoop:
         self.machine.loops += 1
 
     def _settle_rate(self) -> None:
-        cycle = max(self._air_time(group) for group in self.groups)
-        most = WIRE_SHARE / cycle if cycle else inf
-        self.rate = self.rate or max(MIN_RATE, min(USUAL_RATE, most))
-        if cycle * self.rate > 1:
+        """Choose the rate, or check that the wire carries it; goals need about as much as the positions."""
+        cycle = max(
+            sum(group.bus.driver.air_time(request, group.bus.rate) for request in group.reads)
+            for group in self.groups
+        )
+        most = 1 / cycle if cycle else inf
+        self.rate = self.rate or max(MIN_RATE, min(USUAL_RATE, WIRE_SHARE * most))
+        if self.rate > most:
             raise RequestError(
                 f"{self.rate:g} Hz are too fast: a cycle needs {cycle * 1000:.3g} ms on the wire",
-                expected=f"at most {most:.0f} Hz",
+                expected=f"at most {WIRE_SHARE * most:.0f} Hz",
             )
         self.statistics.rate = self.rate
-
-    def _air_time(self, group: BusGroup) -> float:
-        """s on the wire of the positions of a cycle; goals of the same axes need about as much."""
-        return sum(group.bus.driver.air_time(request, group.bus.rate) for request in group.reads)
 
     async def _read(self) -> Mapping[BaseBus, Any]:
         batches = {group.bus: group.reads for group in self.groups if group.reads}
@@ -263,16 +264,15 @@ class ControlLoop:
 
     async def cycle(self) -> LoopState:
         """Send the next goals in the next slot of the grid, read all positions, publish the state."""
-        if any(axis.target is not None and axis.owner is None for axis in self.axes.values()):
-            await self._begin()
+        await self._begin()
         self._check_owned()
         periods = self._schedule(self.machine.now())
         await self._refresh(self._next)
         await self._turn_wheels(periods)
-        batches: dict[BaseBus, Sequence[Request[Any]]] = {
-            group.bus: group.requests(self._goals(group, periods)) for group in self.groups
-        }
         once, self.once = self.once, {}
+        batches: dict[BaseBus, Sequence[Request[Any]]] = {
+            group.bus: (*group.goals(self._goals(group, periods)), *group.reads) for group in self.groups
+        }
         for bus, requests in once.items():
             batches[bus] = [*requests, *batches.get(bus, ())]
         values = await Exchange(
@@ -280,47 +280,42 @@ class ControlLoop:
         )
         missing = self._absorb(values)
         self.statistics.cycles += 1
-        state = LoopState(
-            self.slot, self.machine.now(), {n: a.position for n, a in self.axes.items()}, missing
-        )
+        positions = {name: axis.position for name, axis in self.axes.items()}
+        state = LoopState(self.slot, self.machine.now(), positions, missing)
         self.machine.publish()
-        self._check(values, state)
+        self._check(values, missing)
         for bus, requests in once.items():
             raise_first(dict(enumerate(values[bus][: len(requests)])))
         await self._look()
         return state
-
-    async def _refresh(self, at: float) -> None:
-        """Read all positions again if one is too old, or too doubtful, to judge a goal at this time (s)."""
-        led = [axis.status for axis in self.axes.values() if axis.owner is not None]
-        if any(one.suspect is not None or (one.measured and at - one.at > STALE) for one in led):
-            self._absorb(await self._read())
 
     async def read(self) -> Mapping[str, float]:
         """Read all positions (rad, m) now, without the clock of the loop."""
         values = await self._read()
         missing = self._absorb(values)
         self.machine.publish()
-        self._check(values, LoopState(0, self.machine.now(), {}, missing))
+        self._check(values, missing)
         return {name: axis.position for name, axis in self.axes.items()}
 
     async def write(self, targets: Mapping[str, float], elapsed: float) -> Mapping[str, float]:
         """Send targets now, `elapsed` s after the last ones; gives what was sent, within the limits."""
         for name, target in targets.items():
             self.set_target(name, target)
-        if any(axis.target is not None and axis.owner is None for axis in self.axes.values()):
-            await self._begin()
+        await self._begin()
         await self._refresh(self.machine.now())
         periods = max(1, round(elapsed * self.rate))
         await self._turn_wheels(periods)
-        batches = {}
-        for group in self.groups:
-            goals = self._goals(group, periods)
-            batches[group.bus] = group.requests(goals)[: -len(group.reads) or None] if goals else ()
+        batches = {group.bus: group.goals(self._goals(group, periods)) for group in self.groups}
         values = await Exchange({bus: batch for bus, batch in batches.items() if batch} or batches)
-        self._check(values, LoopState(0, self.machine.now(), {}))
+        self._check(values, frozenset())
         await self._look()
         return {name: axis.sent for name, axis in self.axes.items()}
+
+    async def _refresh(self, at: float) -> None:
+        """Read all positions again if one is too old, or too doubtful, to judge a goal at this time (s)."""
+        led = [axis.status for axis in self.axes.values() if axis.owner is not None]
+        if any(one.suspect is not None or (one.measured and at - one.at > STALE) for one in led):
+            self._absorb(await self._read())
 
     async def leave(self) -> None:
         """Brake the axes that are still moving, within their limits; then the loop sends nothing more."""
@@ -399,18 +394,24 @@ class ControlLoop:
 
     async def _turn_wheels(self, periods: int) -> None:
         """Bring the velocity of each wheel nearer to its target, within its acceleration."""
-        changed: dict[BaseBus, list[LoopAxis]] = {}
+        changed = []
         for axis in self.axes.values():
             config = axis.config
             if not config.is_wheel or axis.owner is None or axis.target is None:
                 continue
-            most = config.acceleration * min(periods, CATCH_UP) / self.rate
-            step = axis.target - axis.sent if self.direct else min(max(axis.target - axis.sent, -most), most)
+            most = inf if self.direct else config.acceleration * min(periods, CATCH_UP) / self.rate
+            step = min(max(axis.target - axis.sent, -most), most)
             if step:
                 axis.sent += step
-                changed.setdefault(axis.axis.bus, []).append(axis)
+                changed.append(axis.axis)
+
+        async def turn(axis: Axis) -> None:
+            one = self.axes[axis.name]
+            if one.owner == one.status.owner:  # no stop has taken it
+                await axis.driver.set_velocity(axis.device, one.sent * one.config.ratio)
+
         if changed:
-            raise_first(await OnBuses({bus: _set_velocities(axes) for bus, axes in changed.items()}))
+            raise_first(await on_axes(changed, turn))
 
     def _absorb(self, values: Mapping[BaseBus, Any]) -> frozenset[str]:
         """Take the positions of a cycle; the names of the axes without one."""
@@ -444,6 +445,8 @@ class ControlLoop:
     async def _begin(self) -> None:
         """Torque on, without a jump, for axes with a first target."""
         fresh = [axis for axis in self.axes.values() if axis.target is not None and axis.owner is None]
+        if not fresh:
+            return
         stopped = [axis for axis in fresh if axis.status.owner != axis.claimed]
         for axis in stopped:
             axis.release()
@@ -470,17 +473,20 @@ class ControlLoop:
             await self.machine.health.look([axis.axis for axis in owned], goals)
 
     def _check_owned(self) -> None:
-        """Raise the error if a stop or another command has taken an axis; it gets no more goals."""
-        lost = [error for group in self.groups if (error := group.lost(self.machine.lease)) is not None]
+        """Raise the error if the lease is lost, or a stop or another command has taken an axis."""
+        lease = self.machine.lease
+        lost = [error for group in self.groups if (error := group.lost(lease)) is not None]
+        if not lost and lease is not None and lease.lost:
+            raise lease_lost("the loop")
         if lost:
             for axis in self.axes.values():
                 if axis.owner != axis.status.owner:
                     axis.release()
             raise lost[0]
 
-    def _check(self, values: Mapping[BaseBus, Any], state: LoopState) -> None:
+    def _check(self, values: Mapping[BaseBus, Any], missing: Iterable[str]) -> None:
         """Raise what is wrong: a silent axis first, then a lost owner, a lost bus, a refused goal."""
-        for name in state.missing:
+        for name in missing:
             axis = self.axes[name]
             silence = self.machine.now() - axis.silent_since
             if axis.owner is not None and silence > SILENCE:
@@ -512,20 +518,14 @@ async def _open(
     return stream, tuple(reads)
 
 
-async def _set_velocities(axes: list[LoopAxis]) -> None:
-    """Procedure: send the velocity of these wheels, unless a stop has taken them."""
-    for one in axes:
-        if one.owner == one.status.owner:
-            await one.axis.driver.set_velocity(one.axis.device, one.sent * one.config.ratio)
-
-
 async def start_axes(bus: BaseBus, axes: list[Axis], health: HealthMonitor) -> None:
     """Procedure: torque on, without a jump, for axes of one bus that are to follow setpoints."""
     led = [axis for axis in axes if not axis.config.is_wheel]
     await gather(*[health.check_kept(axis) for axis in axes])
     before = {axis.name: bus.stop_count(axis.config.node) for axis in axes}
     for axis in axes:
-        await limit_torque(axis)
+        if axis.config.max_torque is not None:
+            await axis.driver.cap_torque(axis.device, axis.config.max_torque)
     if led:
         stream = await led[0].driver.stream([axis.device for axis in led], rate=bus.rate)
         await stream.start(
@@ -541,10 +541,3 @@ async def start_axes(bus: BaseBus, axes: list[Axis], health: HealthMonitor) -> N
             await axis.driver.enable_torque(axis.device)
         axis.status.engaged = True
         await health.arm(axis, before[axis.name])
-
-
-async def limit_torque(axis: Axis) -> None:
-    """Procedure: bound its torque as the machine file says."""
-    if axis.config.max_torque is not None:
-        axis.require("cap_torque")
-        await axis.driver.cap_torque(axis.device, axis.config.max_torque)

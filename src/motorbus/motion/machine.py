@@ -1,7 +1,6 @@
 """The machine file `motorbus.toml`: buses, axes, groups and poses.
 
-Values are in API units: rad and rad/s, for a linear axis m and m/s. In the file they are text with a unit. Positions
-may be counts of the device, `"2048 raw"`; they become angles when the device is known, see `AxisConfig.with_counts`.
+Values are in API units: rad and rad/s, for a linear axis m and m/s. In the file they are text with a unit.
 """
 
 from __future__ import annotations
@@ -34,16 +33,16 @@ WHEEL_EXITS: Final = ("stop", "torque_off", "leave")
 
 
 class Quantity(float):
-    """A number in API units, written as text with a unit of one of these `kinds`."""
+    """A number in API units; in the file it is text with a unit of one of these `kinds`, as the `example`."""
 
     kinds: ClassVar[tuple[str, ...]]
-    counts: ClassVar[bool] = False  # `raw` is a unit, too
-    above_zero: ClassVar[bool] = False
+    example: ClassVar[str]
+    above_zero: ClassVar[bool] = True
     kind: str
 
     def __new__(cls, value: float, kind: str = "") -> Self:
         made = super().__new__(cls, value)
-        made.kind = kind
+        made.kind = kind or cls.kinds[0]
         return made
 
     @property
@@ -57,59 +56,43 @@ class Quantity(float):
         text = str(value).strip()
         unit = text.lstrip("+-.0123456789eE ").strip()
         if not unit or not isinstance(value, str):
-            raise ValueError(f"{shown(value)} has no unit: {cls._hint(value)}")
-        if unit == "raw" and cls.counts:
-            found = cls(units.real(text.removesuffix("raw").strip()), "raw")
-        else:
-            kind = next((kind for kind in cls.kinds if unit in units.SCALES[kind]), cls.kinds[0])
-            found = cls(units.parse(text, kind), kind)
+            raise ValueError(f'{shown(value)} has no unit: write it as "{cls.example}"')
+        kind = next((kind for kind in cls.kinds if unit in units.SCALES[kind]), cls.kinds[0])
+        found = cls(units.parse(text, kind), kind)
         if not isfinite(found) or abs(found) > LARGEST:
             raise ValueError(f"{text} is out of range: at most {LARGEST:g} in API units")
         if cls.above_zero and found <= 0:
             raise ValueError(f"{text} must be above 0")
         return found
 
-    @classmethod
-    def _hint(cls, value: object) -> str:
-        usual = {"position": "deg", "velocity": "deg/s", "acceleration": "deg/s2", "linear velocity": "mm/s"}
-        usual |= {"length": "mm", "linear acceleration": "mm/s2"}
-        number = str(value).strip() or "1"
-        return "write " + " or ".join(f'"{number} {usual[kind]}"' for kind in cls.kinds)
-
 
 class Position(Quantity):
-    """rad; m for a linear axis; raw counts of the device."""
-
-    kinds = ("position", "length")
-    counts = True
-
-
-class Step(Quantity):
     """rad; m for a linear axis."""
 
     kinds = ("position", "length")
-    above_zero = True
+    example = "90 deg"
+    above_zero = False
 
 
 class Velocity(Quantity):
     """rad/s; m/s for a linear axis."""
 
     kinds = ("velocity", "linear velocity")
-    above_zero = True
+    example = "90 deg/s"
 
 
 class Acceleration(Quantity):
     """rad/s²; m/s² for a linear axis."""
 
     kinds = ("acceleration", "linear acceleration")
-    above_zero = True
+    example = "360 deg/s2"
 
 
 class Length(Quantity):
     """m."""
 
     kinds = ("length",)
-    above_zero = True
+    example = "5 mm"
 
 
 class BusConfig(Struct, frozen=True, forbid_unknown_fields=True):
@@ -126,7 +109,9 @@ class AxisConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     device: Annotated[str, Meta(pattern=DEVICE, description="BUS#ID")]
     kind: Annotated[Literal["position", "wheel"], Meta(description="wheel: turns without end")] = "position"
-    zero: Annotated[Position, Meta(description="angle of the device where the axis is at 0")] = Position(0.0)
+    zero: Annotated[Position, Meta(description="angle of the device where the axis is at 0; default 0")] = (
+        msgspec.field(default_factory=lambda: Position(0.0))
+    )
     sign: Annotated[Literal[1, -1], Meta(description="-1: turns against the device")] = 1
     gear: Annotated[float, Meta(gt=0, le=LARGEST, description="turns of the device per turn of the axis")] = (
         1.0
@@ -139,7 +124,7 @@ class AxisConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     high: Annotated[Position | None, Meta(description="highest position")] = None
     max_velocity: Annotated[Velocity, Meta(description="highest velocity")]
     max_acceleration: Annotated[Acceleration | None, Meta(description="highest acceleration")] = None
-    max_step: Annotated[Step | None, Meta(description="farthest goal from the measured position")] = None
+    max_step: Annotated[Position | None, Meta(description="farthest goal from the measured position")] = None
     exit: Annotated[
         Literal["hold", "stop", "torque_off", "park", "leave"] | None,
         Meta(description="at the end of a program"),
@@ -147,7 +132,9 @@ class AxisConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     estop: Annotated[
         Literal["torque_off", "hold"] | None, Meta(description="at an emergency stop; default: of the device")
     ] = None
-    max_torque: Annotated[float, Meta(gt=0, le=1, description="share of the full torque")] | None = None
+    max_torque: Annotated[
+        Annotated[float, Meta(gt=0, le=1)] | None, Meta(description="share of the full torque")
+    ] = None
     monitor_load: Annotated[bool, Meta(description="overload and heat end a movement")] = True
 
     @property
@@ -209,32 +196,6 @@ class AxisConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         slack = SLACK * max(1.0, abs(position)) if isfinite(position) else 0.0
         return low - slack <= position <= high + slack
 
-    # -- raw counts ------------------------------------------------------------------------------------------------
-
-    @property
-    def counted(self) -> tuple[str, ...]:
-        """The keys whose values are raw counts."""
-        return tuple(
-            key for key in ("zero", "low", "high") if getattr(getattr(self, key), "kind", "") == "raw"
-        )
-
-    def with_counts(self, resolution: float) -> AxisConfig:
-        """The same axis with angles in place of raw counts; `resolution` in rad per count."""
-        if not self.counted:
-            return self
-        zero = self.zero * resolution if "zero" in self.counted else float(self.zero)
-        axis = structs.replace(self, zero=Position(zero, "position"))
-        kind = "length" if self.travel else "position"
-        ends = {
-            key: Position(axis.from_device(getattr(self, key) * resolution), kind)
-            for key in ("low", "high")
-            if key in self.counted
-        }
-        axis = structs.replace(axis, **ends)
-        if len(ends) == 2 and axis.low is not None and axis.high is not None and axis.low > axis.high:
-            axis = structs.replace(axis, low=axis.high, high=axis.low)
-        return axis
-
     # -- text ------------------------------------------------------------------------------------------------------
 
     def show(self, position: float) -> str:
@@ -245,13 +206,11 @@ class AxisConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         number = f"{position / scale:.{digits}f}"
         return f"{number if float(number) else number.removeprefix('-')} {unit}"
 
-    def parse(self, text: str) -> float:
-        """`90 deg`, or a number in the display unit -> position (rad, m). Raises RequestError."""
-        quantity = "length" if self.travel else "position"
-        try:
-            return units.real(text.strip()) * units.SCALES[quantity][self.display_unit]
-        except ValueError:
-            return units.parse(text, quantity)
+
+class GroupConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """A group of axes."""
+
+    axes: Annotated[tuple[str, ...], Meta(min_length=1)]
 
 
 class MachineConfig(Struct, frozen=True, kw_only=True):
@@ -300,7 +259,9 @@ class MachineConfig(Struct, frozen=True, kw_only=True):
             raise RequestError(
                 f"format is {shown(data.get('format'))}", expected=f"format = {FORMAT} in the first line"
             )
-        groups = {name: _convert(f"group.{name}", table, _Group) for name, table in _tables(data, "group")}
+        groups = {
+            name: _convert(f"group.{name}", table, GroupConfig) for name, table in _tables(data, "group")
+        }
         machine = cls(
             name=str(data.get("name", "")),
             buses={name: _convert(f"bus.{name}", table, BusConfig) for name, table in _tables(data, "bus")},
@@ -322,29 +283,35 @@ class MachineConfig(Struct, frozen=True, kw_only=True):
             if parse_address(bus.address).nodes:
                 raise RequestError(f"bus.{name}.address: an id belongs to an axis", expected="FAMILY:PORT")
         for name, axis in self.axes.items():
+            where = f"axis.{name}"
             if axis.bus not in self.buses:
                 raise RequestError(
-                    f"axis.{name}.device: no bus {axis.bus!r}", advice=nearest(axis.bus, self.buses)
+                    f"{where}.device: no bus {axis.bus!r}", advice=nearest(axis.bus, self.buses)
                 )
             if other := owners.get((axis.bus, axis.node)):
-                raise RequestError(f"axis.{name}.device: {axis.device} belongs to axis.{other}")
+                raise RequestError(f"{where}.device: {axis.device} belongs to axis.{other}")
             owners[axis.bus, axis.node] = name
-            _check_axis(f"axis.{name}", axis)
+            _check_axis(where, axis)
             if axis.exit == "park" and name not in self.poses.get("park", {}):
-                raise RequestError(f'axis.{name}.exit: "park" needs its position in [pose.park]')
+                raise RequestError(f'{where}.exit: "park" needs its position in [pose.park]')
         for name, members in self.groups.items():
             if name in self.axes:
                 raise RequestError(f"group.{name}: an axis has this name")
-            self._check_known(f"group.{name}", members)
+            for member in members:
+                self._axis(f"group.{name}", member)
         for name, places in self.poses.items():
-            self._check_known(f"pose.{name}", places)
             for member, place in places.items():
-                _check_pose(f"pose.{name}.{member}", self.axes[member], place)
+                where, axis = f"pose.{name}.{member}", self._axis(f"pose.{name}", member)
+                if axis.is_wheel:
+                    raise RequestError(f"{where}: a wheel has no position")
+                _check_kind(where, axis, place)
+                if not axis.allows(place):
+                    raise RequestError(f"{where}: {axis.show(place)} is outside the limits of the axis")
 
-    def _check_known(self, where: str, axes: Iterable[str]) -> None:
-        for axis in axes:
-            if axis not in self.axes:
-                raise RequestError(f"{where}: no axis {axis!r}", advice=nearest(axis, self.axes))
+    def _axis(self, where: str, name: str) -> AxisConfig:
+        if name not in self.axes:
+            raise RequestError(f"{where}: no axis {name!r}", advice=nearest(name, self.axes))
+        return self.axes[name]
 
     def axes_of(self, names: Names = None) -> tuple[str, ...]:
         """The axes of these names of axes, groups and buses. Raises RequestError for an unknown name."""
@@ -364,10 +331,6 @@ class MachineConfig(Struct, frozen=True, kw_only=True):
         return tuple(found)
 
 
-class _Group(Struct, frozen=True, forbid_unknown_fields=True):
-    axes: Annotated[tuple[str, ...], Meta(min_length=1)]
-
-
 def _check_axis(where: str, axis: AxisConfig) -> None:
     if axis.is_wheel:
         for key in ("low", "high", "max_step", "travel"):
@@ -379,36 +342,23 @@ def _check_axis(where: str, axis: AxisConfig) -> None:
             )
     elif axis.exit == "stop":
         raise RequestError(f'{where}.exit: "stop" is for a wheel', advice='"hold" stops and holds')
-    if (axis.low is None) != (axis.high is None):
-        raise RequestError(f"{where}: low and high are needed together")
     for key in ("low", "high", "max_step", "max_velocity", "max_acceleration"):
-        value = getattr(axis, key)
-        if value is not None and value.kind != "raw" and value.is_linear != bool(axis.travel):
-            raise RequestError(
-                f"{where}.{key}: this axis is {'linear' if axis.travel else 'not linear'}",
-                advice='an axis with travel = "5 mm" (length per turn) is linear',
-            )
+        _check_kind(f"{where}.{key}", axis, getattr(axis, key))
     if (axis.display_unit in ("mm", "m")) != bool(axis.travel):
         raise RequestError(f"{where}.unit: {axis.unit} does not measure this axis")
-    if len({key in axis.counted for key in ("low", "high")}) > 1:
-        raise RequestError(f"{where}: low and high are both raw, or none of them is")
+    if (axis.low is None) != (axis.high is None):
+        raise RequestError(f"{where}: low and high are needed together")
     if axis.low is not None and axis.high is not None and axis.low >= axis.high:
-        ends = (
-            (str(axis.low), str(axis.high)) if axis.counted else (axis.show(axis.low), axis.show(axis.high))
-        )
+        ends = axis.show(axis.low), axis.show(axis.high)
         raise RequestError(f"{where}.low: {ends[0]} is not below high, {ends[1]}")
 
 
-def _check_pose(where: str, axis: AxisConfig, place: float) -> None:
-    kind = getattr(place, "kind", "")
-    if axis.is_wheel:
-        raise RequestError(f"{where}: a wheel has no position")
-    if kind == "raw":
-        raise RequestError(f"{where}: raw counts are for zero, low and high", advice="give a unit")
-    if kind and (kind == "length") != bool(axis.travel):
-        raise RequestError(f"{where}: this axis is {'linear' if axis.travel else 'not linear'}")
-    if not axis.counted and not axis.allows(place):
-        raise RequestError(f"{where}: {axis.show(place)} is outside the limits of the axis")
+def _check_kind(where: str, axis: AxisConfig, value: float | None) -> None:
+    if isinstance(value, Quantity) and value.is_linear != bool(axis.travel):
+        raise RequestError(
+            f"{where}: this axis is {'linear' if axis.travel else 'not linear'}",
+            advice='an axis with travel = "5 mm" (length per turn) is linear',
+        )
 
 
 def _tables(data: Mapping[str, Any], kind: str) -> list[tuple[str, Mapping[str, Any]]]:

@@ -8,10 +8,10 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
-from types import NoneType, UnionType
-from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Final, Literal
 
-from msgspec import NODEFAULT, Meta, Struct, structs
+import msgspec
+from msgspec import Meta, Struct, structs
 
 from motorbus.core import units
 from motorbus.errors import RequestError
@@ -21,6 +21,7 @@ from motorbus.motion.machine import (
     Acceleration,
     AxisConfig,
     BusConfig,
+    GroupConfig,
     MachineConfig,
     Position,
     Quantity,
@@ -47,39 +48,21 @@ def edit(text: str, changes: Mapping[str, object]) -> str:
     try:
         document = tomlkit.parse(text.replace("\r\n", "\n"))
         for place, value in changes.items():
-            _put(document, place, value)
+            here: Any = document
+            *tables, key = place.split(".")
+            for depth, name in enumerate(tables, 1):
+                if name not in here:
+                    here[name] = tomlkit.table(is_super_table=depth < len(tables))
+                here = here[name]
+            if value is None or isinstance(value, Mapping):
+                here.pop(key) if value is None or key in here else None
+            if value is not None:
+                here[key] = value
     except (TOMLKitError, KeyError, TypeError) as error:
         raise RequestError(f"the file cannot be edited: {error}", advice="make this change by hand") from None
     edited = document.as_string()
     MachineConfig.parse(edited)
     return edited.replace("\n", ends)
-
-
-def _put(document: Any, place: str, value: object) -> None:
-    import tomlkit
-
-    *tables, key = place.split(".")
-    here = document
-    for depth, name in enumerate(tables, 1):
-        if name not in here:
-            here[name] = tomlkit.table(is_super_table=depth < len(tables))
-        here = here[name]
-    if value is None:
-        del here[key]
-    elif isinstance(value, Mapping) and key in here:
-        for name in [name for name in here[key] if name not in value]:
-            del here[key][name]
-        for name, inner in value.items():
-            here[key][name] = inner
-    elif isinstance(value, Mapping):
-        if not tables:
-            raise KeyError(place)
-        table = tomlkit.table()
-        for name, inner in value.items():
-            table[name] = inner
-        here[key] = table
-    else:
-        here[key] = value
 
 
 def pose_change(machine: MachineConfig, name: str, positions: Mapping[str, float]) -> dict[str, object]:
@@ -96,9 +79,12 @@ def write(machine: MachineConfig) -> str:
         lines.append(f"name = {_quoted(machine.name)}")
     for name, bus in machine.buses.items():
         lines += ["", f"[bus.{name}]", f"address = {_quoted(bus.address)}"]
-    explained: set[str] = set()
     for name, axis in machine.axes.items():
-        lines += ["", f"[axis.{name}]", *_axis_lines(axis, explained)]
+        lines += ["", f"[axis.{name}]"]
+        for field in structs.fields(AxisConfig):
+            value = getattr(axis, field.name)
+            if value is not None and value != field.default and (field.name != "zero" or value):
+                lines.append(f"{field.name} = {_value(axis, field.name, value)}")
     for name, members in machine.groups.items():
         lines += ["", f"[group.{name}]", f"axes = [{', '.join(map(_quoted, members))}]"]
     for name, pose in machine.poses.items():
@@ -107,39 +93,17 @@ def write(machine: MachineConfig) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _axis_lines(axis: AxisConfig, explained: set[str]) -> list[str]:
-    lines = []
-    hints = get_type_hints(AxisConfig, include_extras=True)
-    for field in structs.fields(AxisConfig):
-        value = getattr(axis, field.name)
-        if value is None or value == field.default:
-            continue
-        line = f"{field.name} = {_value(axis, field.name, value)}"
-        description = description_of(hints[field.name])
-        if description and field.name not in explained:
-            line = f"{line:<30}  # {description}"
-            explained.add(field.name)
-        lines.append(line)
-    return lines
-
-
 def _value(axis: AxisConfig, key: str, value: Any) -> str:
-    if isinstance(value, Quantity) and value.kind == "raw":
-        return _quoted(f"{value:.12g} raw")
+    unit = axis.display_unit
     if key == "zero":
         return _quoted(_text(value, "position", "deg"))
-    if isinstance(value, Velocity):
-        return _quoted(
-            _text(value, "linear velocity" if axis.travel else "velocity", f"{axis.display_unit}/s")
-        )
-    if isinstance(value, Acceleration):
-        kind = "linear acceleration" if axis.travel else "acceleration"
-        return _quoted(_text(value, kind, f"{axis.display_unit}/s2"))
     if key == "travel":
         return _quoted(_text(value, "length", "mm"))
-    if isinstance(value, Quantity):
-        return _quoted(_position(axis, value))
-    return json.dumps(value)
+    if isinstance(value, Velocity):
+        return _quoted(_text(value, value.kind, f"{unit}/s"))
+    if isinstance(value, Acceleration):
+        return _quoted(_text(value, value.kind, f"{unit}/s2"))
+    return _quoted(_position(axis, value)) if isinstance(value, Quantity) else json.dumps(value)
 
 
 def _position(axis: AxisConfig, value: float) -> str:
@@ -162,76 +126,29 @@ def _quoted(text: str) -> str:
 
 # -- schema ----------------------------------------------------------------------------------------------------
 
+Name = Annotated[str, Meta(pattern=NAME)]
+
+
+class _File(Struct, forbid_unknown_fields=True):
+    format: Literal[1]
+    name: str = ""
+    bus: dict[Name, BusConfig] = {}
+    axis: dict[Name, AxisConfig] = {}
+    group: dict[Name, GroupConfig] = {}
+    pose: dict[Name, dict[str, Position]] = {}
+
 
 def schema() -> dict[str, Any]:
     """The JSON schema of a machine file, for editors."""
-    members = {"type": "array", "items": {"type": "string"}, "minItems": 1}
-    tables = {
-        "bus": _struct_schema(BusConfig),
-        "axis": _struct_schema(AxisConfig),
-        "group": _object({"axes": members}, ["axes"]),
-        "pose": {"type": "object", "additionalProperties": _type_schema(Position)},
-    }
-    properties = {name: _tables(table) for name, table in tables.items()}
-    properties |= {"format": {"const": FORMAT}, "name": {"type": "string"}}
-    title = {
+    made = msgspec.json.schema(_File, schema_hook=_quantity_schema)
+    return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "motorbus machine file",
-    }
-    return title | _object(properties, ["format"])
-
-
-def _object(properties: dict[str, Any], required: list[str]) -> dict[str, Any]:
-    return {
-        "type": "object",
-        "additionalProperties": False,
-        "required": required,
-        "properties": properties,
+        **made,
     }
 
 
-def _tables(table: dict[str, Any]) -> dict[str, Any]:
-    return {"type": "object", "propertyNames": {"pattern": NAME}, "additionalProperties": table}
-
-
-def _struct_schema(kind: type[Struct]) -> dict[str, Any]:
-    properties = {}
-    for name, hint in get_type_hints(kind, include_extras=True).items():
-        properties[name] = _type_schema(hint)
-        if description := description_of(hint):
-            properties[name]["description"] = description
-    required = [field.encode_name for field in structs.fields(kind) if field.default is NODEFAULT]
-    return _object(properties, required)
-
-
-def split_hint(hint: Any) -> tuple[Any, tuple[Meta, ...]]:
-    """The type of a key without None, and its annotations."""
-    found: tuple[Meta, ...] = ()
-    while get_origin(hint) in (Annotated, Union, UnionType):
-        if get_origin(hint) is Annotated:
-            found += tuple(one for one in hint.__metadata__ if isinstance(one, Meta))
-            hint = hint.__origin__
-        else:
-            hint = next(one for one in get_args(hint) if one is not NoneType)
-    return hint, found
-
-
-def description_of(hint: Any) -> str:
-    """What a key means."""
-    return next((meta.description for meta in split_hint(hint)[1] if meta.description), "")
-
-
-def _type_schema(hint: Any) -> dict[str, Any]:
-    kind, metas = split_hint(hint)
-    if get_origin(kind) is Literal:
-        return {"enum": list(get_args(kind))}
-    if issubclass(kind, Quantity):
-        names = [unit for quantity in kind.kinds for unit in units.SCALES[quantity]]
-        pattern = "|".join(map(re.escape, [*names, *(["raw"] if kind.counts else [])]))
-        sign = "" if kind.above_zero else "-"
-        return {"type": "string", "pattern": rf"^\s*[+{sign}]?{NUMBER}\s*({pattern})\s*$"}
-    made: dict[str, Any] = {"type": {float: "number", bool: "boolean", str: "string"}[kind]}
-    for meta in metas:
-        bounds = {"exclusiveMinimum": meta.gt, "maximum": meta.le, "pattern": meta.pattern}
-        made |= {name: bound for name, bound in bounds.items() if bound is not None}
-    return made
+def _quantity_schema(kind: type[Quantity]) -> dict[str, Any]:
+    names = [re.escape(unit) for quantity in kind.kinds for unit in units.SCALES[quantity]]
+    sign = "" if kind.above_zero else "-"
+    return {"type": "string", "pattern": rf"^\s*[+{sign}]?{NUMBER}\s*({'|'.join(names)})\s*$"}

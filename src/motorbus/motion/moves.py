@@ -23,7 +23,7 @@ from motorbus.motion.axis import Axis, by_bus, on_axes
 from motorbus.motion.commands import AxisResult, LoopResult, MoveResult, StopResult, StopState
 from motorbus.motion.loop import ControlLoop, LoopState, start_axes
 from motorbus.motion.machine import Names
-from motorbus.motion.profile import Kind, Limits, Move, Synchronized, synchronize
+from motorbus.motion.profile import Kind, Limits, Move, synchronize
 from motorbus.motion.program import Exchange, OnBuses, raise_first
 from motorbus.motion.state import OpenMachine
 
@@ -92,26 +92,68 @@ async def move(
         raise RequestError(f"velocity {velocity}", expected="a finite number above 0")
     for axis in axes:
         _check_goal(axis, goals[axis.name], relative=relative)
-    led = [axis for axis in axes if axis.follows_setpoints]
-    timed = [axis for axis in axes if axis not in led]
-    loop = ControlLoop(machine, [axis.name for axis in led], direct=True) if led else None
-    mover = _Mover(machine, loop, timed, goals, relative)
-    async with mover, StopsIfInterrupted(axes):
+    limits = {
+        axis.name: Limits(
+            min(axis.config.max_velocity * speed, velocity or inf), axis.config.acceleration * speed**2
+        )
+        for axis in axes
+    }
+    led = [axis.name for axis in axes if axis.follows_setpoints]
+    timed = _TimedAxes([axis for axis in axes if not axis.follows_setpoints])
+    loop = ControlLoop(machine, led, direct=True) if led else None
+    async with timed, StopsIfInterrupted(axes):
         try:
+            moves = {}
             if loop is not None:
                 await loop.enter()
-            return await mover.run(duration, speed, velocity or inf, kind, tolerance, timeout)
+                for name, one in loop.axes.items():
+                    goal = goals[name] + (one.position if relative else 0.0)
+                    check_reach(one.axis, goal)
+                    moves[name] = Move(one.position, goal, limits[name])
+            await timed.plan(goals, limits, relative=relative)
+            profile = synchronize(moves, kind=kind, duration=duration, shortest=timed.shortest)
+            longest = timed.fit(profile.duration)
+            if longest > profile.duration:
+                profile = synchronize(moves, kind=kind, duration=longest, shortest=timed.shortest)
+            await timed.prepare(profile.duration)
+            begun = machine.now()
+            if loop is None:
+                await timed.start()
+            else:
+                period = 1 / loop.rate
+
+                def positions(elapsed: float) -> Mapping[str, float]:
+                    # `elapsed` is that of the next slot
+                    timed.estimate(min(elapsed - period, profile.duration))
+                    return profile.positions(elapsed)
+
+                peaks = {name: one.peak for name, one in profile.profiles.items()}
+                ends = {name: one.goal for name, one in moves.items()}
+                course = Course(profile.duration, positions, peaks, ends)
+                begun = await lead(loop, course, timed.starts, tolerance, timeout)
+            await timed.end()
         finally:
             if loop is not None:
                 loop.close()
+    results = {
+        name: AxisResult(
+            moves[name].goal if name in moves else goal,
+            machine.axes[name].status.known_position,
+            estimated=name not in moves,
+        )
+        for name, goal in goals.items()
+    }
+    return MoveResult(results, profile.duration, machine.now() - begun, profile.limited_by)
 
 
-async def pose(machine: OpenMachine, name: str, **options: Any) -> MoveResult:
-    """Move to a pose of the machine file. Options and errors as for `move`."""
+async def pose(
+    machine: OpenMachine, name: str, duration: float | None = None, speed: float = 1.0
+) -> MoveResult:
+    """Move to a pose of the machine file. Errors as for `move`."""
     poses = machine.config.poses
     if name not in poses:
         raise RequestError(f"no pose {name!r}", expected=f"one of {', '.join(poses) or 'none'}")
-    return await move(machine, poses[name], **options)
+    return await move(machine, poses[name], duration=duration, speed=speed)
 
 
 def _check_goal(axis: Axis, goal: float, *, relative: bool) -> None:
@@ -139,123 +181,85 @@ def check_reach(axis: Axis, goal: float) -> None:
         )
 
 
-class _Mover(Guard):
-    """One move: axes of a loop, and self-timed axes that start in a slot of that loop.
+class _TimedAxes(Guard):
+    """The self-timed axes of a move.
 
-    After an error each self-timed axis, which was stopped then, gives back what it borrowed.
+    After an error each, which was stopped then, gives back what it borrowed.
     """
 
-    def __init__(
-        self,
-        machine: OpenMachine,
-        loop: ControlLoop | None,
-        timed: list[Axis],
-        goals: Mapping[str, float],
-        relative: bool,
-    ) -> None:
-        self._machine, self._loop, self._timed = machine, loop, timed
-        self._goals = dict(goals)
-        self._relative = relative
+    def __init__(self, axes: list[Axis]) -> None:
+        self._axes = axes
+        self._before = {axis.name: axis.status.estimate for axis in axes}
         self._plans: dict[str, SelfTimedMove] = {}
-        self._starts = {axis.name: axis.status.estimate for axis in timed}
 
-    async def run(
-        self,
-        duration: float | None,
-        speed: float,
-        highest: float,
-        kind: Kind,
-        tolerance: float,
-        timeout: float,
-    ) -> MoveResult:
-        machine = self._machine
-        begun = machine.now()
-        profile = await self._plan(duration, speed, highest, kind)
-        raise_first(await on_axes(self._timed, lambda axis: self._plans[axis.name].prepare(profile.duration)))
-        starts = {axis.bus: [self._plans[axis.name].start] for axis in self._timed}
-        if self._loop is None and starts:
-            begun = machine.now()
-            for values in (await Exchange(starts)).values():
-                raise_first(dict(enumerate(values)) if isinstance(values, list) else {0: values})
-        elif self._loop is not None:
-            peaks = {name: one.peak for name, one in profile.profiles.items()}
+    async def plan(self, goals: Mapping[str, float], limits: Mapping[str, Limits], *, relative: bool) -> None:
+        """Make the plan of each; an axis that needs no step of its device is left out."""
 
-            def positions(elapsed: float) -> Mapping[str, float]:
-                self._estimate(min(elapsed, profile.duration))
-                return profile.positions(elapsed)
+        def plan(axis: Axis) -> Any:
+            config, start, goal = axis.config, axis.status.estimate, goals[axis.name]
+            if relative:
+                angle = goal * config.ratio
+                if start is not None:
+                    check_reach(axis, config.from_device(start + angle))
+            else:
+                assert start is not None
+                angle = config.to_device(goal) - start
+            velocity, acceleration = (abs(limit * config.ratio) for limit in limits[axis.name])
+            return axis.driver.plan_move(axis.device, angle, velocity=velocity, acceleration=acceleration)
 
-            course = Course(profile.duration, positions, peaks, self._goals)
-            begun = await lead(self._loop, course, starts, tolerance, timeout)
+        plans = await on_axes(self._axes, plan)
+        raise_first(plans)
+        self._plans = plans
+        self._axes = [axis for axis in self._axes if plans[axis.name].angle]
+
+    @property
+    def shortest(self) -> float:
+        """The shortest duration (s) of all."""
+        return max((one.shortest for one in self._plans.values()), default=0.0)
+
+    def fit(self, duration: float) -> float:
+        """The nearest duration (s) that is possible for each, not below this one."""
+        return max((one.fit(duration) for one in self._plans.values()), default=duration)
+
+    async def prepare(self, duration: float) -> None:
+        raise_first(await on_axes(self._axes, lambda axis: self._plans[axis.name].prepare(duration)))
+
+    @property
+    def starts(self) -> dict[BaseBus, list[Request[Any]]]:
+        """The requests that start them."""
+        return {axis.bus: [self._plans[axis.name].start] for axis in self._axes}
+
+    async def start(self) -> None:
+        """Start them without a loop."""
+        for values in (await Exchange(self.starts)).values() if self._axes else ():
+            raise_first(dict(enumerate(values)) if isinstance(values, list) else {0: values})
+
+    def estimate(self, elapsed: float) -> None:
+        """Where they are by their plans."""
+        for axis in self._axes:
+            before = self._before[axis.name]
+            if before is not None:
+                axis.status.estimate = before + self._plans[axis.name].position(elapsed)
+
+    async def end(self) -> None:
+        """Wait for their ends."""
         raise_first(await self._finish())
-        for axis in self._timed:
-            _moved(axis, self._starts[axis.name], self._plans[axis.name].angle)
-            axis.status.moving = False
-        axes = {name: self._result(name, goal) for name, goal in self._goals.items()}
-        return MoveResult(axes, profile.duration, machine.now() - begun, profile.limited_by)
-
-    def _estimate(self, elapsed: float) -> None:
-        """Where the self-timed axes are by their plans, for who watches the move."""
-        for axis in self._timed:
-            start = self._starts[axis.name]
-            if start is not None:
-                axis.status.estimate = start + self._plans[axis.name].position(elapsed)
+        for axis in self._axes:
+            _moved(axis, self._before[axis.name], self._plans[axis.name].angle)
 
     async def _finish(self) -> dict[str, Any]:
-        planned = [axis for axis in self._timed if axis.name in self._plans]
+        planned = [axis for axis in self._axes if axis.name in self._plans]
         return await on_axes(planned, lambda axis: self._plans[axis.name].finish())
 
     async def leave(self, error: BaseException | None) -> None:
         if error is None:
             return
-        for axis in self._timed:
-            if axis.status.estimate != self._starts[axis.name]:
+        for axis in self._axes:
+            if axis.status.estimate != self._before[axis.name]:
                 axis.status.estimate = None
         for name, result in (await self._finish()).items():
             if isinstance(result, MotorbusError) and not isinstance(result, Interrupted):
                 error.add_note(f"{name}: {result.summary}")
-
-    def _result(self, name: str, goal: float) -> AxisResult:
-        position = self._machine.axes[name].status.known_position
-        return AxisResult(goal, position, estimated=name in self._plans)
-
-    async def _plan(self, duration: float | None, speed: float, highest: float, kind: Kind) -> Synchronized:
-        moves = {}
-        for axis in self._loop.members if self._loop is not None else ():
-            assert self._loop is not None
-            here = self._loop.axes[axis.name].position
-            goal = self._goals[axis.name] + (here if self._relative else 0.0)
-            check_reach(axis, goal)
-            self._goals[axis.name] = goal
-            limits = Limits(
-                min(axis.config.max_velocity * speed, highest), axis.config.acceleration * speed**2
-            )
-            moves[axis.name] = Move(here, goal, limits)
-
-        def plan(axis: Axis) -> Any:
-            ratio, start = axis.config.ratio, axis.status.estimate
-            if self._relative:
-                angle = self._goals[axis.name] * ratio
-                if start is not None:
-                    check_reach(axis, axis.config.from_device(start + angle))
-            else:
-                assert start is not None
-                angle = axis.config.to_device(self._goals[axis.name]) - start
-            velocity = min(axis.config.max_velocity * speed, highest)
-            acceleration = axis.config.acceleration * speed**2
-            return axis.driver.plan_move(
-                axis.device, angle, velocity=abs(velocity * ratio), acceleration=abs(acceleration * ratio)
-            )
-
-        plans = await on_axes(self._timed, plan)
-        raise_first(plans)
-        self._plans = plans
-        self._timed = [axis for axis in self._timed if plans[axis.name].angle]
-        shortest = max((one.shortest for one in self._plans.values()), default=0.0)
-        profile = synchronize(moves, kind=kind, duration=duration, shortest=shortest)
-        longest = max((one.fit(profile.duration) for one in self._plans.values()), default=profile.duration)
-        if longest > profile.duration:
-            profile = synchronize(moves, kind=kind, duration=longest, shortest=shortest)
-        return profile
 
 
 class Course(NamedTuple):
@@ -497,24 +501,38 @@ async def watch_rest(axis: Axis, seconds: float = WATCH_TIME) -> bool | None:
     return False
 
 
-async def switch_torque(machine: OpenMachine, on: bool, names: Names = None) -> tuple[str, ...]:
-    """Torque on without a jump, or off, for these axes; None means all that can. Gives their names."""
+async def enable_torque(machine: OpenMachine, names: Names = None) -> tuple[str, ...]:
+    """Torque on without a jump: each axis holds its position, a wheel stands. Gives the names of the axes.
+
+    A loop or move that leads one of them ends. Without `names`: all that can.
+    """
+    axes = _able(machine, names, lambda axis: axis.follows_setpoints, "on")
+    for axis in axes:
+        axis.status.check_fault()
+        axis.status.stopped()
+    groups = by_bus(axes)
+    raise_first(
+        await OnBuses({bus: start_axes(bus, members, machine.health) for bus, members in groups.items()})
+    )
+    machine.publish()
+    return tuple(axis.name for axis in axes)
+
+
+async def disable_torque(machine: OpenMachine, names: Names = None) -> tuple[str, ...]:
+    """Torque off; gives the names of the axes. Without `names`: all that can."""
+    axes = _able(machine, names, lambda axis: "disable_torque" in axis.driver, "off")
+    raise_first(await release_torque(axes))
+    machine.publish()
+    return tuple(axis.name for axis in axes)
+
+
+def _able(machine: OpenMachine, names: Names, can: Callable[[Axis], bool], way: str) -> list[Axis]:
     axes = machine.chosen(names)
-    able = [axis for axis in axes if (axis.follows_setpoints if on else "disable_torque" in axis.driver)]
+    able = [axis for axis in axes if can(axis)]
     if names is not None and len(able) < len(axes):
         others = ", ".join(axis.name for axis in axes if axis not in able)
-        raise RequestError(f"{others}: torque cannot be switched {'on' if on else 'off'}")
-    groups = by_bus(able)
-    if on:
-        for axis in able:
-            axis.status.check_fault()
-        raise_first(
-            await OnBuses({bus: start_axes(bus, members, machine.health) for bus, members in groups.items()})
-        )
-    else:
-        raise_first(await release_torque(able))
-    machine.publish()
-    return tuple(axis.name for axis in able)
+        raise RequestError(f"{others}: torque cannot be switched {way}")
+    return able
 
 
 async def release_torque(axes: list[Axis]) -> dict[str, Any]:

@@ -16,7 +16,6 @@ from motorbus.core.steps import READABLE, catch, gather
 from motorbus.errors import MotorbusError, NoReply, RequestError
 from motorbus.link.memory import MemoryLink, share_clock
 from motorbus.motion.axis import Axis
-from motorbus.motion.describe import notes_of
 from motorbus.motion.gate import SafetyGate
 from motorbus.motion.machine import AxisConfig, BusConfig, MachineConfig, Names, Velocity
 from motorbus.motion.program import OnBuses, raise_first
@@ -114,8 +113,6 @@ async def identify(machine: OpenMachine, kind: str) -> None:
         machine.gates[bus] = SafetyGate(
             bus, [axis.status for axis in machine.axes.values() if axis.bus is bus]
         )
-    for axis in machine.axes.values():
-        machine.warnings += notes_of(axis)
     for name, bus in machine.buses.items():
         machine.warnings += [f"{name}: {text}" for text in bus.warnings]
         _distrust(machine, bus)
@@ -140,8 +137,6 @@ async def _identify_axis(bus: BaseBus, name: str, config: AxisConfig, kind: str)
     device = getattr(bus.family.devices, kind)(bus, config.node)
     if not driver.names:
         raise RequestError(f"{name}: {config.device} is {identity.model}, whose functions are not known")
-    if config.counted:
-        config = config.with_counts(_resolution(bus, name, identity))
     if name.startswith("#") and "stream" not in driver and "set_velocity" in driver:
         config = structs.replace(config, kind="wheel")
     axis = Axis(
@@ -168,17 +163,4 @@ async def _identify_axis(bus: BaseBus, name: str, config: AxisConfig, kind: str)
         if isinstance(found, NoReply):
             raise found
         axis.limits = None if isinstance(found, MotorbusError) else found
-    if "max_velocity" in driver:
-        axis.top_velocity = await driver.max_velocity(device)
     return axis
-
-
-def _resolution(bus: BaseBus, name: str, identity: Identity) -> float:
-    """rad per count of the position of a device. Raises RequestError where that is not known."""
-    table = bus.family.registers.get(identity.table)
-    row = table["present_position"] if table is not None and "present_position" in table else None
-    if row is None or row.unit != "rad":
-        raise RequestError(
-            f"{name}: the resolution of {identity.model} is not known", advice="give angles, not raw"
-        )
-    return row.scale

@@ -13,21 +13,23 @@ does what `exit` of the machine file says.
 from __future__ import annotations
 
 import logging
-from abc import abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AsyncExitStack, ExitStack, suppress
+from functools import wraps
 from math import inf
 from os import PathLike
 from threading import Event, Thread
-from typing import Any, Final, Self
+from typing import TYPE_CHECKING, Any, Concatenate, Final, Generic, ParamSpec, Self, TypeVar, overload
 
 from msgspec import structs
 
 from motorbus.bus.interrupts import Interrupts, interrupts
 from motorbus.errors import Refused, RequestError
-from motorbus.motion import commands, moves, teach
+from motorbus.motion import commands, moves
+from motorbus.motion import teach as recording
 from motorbus.motion.axis import Axis, read_position
-from motorbus.motion.blocks import Attendance, Loop
+from motorbus.motion.blocks import AsyncLoop, Attendance, Loop
 from motorbus.motion.commands import EStopResult, RobotCommand
 from motorbus.motion.describe import MachineDescription, describe
 from motorbus.motion.loop import ControlLoop, Policy
@@ -35,13 +37,67 @@ from motorbus.motion.machine import MachineConfig, Names
 from motorbus.motion.opening import UNTRUSTED, USUAL_VELOCITY, bus_options, identify, machine_at, select
 from motorbus.motion.program import Program, drive, drive_async, raise_first, run
 from motorbus.motion.shutdown import Shutdown
-from motorbus.motion.state import OpenMachine, Subscription, poll, read_axes
-from motorbus.motion.trajectory import Trajectory
+from motorbus.motion.state import OpenMachine, Subscription, poll, read_axes, read_positions
 from motorbus.session import open as open_bus
 from motorbus.session import open_async
 
+P = ParamSpec("P")
+T = TypeVar("T")
 LOG = logging.getLogger("motorbus.motion")
 POLL_PERIOD: Final = 0.1  # s between two states for subscribers while no loop runs
+
+
+if TYPE_CHECKING:
+
+    class program_method(Generic[P, T]):  # noqa: N801 - used like a function
+        """The type of a method of a robot: the value of its program, of an AsyncRobot a coroutine of it."""
+
+        def __init__(self, program: Callable[Concatenate[Any, P], Program[T]]) -> None: ...
+        @overload
+        def __get__(self, robot: Robot, owner: type) -> Callable[P, T]: ...
+        @overload
+        def __get__(self, robot: AsyncRobot, owner: type) -> Callable[P, Coroutine[Any, Any, T]]: ...
+        def __get__(self, robot: Any, owner: type) -> Any: ...
+
+else:
+
+    def program_method(program: Callable[..., Program[T]]) -> Callable[..., Any]:
+        """Make a method of a robot that runs this program."""
+
+        @wraps(program)
+        def method(self: Any, /, *args: Any, **options: Any) -> Any:
+            return self.carry_out(program(self, *args, **options))
+
+        return method
+
+
+async def shutdown(machine: OpenMachine) -> None:
+    """Graceful stop: decelerate, hold, go to the pose `park` if there is one, torque off.
+
+    A second Ctrl-C, or a cancellation, releases at once. What failed is in `warnings`.
+    """
+    await _leave(machine, None, graceful=True)
+
+
+async def _leave(machine: OpenMachine, error: BaseException | None, *, graceful: bool = False) -> None:
+    """Program: the end. What it did not achieve is a note of `error`, which ends the program, else is raised."""
+    ending = Shutdown(machine, graceful=graceful)
+    try:
+        await ending.run()
+    except BaseException as interrupt:
+        error = error or interrupt
+        raise
+    finally:
+        machine.warnings += ending.notes
+        for note in ending.notes:
+            LOG.warning("%s", note)
+            if error is not None:
+                error.add_note(note)
+    if error is None:
+        raise_first(ending.errors)
+    else:
+        for name, action in ending.carried_out():
+            error.add_note(f"{name}: {action}, as its exit says")
 
 
 class RobotMethods(OpenMachine):
@@ -49,6 +105,8 @@ class RobotMethods(OpenMachine):
 
     `names` are names of axes, groups and buses; None means all axes.
     """
+
+    carry_out: Callable[[Program[Any]], Any]
 
     def __init__(self, config: MachineConfig, axes: Names = None) -> None:
         super().__init__()
@@ -69,9 +127,20 @@ class RobotMethods(OpenMachine):
         """
         return cls(machine_at(address, max_velocity))
 
-    @abstractmethod
-    def carry_out(self, program: Program[Any]) -> Any:
-        """Run a program; gives its value, or what is awaited for it."""
+    states = program_method(read_axes)
+    positions = program_method(read_positions)
+    move = program_method(moves.move)
+    pose = program_method(moves.pose)
+    jog = program_method(moves.jog)
+    home = program_method(moves.home)
+    run = program_method(moves.run_stored)
+    stop = program_method(moves.stop)
+    enable_torque = program_method(moves.enable_torque)
+    disable_torque = program_method(moves.disable_torque)
+    teach = program_method(recording.teach)
+    replay = program_method(recording.replay)
+    follow = program_method(recording.follow)
+    shutdown = program_method(shutdown)
 
     @property
     def _is_virtual(self) -> bool:
@@ -80,23 +149,15 @@ class RobotMethods(OpenMachine):
     def __getitem__(self, name: str) -> Axis:
         return self.axis(name)
 
-    # -- state -----------------------------------------------------------------------------------------------------
+    def program(self, command: RobotCommand) -> Program[Any]:
+        """The program that carries out a command."""
+        return PROGRAMS[type(command)](self, **structs.asdict(command))
+
+    # -- without I/O -----------------------------------------------------------------------------------------------
 
     def describe(self) -> MachineDescription:
         """What the machine is; sends nothing."""
         return describe(self)
-
-    def states(self, names: Names = None) -> Any:
-        """Read these axes; gives their `AxisState` by name."""
-        return self.carry_out(read_axes(self, names))
-
-    def positions(self, names: Names = None) -> Any:
-        """Read the positions (rad, m) of these axes, by name; None where a device reports none."""
-        return self.carry_out(self._read_positions(names))
-
-    async def _read_positions(self, names: Names) -> dict[str, float | None]:
-        states = await read_axes(self, names)
-        return {name: state.position for name, state in states.items()}
 
     @property
     def faults(self) -> dict[str, str]:
@@ -115,7 +176,7 @@ class RobotMethods(OpenMachine):
     def set_position(self, name: str, position: float) -> None:
         """Declare the position (rad, m) of an axis whose device reports none. Sends nothing."""
         axis = self.axis(name)
-        if "position" in axis.driver:
+        if axis.status.measured:
             raise RequestError(
                 f"{name}: its device reports its position", advice="calibrate its zero instead"
             )
@@ -137,88 +198,30 @@ class RobotMethods(OpenMachine):
                 with suppress(Exception):  # a bus that is gone, or closed meanwhile
                     drive(poll(self))
 
-    # -- commands --------------------------------------------------------------------------------------------------
+    def attended(self, seconds: float = inf) -> Attendance:
+        """Attend the machine in a block: motion without an end of its own is allowed, and stopped at the end.
 
-    def program(self, command: RobotCommand) -> Program[Any]:
-        """The program that carries out a command."""
-        return PROGRAMS[type(command)](self, **structs.asdict(command))
-
-    def move(self, goals: Mapping[str, float], **options: Any) -> Any:
-        """Move axes together; gives a `MoveResult`. See `moves.move`."""
-        return self.carry_out(moves.move(self, goals, **options))
-
-    def pose(self, name: str, **options: Any) -> Any:
-        """Move to a pose of the machine file; gives a `MoveResult`."""
-        return self.carry_out(moves.pose(self, name, **options))
-
-    def jog(
-        self,
-        name: str,
-        velocity: float,
-        seconds: float | None = None,
-        until: Callable[[], bool] | None = None,
-    ) -> Any:
-        """Move an axis at a velocity (rad/s, m/s), then brake; gives a `LoopResult`. See `moves.jog`."""
-        return self.carry_out(moves.jog(self, name, velocity, seconds, until))
-
-    def home(self, names: Names = None, *, timeout: float = 30.0, velocity: float | None = None) -> Any:
-        """Move to the reference switches; gives the positions by name. Needs `attended()`."""
-        return self.carry_out(moves.home(self, names, timeout, velocity))
-
-    def run(self, name: str, number: int, *, timeout: float | None = None) -> Any:
-        """Run a stored program of the device of an axis; gives its result as text."""
-        return self.carry_out(moves.run_stored(self, name, number, timeout))
-
-    def stop(self, names: Names = None, *, verify: bool = False) -> Any:
-        """Decelerate and hold; gives a `StopResult`. `verify`: watch until each rests, at most 1 s."""
-        return self.carry_out(moves.stop(self, names, verify=verify))
-
-    def enable_torque(self, names: Names = None) -> Any:
-        """Torque on without a jump: hold the present position. Gives the names of the axes."""
-        return self.carry_out(moves.switch_torque(self, True, names))
-
-    def disable_torque(self, names: Names = None) -> Any:
-        """Torque off. Gives the names of the axes."""
-        return self.carry_out(moves.switch_torque(self, False, names))
-
-    def teach(self, names: Names = None, **how: Any) -> Any:
-        """Record axes that are moved by hand; gives a `Trajectory`. See `teach.teach`."""
-        return self.carry_out(teach.teach(self, names, **how))
-
-    def replay(self, trajectory: Trajectory, **how: Any) -> Any:
-        """Play a trajectory; gives a `LoopResult`. See `teach.replay`."""
-        return self.carry_out(teach.replay(self, trajectory, **how))
-
-    def follow(self, pairs: Mapping[str, str], **how: Any) -> Any:
-        """Let axes track others, `{leader: follower}`; gives a `LoopResult`. See `teach.follow`."""
-        return self.carry_out(teach.follow(self, pairs, **how))
+        The block gets a `Lease`. With `seconds` it must be renewed by `beat()` within that time, or all that moves is
+        stopped, and the end of the block raises Refused.
+        """
+        return Attendance(self, seconds, self.carry_out)
 
     # -- emergency stop --------------------------------------------------------------------------------------------
 
     def estop(self) -> dict[str, EStopResult]:
         """Emergency stop of all buses at the same time, latched until `reset`. From any thread; never awaited."""
-        found: dict[str, EStopResult] = {}
+        if not self._is_virtual:
+            with suppress(RuntimeError), ThreadPoolExecutor(len(self.buses)) as pool:  # no thread left
+                return dict(zip(self.buses, pool.map(self._stop_bus, self.buses), strict=True))
+        return {name: self._stop_bus(name) for name in self.buses}
 
-        def stop(name: str) -> None:
-            try:
-                outcome = self.buses[name].estop()
-            except Exception as error:  # its port is gone: the others are stopped all the same
-                nodes = tuple(axis.config.node for axis in self.axes.values() if axis.config.bus == name)
-                found[name] = EStopResult((), nodes, f"nothing: {error}")
-            else:
-                found[name] = EStopResult(outcome.acknowledged, outcome.silent, outcome.promise)
-
-        threads = {name: Thread(target=stop, args=(name,), daemon=True) for name in self.buses}
-        for thread in threads.values():
-            with suppress(RuntimeError):  # the system has no more threads
-                if not self._is_virtual:
-                    thread.start()
-        for name, thread in threads.items():
-            if thread.ident is None:
-                stop(name)
-            else:
-                thread.join()
-        return {name: found[name] for name in self.buses}
+    def _stop_bus(self, name: str) -> EStopResult:
+        try:
+            outcome = self.buses[name].estop()
+        except Exception as error:  # its port is gone: the others are stopped all the same
+            nodes = tuple(axis.config.node for axis in self.axes.values() if axis.config.bus == name)
+            return EStopResult((), nodes, f"nothing: {error}")
+        return EStopResult(outcome.acknowledged, outcome.silent, outcome.promise)
 
     def trigger_estop(self) -> None:
         """Ask the stop threads of all buses for an emergency stop; for signal handlers."""
@@ -230,80 +233,39 @@ class RobotMethods(OpenMachine):
         for bus in self.buses.values():
             bus.reset()
 
-    # -- loop, lease -----------------------------------------------------------------------------------------------
 
-    def loop(
-        self,
-        rate: float | None = None,
-        names: Names = None,
-        *,
-        policy: Policy = "reject",
-        direct: bool = False,
-    ) -> Loop:
-        """A control loop of these axes, at `rate` Hz. See `ControlLoop`."""
-        loop = ControlLoop(self, names, rate=rate, policy=policy, direct=direct)
-        return Loop(loop, self.carry_out)
-
-    def attended(self, seconds: float = inf) -> Attendance:
-        """Attend the machine in a block: motion without an end of its own is allowed, and stopped at the end.
-
-        The block gets a `Lease`. With `seconds` it must be renewed by `beat()` within that time, or all that moves is
-        stopped, and the end of the block raises Refused.
-        """
-        return Attendance(self, seconds, self.carry_out)
-
-    # -- the end ---------------------------------------------------------------------------------------------------
-
-    def shutdown(self) -> Any:
-        """Graceful stop: decelerate, hold, go to the pose `park` if there is one, torque off.
-
-        A second Ctrl-C, or a cancellation, releases at once. What failed is in `warnings`.
-        """
-        return self.carry_out(self._leave(None, graceful=True))
-
-    async def _leave(self, error: BaseException | None, *, graceful: bool = False) -> None:
-        """Program: the end. What it did not achieve is a note of `error`, which ends the program, else is raised."""
-        ending = Shutdown(self, graceful=graceful)
-        try:
-            await ending.run()
-        except BaseException as interrupt:
-            error = error or interrupt
-            raise
-        finally:
-            self.warnings += ending.notes
-            for note in ending.notes:
-                LOG.warning("%s", note)
-                if error is not None:
-                    error.add_note(note)
-        if error is None:
-            raise_first(ending.errors)
-        else:
-            for name, action in ending.carried_out():
-                error.add_note(f"{name}: {action}, as its exit says")
+# -- commands --------------------------------------------------------------------------------------------------
 
 
-async def call_device(robot: OpenMachine, name: str, function: str, arguments: Mapping[str, Any]) -> Any:
-    """Program: a driver function of the device of an axis, after a read of its position."""
-    await run(robot.axis(name).bus, read_position(robot.axis(name)))
-    return await _call(robot.axis(name), function, (), arguments)
+async def switch_torque(machine: OpenMachine, on: bool, names: Names) -> tuple[str, ...]:
+    """Program: torque on or off."""
+    return await (moves.enable_torque if on else moves.disable_torque)(machine, names)
 
 
-async def read_registers(robot: OpenMachine, name: str, registers: Sequence[str]) -> Any:
+async def read_registers(machine: OpenMachine, name: str, registers: tuple[str, ...]) -> Any:
     """Program: registers of the device of an axis, by name."""
-    return await _call(robot.axis(name), "read", registers, {})
+    axis = machine.axis(name)
+    return await run(axis.bus, _device_function(axis, "read")(axis.device, *registers))
 
 
-async def write_registers(robot: OpenMachine, name: str, values: Mapping[str, float]) -> Any:
+async def write_registers(machine: OpenMachine, name: str, values: Mapping[str, float]) -> Any:
     """Program: write registers of the device of an axis, after a read of its position."""
-    await run(robot.axis(name).bus, read_position(robot.axis(name)))
-    return await _call(robot.axis(name), "write", (), values)
+    return await call_device(machine, name, "write", values)
 
 
-async def _call(axis: Axis, function: str, given: Sequence[Any], named: Mapping[str, Any]) -> Any:
-    method: Any = getattr(type(axis.device), function, None)
+async def call_device(machine: OpenMachine, name: str, function: str, arguments: Mapping[str, Any]) -> Any:
+    """Program: a driver function of the device of an axis, after a read of its position."""
+    axis = machine.axis(name)
+    called = _device_function(axis, function)
+    await run(axis.bus, read_position(axis))
+    return await run(axis.bus, called(axis.device, **arguments))
+
+
+def _device_function(axis: Axis, name: str) -> Callable[..., Any]:
+    method: Any = getattr(type(axis.device), name, None)
     if not hasattr(method, "function"):
-        raise RequestError(f"{axis.name}: {axis.config.device} has no command {function!r}")
-    return await run(axis.bus, method.function(axis.device, *given, **named))
+        raise RequestError(f"{axis.name}: {axis.config.device} has no command {name!r}")
+    return method.function  # type: ignore[no-any-return]
 
 
 def _at_once(method: Callable[..., Any]) -> Callable[..., Program[Any]]:
@@ -319,10 +281,10 @@ PROGRAMS: Final[Mapping[type, Callable[..., Program[Any]]]] = {
     commands.Jog: moves.jog,
     commands.Home: moves.home,
     commands.RunProgram: moves.run_stored,
-    commands.Replay: teach.replay_file,
-    commands.Teach: teach.teach_file,
-    commands.Follow: teach.follow,
-    commands.Torque: moves.switch_torque,
+    commands.Replay: recording.replay_file,
+    commands.Teach: recording.teach_file,
+    commands.Follow: recording.follow,
+    commands.Torque: switch_torque,
     commands.Stop: moves.stop,
     commands.EStop: _at_once(RobotMethods.estop),
     commands.Reset: _at_once(RobotMethods.reset),
@@ -352,12 +314,24 @@ class Robot(RobotMethods):
             drive(identify(self, "blocking"))
             self._stack = stack.pop_all()
 
-    def carry_out(self, program: Program[Any]) -> Any:
+    def carry_out(self, program: Program[T]) -> T:
+        """Run a program and give its value."""
         return drive(program)
 
     def execute(self, command: RobotCommand) -> Any:
         """Carry out a command and give its result."""
         return drive(self.program(command))
+
+    def loop(
+        self,
+        rate: float | None = None,
+        names: Names = None,
+        *,
+        policy: Policy = "reject",
+        direct: bool = False,
+    ) -> Loop:
+        """A control loop of these axes, at `rate` Hz. See `ControlLoop`."""
+        return Loop(ControlLoop(self, names, rate=rate, policy=policy, direct=direct))
 
     def close(self) -> None:
         """Leave each axis as the machine file says, and give the ports back."""
@@ -376,7 +350,7 @@ class Robot(RobotMethods):
             return
         with interrupts():
             try:
-                drive(self._leave(error))
+                drive(_leave(self, error))
             finally:
                 self._closed.set()
                 self._stack.close()
@@ -390,8 +364,20 @@ class Robot(RobotMethods):
 class AsyncRobot(RobotMethods):
     """An open machine on asyncio; it is opened when its `async with` is entered."""
 
-    async def carry_out(self, program: Program[Any]) -> Any:
+    async def carry_out(self, program: Program[T]) -> T:
+        """Run a program and give its value."""
         return await drive_async(program)
+
+    def loop(
+        self,
+        rate: float | None = None,
+        names: Names = None,
+        *,
+        policy: Policy = "reject",
+        direct: bool = False,
+    ) -> AsyncLoop:
+        """A control loop of these axes, at `rate` Hz. See `ControlLoop`."""
+        return AsyncLoop(ControlLoop(self, names, rate=rate, policy=policy, direct=direct))
 
     async def execute(self, command: RobotCommand) -> Any:
         """Carry out a command and give its result."""
@@ -418,4 +404,4 @@ class AsyncRobot(RobotMethods):
 
     async def __aexit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         async with self._stack:
-            await self.carry_out(self._leave(error))
+            await self.carry_out(_leave(self, error))

@@ -167,13 +167,21 @@ class OpenMachine:
 
 
 async def read_axes(machine: OpenMachine, names: Names = None) -> dict[str, AxisState]:
-    """Program: read these axes; gives their state. Raises the first error of one, after all were visited."""
+    """Read these axes; gives the `AxisState` of each by name.
+
+    Every axis is visited; then the first error is raised, with a note for each other.
+    """
     axes = machine.chosen(names)
     await on_axes([axis for axis in axes if machine.health.is_due(axis)], machine.health.note)
     raise_first(await on_axes(axes, read_state))
     machine.publish()
     state = machine.snapshot()
     return {axis.name: state.axes[axis.name] for axis in axes}
+
+
+async def read_positions(machine: OpenMachine, names: Names = None) -> dict[str, Any]:
+    """Read the positions (rad, m) of these axes, by name; None where a device reports none."""
+    return {name: state.position for name, state in (await read_axes(machine, names)).items()}
 
 
 async def poll(machine: OpenMachine) -> None:

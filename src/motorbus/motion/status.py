@@ -53,10 +53,8 @@ class AxisStatus:
     def take(self, angle: float, at: float) -> bool:
         """Take a reading; False while it is suspect.
 
-        An implausible reading is suspect until a second one agrees with it. The same reading counts once.
+        An implausible reading is suspect until a second one agrees with it.
         """
-        if at <= self.seen:
-            return self.suspect is None
         self.seen = at
         before, age = self.position, at - self.at
         if before is None or abs(angle - before) <= JITTER + FASTEST * min(age, FRESH):

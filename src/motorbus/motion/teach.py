@@ -10,7 +10,7 @@ from typing import Any, Final
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.motion.axis import Axis
 from motorbus.motion.commands import LoopResult
-from motorbus.motion.loop import ControlLoop, Policy
+from motorbus.motion.loop import ControlLoop, LoopState, Policy
 from motorbus.motion.machine import Names
 from motorbus.motion.moves import (
     Course,
@@ -47,63 +47,47 @@ async def teach(
     that ends a recording has it as `so_far`.
     """
     check_seconds(seconds)
-    axes = _taught(machine, names, keep_torque=keep_torque)
+    chosen = machine.chosen(names)
+    axes = [axis for axis in chosen if _can_be_taught(axis, keep_torque=keep_torque)]
+    if not axes or (names is not None and len(axes) < len(chosen)):
+        others = ", ".join(axis.name for axis in chosen if axis not in axes)
+        raise RequestError(f"{others}: cannot be moved by hand and read in a loop", advice="name other axes")
     if not keep_torque:
         raise_first(await release_torque(axes))
     loop = ControlLoop(machine, [axis.name for axis in axes], rate=rate)
-    recording = _Recording(axes)
+    samples: list[LoopState] = []
     try:
         async with Running(loop):
             begun = machine.now()
-            while not ended(machine.now() - begun, seconds, until) and len(recording.times) < MOST:
+            while not ended(machine.now() - begun, seconds, until) and len(samples) < MOST:
                 state = await loop.cycle()
                 if not state.missing:
-                    recording.add(state.at, state.position)
+                    samples.append(state)
     except MotorbusError as error:
-        error.so_far = recording.trajectory() if len(recording.times) > 1 else None
+        error.so_far = _recorded(axes, samples) if len(samples) > 1 else None
         raise
     except KeyboardInterrupt:
         if seconds is not None:
             raise
-    return recording.trajectory()
+    return _recorded(axes, samples)
 
 
-def _taught(machine: OpenMachine, names: Names, *, keep_torque: bool) -> list[Axis]:
-    axes = machine.chosen(names)
-    able = [
-        axis
-        for axis in axes
-        if "stream" in axis.driver
-        and not axis.config.is_wheel
-        and (keep_torque or "disable_torque" in axis.driver)
-    ]
-    if not able or (names is not None and len(able) < len(axes)):
-        others = ", ".join(axis.name for axis in axes if axis not in able)
-        raise RequestError(f"{others}: cannot be moved by hand and read in a loop", advice="name other axes")
-    return able
+def _can_be_taught(axis: Axis, *, keep_torque: bool) -> bool:
+    is_led = "stream" in axis.driver and not axis.config.is_wheel
+    return is_led and (keep_torque or "disable_torque" in axis.driver)
 
 
-class _Recording:
-    def __init__(self, axes: list[Axis]) -> None:
-        self.times: list[float] = []
-        self._places: dict[str, list[float]] = {axis.name: [] for axis in axes}
-        self._axes = axes
-        self._outside: dict[str, str] = {}
-
-    def add(self, at: float, positions: Mapping[str, float]) -> None:
-        """Add a sample."""
-        self.times.append(at)
-        for axis in self._axes:
-            place = positions[axis.name]
-            self._places[axis.name].append(place)
-            if not axis.config.allows(place) and axis.name not in self._outside:
-                note = f"{axis.name} is outside its limits at {at - self.times[0]:.2f} s: {axis.config.show(place)}"
-                self._outside[axis.name] = note
-
-    def trajectory(self) -> Trajectory:
-        """What was recorded. Raises RequestError for fewer than two samples."""
-        times = [at - self.times[0] for at in self.times]
-        return Trajectory(times, self._places, tuple(self._outside.values()))
+def _recorded(axes: list[Axis], samples: list[LoopState]) -> Trajectory:
+    times = [sample.at - samples[0].at for sample in samples]
+    places = {axis.name: [sample.position[axis.name] for sample in samples] for axis in axes}
+    notes = []
+    for axis in axes:
+        outside = [
+            at for at, place in zip(times, places[axis.name], strict=True) if not axis.config.allows(place)
+        ]
+        if outside:
+            notes.append(f"{axis.name} is outside its limits from {outside[0]:.2f} s on")
+    return Trajectory(times, places, tuple(notes))
 
 
 async def replay(
@@ -208,12 +192,9 @@ async def follow(
     return loop_result(loop, machine.now() - begun, {name: count for name, count in held.items() if count})
 
 
-async def replay_file(
-    machine: OpenMachine, file: str, *, skip_others: bool = False, **options: Any
-) -> LoopResult:
+async def replay_file(machine: OpenMachine, file: str, **options: Any) -> LoopResult:
     """Play a trajectory file. Options and errors as for `Trajectory.load` and `replay`."""
-    trajectory = Trajectory.load(file, machine.config.axes, skip_others=skip_others)
-    return await replay(machine, trajectory, **options)
+    return await replay(machine, Trajectory.load(file, machine.config.axes), **options)
 
 
 async def teach_file(machine: OpenMachine, file: str, **options: Any) -> LoopResult:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil, isfinite, pi, sqrt
@@ -20,17 +20,15 @@ from motorbus.motion.machine import LARGEST, AxisConfig, nearest
 Interpolation: TypeAlias = Literal["linear", "spline"]
 TIMES: Final = ("time", "t", "timestamp", "time_from_start", "seconds", "secs", "elapsed")
 COLUMN: Final = re.compile(r"(.*?)\s*(?:\(([^()]*)\)|\[([^\[\]]*)\])?")
-SUFFIX: Final = re.compile(r"\.pos$")  # of a column of a LeRobot recording
 MOST: Final = 1_000_000  # samples
 CLOSEST: Final = 1e-6  # s between two samples
-EPOCH: Final = 1e8  # s; a larger first time is a date
 HALF_POWER: Final = sqrt(2**0.25 - 1)  # ω·τ where two passes of the filter let half of the power through
 SLACK: Final = 1e-6  # share of a limit that rounding in a file makes
 
 
 @dataclass(frozen=True, slots=True)
 class Trajectory:
-    """Positions of axes (rad, m) at `times` (s, from 0, increasing, at least two). `notes` are about the file.
+    """Positions of axes (rad, m) at `times` (s, from 0, increasing, at least two). `notes` are about the recording.
 
     Raises RequestError for times and positions that do not fit together or are not finite.
     """
@@ -129,16 +127,10 @@ class Trajectory:
     # -- CSV -------------------------------------------------------------------------------------------------------
 
     @classmethod
-    def load(
-        cls,
-        path: str | PathLike[str],
-        axes: Mapping[str, AxisConfig] | None = None,
-        *,
-        skip_others: bool = False,
-    ) -> Trajectory:
+    def load(cls, path: str | PathLike[str], axes: Mapping[str, AxisConfig] | None = None) -> Trajectory:
         """Read a CSV file. Raises RequestError that names the file and the line."""
         try:
-            return cls.parse(Path(path).read_text("utf-8"), axes, skip_others=skip_others)
+            return cls.parse(Path(path).read_text("utf-8"), axes)
         except (OSError, UnicodeDecodeError) as error:
             raise RequestError(f"{path}: {getattr(error, 'strerror', '') or 'not UTF-8 text'}") from None
         except RequestError as error:
@@ -146,116 +138,84 @@ class Trajectory:
             raise
 
     @classmethod
-    def parse(
-        cls, text: str, axes: Mapping[str, AxisConfig] | None = None, *, skip_others: bool = False
-    ) -> Trajectory:
+    def parse(cls, text: str, axes: Mapping[str, AxisConfig] | None = None) -> Trajectory:
         """Read the text of a CSV file: a header `time (s),NAME (unit),…`, then numbers.
 
-        With `axes`, a column of another name is refused, or left out with `skip_others`. Times are counted from the
-        first row; a row equal to the row before is left out. Raises RequestError that names the line.
+        With `axes`, a column of another name is refused. Times are counted from the first row; a row equal to the row
+        before is left out. Raises RequestError that names the line.
         """
         lines = _lines(text)
         line, header = next(lines, (1, [""]))
-        columns, notes = _columns(line, header, axes, skip_others)
+        columns = _columns(line, header, axes)
         rows: list[list[float]] = []
-        equal = 0
         for line, cells in lines:
             if len(cells) != len(header):
                 raise RequestError(
                     f"line {line}: {len(cells)} columns", expected=f"{len(header)}, as in the header"
                 )
-            row = [_number(line, cells[index]) * scale for index, _, scale in columns]
-            if rows and row == rows[-1]:
-                equal += 1
-                continue
-            if rows and row[0] == rows[-1][0]:
-                raise RequestError(
-                    f"line {line}: a second row at {cells[columns[0][0]]}", advice="keep one of them"
-                )
-            if rows and row[0] - rows[-1][0] < CLOSEST:
-                raise RequestError(
-                    f"line {line}: {cells[columns[0][0]]} is before the row above", advice="sort the rows"
-                )
-            rows.append(row)
-        if equal:
-            notes.append(f"{equal} identical rows left out")
-        if rows and rows[0][0] > EPOCH:
-            notes.append("times are dates: counted from the first row")
+            row = [_number(line, cell) * scale for cell, scale in zip(cells, columns.values(), strict=True)]
+            rows += [row] if not rows or row != rows[-1] else []
+        time = list(columns).index("time")
+        for (at, *_), (later, *_) in pairwise([row[time:] for row in rows]):
+            if later - at < CLOSEST:
+                raise RequestError(f"time {later:.6g} s is not after {at:.6g} s", advice="sort the rows")
         if len(rows) < 2:
             raise RequestError(f"{len(rows)} rows of numbers", expected="at least 2")
-        times = [row[0] - rows[0][0] for row in rows]
-        places = {name: [row[index] for row in rows] for index, (_, name, _) in enumerate(columns) if index}
-        return cls(times, places, tuple(notes))
+        places = {name: [row[index] for row in rows] for index, name in enumerate(columns)}
+        times = places.pop("time")
+        return cls([at - times[0] for at in times], places)
 
     def text(self, axes: Mapping[str, AxisConfig] | None = None) -> str:
         """A CSV file; with `axes` in the display units."""
         units_of = {name: axes[name].display_unit if axes and name in axes else "" for name in self.axes}
-        scales = {name: _scale(unit) if unit else 1.0 for name, unit in units_of.items()}
         head = ["time (s)", *(f"{name} ({unit})" if unit else name for name, unit in units_of.items())]
         lines = [",".join(head)]
         for index, at in enumerate(self.times):
-            cells = (f"{places[index] / scales[name]:.12g}" for name, places in self.axes.items())
+            cells = (f"{places[index] / _scale(units_of[name]):.12g}" for name, places in self.axes.items())
             lines.append(",".join([f"{at:.12g}", *cells]))
         return "\n".join(lines) + "\n"
 
 
 def _lines(text: str) -> Iterator[tuple[int, list[str]]]:
-    if re.search(r"^\s*-?\s*(joint_names|points|positions)\s*:", text, re.MULTILINE):
-        raise RequestError(
-            "this is a YAML of joint trajectories, not CSV",
-            advice="write a header `time,NAME,…` and one line of numbers for each point",
-        )
     for line, content in enumerate(text.removeprefix("\ufeff").splitlines(), 1):
         bare = content.strip()
         if bare and not bare.startswith("#"):
             yield line, [cell.strip().strip('"').strip() for cell in bare.split(",")]
 
 
-def _columns(
-    line: int, header: Sequence[str], axes: Mapping[str, AxisConfig] | None, skip_others: bool
-) -> tuple[list[tuple[int, str, float]], list[str]]:
-    """Of the time, then of each axis: index, name, and the factor to API units; and notes."""
+def _columns(line: int, header: Sequence[str], axes: Mapping[str, AxisConfig] | None) -> dict[str, float]:
+    """The factor to API units of each column, by name of the axis, or "time"."""
     if len(header) == 1 or header[0].replace(".", "").isdigit():
         raise RequestError(
             f"line {line}: no header", expected="time (s),shoulder (deg),…, separated by commas"
         )
-    times: list[tuple[int, str, float]] = []
-    found: dict[str, tuple[int, str, float]] = {}
-    skipped = []
-    for index, cell in enumerate(header):
+    found: dict[str, float] = {}
+    for cell in header:
         match = COLUMN.fullmatch(cell)
         assert match is not None
         name, unit = match[1].strip(), (match[2] or match[3] or "").strip()
+        kinds: tuple[str, ...] = ("position", "length")
         if name.lower() in TIMES:
-            times.append((index, "time", _unit(line, cell, unit, ("time",))))
-            continue
-        name = name if axes is None or name in axes else SUFFIX.sub("", name)
-        if axes is not None and name not in axes:
-            if not skip_others:
+            name, kinds = "time", ("time",)
+        elif axes is not None:
+            if name not in axes:
                 raise RequestError(f"line {line}: no axis {shown(name)}", advice=nearest(name, axes))
-            skipped.append(cell)
-        elif name in found:
+            kinds = ("length",) if axes[name].travel else ("position",)
+        scales = {known: scale for kind in kinds for known, scale in units.SCALES[kind].items()}
+        if unit and unit not in scales:
+            raise RequestError(
+                f"line {line}: {shown(cell)} has an unknown unit", advice=nearest(unit, scales)
+            )
+        if name in found:
             raise RequestError(f"line {line}: {name} is there twice")
-        else:
-            linear = () if axes is None else (("length",) if axes[name].travel else ("position",))
-            found[name] = index, name, _unit(line, cell, unit, linear or ("position", "length"))
-    if len(times) != 1:
-        raise RequestError(
-            f"line {line}: {len(times)} columns of time", expected=f"one named {', '.join(TIMES)}"
-        )
-    return [*times, *found.values()], [f"columns left out: {', '.join(skipped)}"] if skipped else []
-
-
-def _unit(line: int, cell: str, unit: str, quantities: Collection[str]) -> float:
-    for quantity in quantities:
-        if not unit or unit in units.SCALES[quantity]:
-            return units.SCALES[quantity][unit] if unit else 1.0
-    known = [known for quantity in quantities for known in units.SCALES[quantity]]
-    raise RequestError(f"line {line}: {shown(cell)} has an unknown unit", advice=nearest(unit, known))
+        found[name] = scales[unit] if unit else 1.0
+    if "time" not in found:
+        raise RequestError(f"line {line}: no column of time", expected=f"one named {', '.join(TIMES)}")
+    return found
 
 
 def _scale(unit: str) -> float:
-    return units.SCALES["length" if unit in units.SCALES["length"] else "position"][unit]
+    return {**units.SCALES["position"], **units.SCALES["length"], "": 1.0}[unit]
 
 
 def _number(line: int, cell: str) -> float:

@@ -14,8 +14,7 @@ from typing import Final, NamedTuple
 from motorbus import families
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.family import Family
-from motorbus.core.recording import ABSENT, RecordedEvent, RecordedFrame, RecordingReceiver
-from motorbus.core.register import shown
+from motorbus.core.recording import ABSENT, RecordedEvent, RecordedFrame
 from motorbus.core.request import Data, Event, Noise, Notification
 from motorbus.errors import RequestError
 
@@ -52,40 +51,24 @@ class Decoder:
     """
 
     def __init__(self, family: str | Family, direction: str = "") -> None:
-        if isinstance(family, str):
-            family = families.load(family)
-        elif not hasattr(family, "link"):
-            raise RequestError(
-                f"{shown(family)} is no family of devices",
-                expected=f"one of {', '.join(families.names())}, or a `FAMILY`",
-                advice='give the name of the family, as "feetech"',
-            )
-        self.family: Final = family
-        self.code_meaning: Final = _receiver(family, direction).code_meaning
-        """The meaning of `Packet.code`, in words; "" if the family has no codes."""
+        self.family: Final = families.load(family) if isinstance(family, str) else family
         self._direction: Final = direction
-        self._frames: Final = family.link.kind == "frames"
-        self._streams: Final[dict[str, _Stream]] = {}
+        self._frames: Final = self.family.link.kind == "frames"
+        self._streams: Final = {name: _Stream(self.family, name) for name in ("", "tx", "rx")}
         self._position = 0
+        self._stream(direction)
 
     def feed(self, data: Data, at: float | None = None, direction: str | None = None) -> list[Packet]:
         """Take bytes, or one CAN frame, and the time (s) of their arrival; return the packets that are complete.
 
-        Raises RequestError for an unknown direction, a time that is not finite, and data of the wrong kind of bus.
+        Raises RequestError for an unknown direction and for data of the wrong kind of bus.
         """
-        if at is not None and not (isinstance(at, int | float) and -inf < at < inf):
-            raise RequestError(f"at: {shown(at)} is no time", expected="a finite number of seconds, or None")
-        if self._frames:
-            if not isinstance(data, CanFrame):
-                raise RequestError(f"{self.family.name} devices are on a CAN bus", expected="a CanFrame")
-        elif isinstance(data, bytes | bytearray | memoryview):
-            data = bytes(data)
-        else:
-            raise RequestError(f"{self.family.name} devices are on a serial line", expected="bytes")
-        direction = self._direction if direction is None else direction
-        stream = self._streams.get(direction)
-        if stream is None:
-            stream = self._streams[direction] = _Stream(_receiver(self.family, direction), self._frames)
+        if self._frames != isinstance(data, CanFrame):
+            expected = "a CanFrame" if self._frames else "bytes"
+            raise RequestError(f"data of {self.family.name}: {type(data).__name__}", expected=expected)
+        if not isinstance(data, CanFrame):
+            data = bytes(data)  # a caller may reuse its buffer
+        stream = self._stream(self._direction if direction is None else direction)
         start = self._position
         self._position += 1 if self._frames else len(data)
         return stream.feed(data, start, at)
@@ -93,6 +76,14 @@ class Decoder:
     def flush(self) -> list[Packet]:
         """End of the recording: return the packets in the remaining data, one direction after the other."""
         return [packet for stream in self._streams.values() for packet in stream.flush()]
+
+    def _stream(self, direction: str) -> _Stream:
+        if direction not in self._streams:
+            raise RequestError(
+                f"direction {direction!r}",
+                expected='"rx" from the devices, "tx" to them, "" both',
+            )
+        return self._streams[direction]
 
 
 class _Chunk(NamedTuple):
@@ -106,9 +97,10 @@ class _Chunk(NamedTuple):
 class _Stream:
     """The data of one direction."""
 
-    def __init__(self, receiver: RecordingReceiver, frames: bool) -> None:
-        self._receiver = receiver
-        self._frames = frames
+    def __init__(self, family: Family, direction: str) -> None:
+        self._frames = family.link.kind == "frames"
+        receiver = _FrameReceiver if self._frames else _ReplyReceiver
+        self._receiver = family.recording(direction) or receiver(family)
         self._chunks: deque[_Chunk] = deque()
         self._fed = 0
         self._position = 0  # of the next packet
@@ -121,7 +113,7 @@ class _Stream:
         return self._packets(self._receiver.feed(data))
 
     def flush(self) -> list[Packet]:
-        return self._packets(self._receiver.flush(), end=True)
+        return self._packets(self._receiver.flush(), end=True) if self._chunks else []
 
     def _packets(self, events: list[RecordedEvent], end: bool = False) -> list[Packet]:
         packets: list[Packet] = []
@@ -161,21 +153,11 @@ class _Stream:
             self._noise = b""
 
 
-def _receiver(family: Family, direction: str) -> RecordingReceiver:
-    if direction not in ("", "rx", "tx"):
-        raise RequestError(
-            f"there is no direction {direction!r}", expected='"rx" from the devices, "tx" to them, "" both'
-        )
-    receiver = _FrameReceiver if family.link.kind == "frames" else _BusReceiver
-    return family.recording(direction) or receiver(family)
-
-
 class _FrameReceiver:
     """CAN frames, each explained by itself: its identifier gives the direction."""
 
     def __init__(self, family: Family) -> None:
         self._driver = family.open()
-        self.code_meaning: str = getattr(self._driver, "code_meaning", "")
 
     def feed(self, data: Data) -> list[RecordedEvent]:
         assert isinstance(data, CanFrame)
@@ -188,10 +170,8 @@ class _FrameReceiver:
         return []
 
 
-class _BusReceiver:
-    """The receiver of a serial bus: replies and notices only."""
-
-    code_meaning = ""
+class _ReplyReceiver:
+    """Replies and notices of a serial bus whose family has no receiver for recordings."""
 
     def __init__(self, family: Family) -> None:
         self._receiver = family.open().receiver()

@@ -46,9 +46,9 @@ class CanChannel:
     def fileno(self) -> int | None:
         return self.link.fileno()
 
-    def receive(self, patience: float = 0.0) -> list[Data]:
+    def receive(self, wait: float = 0.0) -> list[Data]:
         """The frames that have arrived; wait so long (s) for the first."""
-        return self.link.read(self.link.now() + patience)
+        return self.link.read(self.link.now() + wait)
 
     def rate(self) -> int | None:
         return None

@@ -13,7 +13,7 @@ MAX_UNREAD: Final = 4096  # bytes kept for a program that does not read
 
 
 class Stream(Protocol):
-    """Bytes from and to one program; no call blocks. `gone`: the program has left for good."""
+    """Bytes from and to one program; no call blocks. `gone`: the program has left."""
 
     gone: bool
 

@@ -22,8 +22,7 @@ from motorbus.errors import LinkError, MotorbusError, PortBusy, RequestError
 from motorbus.simulation.server import Server
 
 MAX_LINE: Final = 1 << 16
-"""Bytes of an order; a script of faults is the longest."""
-MAX_CLIENTS: Final = 16
+"""Bytes of an order; a longer one ends the connection."""
 MAX_FIRED: Final = 20  # latest faults in a reply
 
 
@@ -146,15 +145,6 @@ def _node(server: Server, text: str) -> SimulatedNode:
         raise RequestError(f"there is no device {text}", expected=f"one of {known}") from None
 
 
-class _Client:
-    """A connection: orders that are not complete, and replies that are not sent."""
-
-    def __init__(self, connection: socket.socket) -> None:
-        self.connection = connection
-        self.orders = b""
-        self.replies = b""
-
-
 class ControlSocket:
     """An open control socket of a server, which calls it when there is something to do.
 
@@ -165,15 +155,15 @@ class ControlSocket:
     def __init__(self, path: str | Path, server: Server) -> None:
         self.path = Path(path)
         self._server = server
-        self._clients: dict[int, _Client] = {}
+        self._clients: dict[socket.socket, bytes] = {}  # bytes of an order that is not complete
         self._listener = _listen(self.path)
         self._inode = self.path.stat().st_ino
         server.watch(self._listener.fileno(), self._accept)
 
     def close(self) -> None:
         """Close all connections and remove the socket; a second call does nothing."""
-        for descriptor in tuple(self._clients):
-            self._drop(descriptor)
+        for client in tuple(self._clients):
+            self._drop(client)
         if self._listener.fileno() >= 0:
             self._server.unwatch(self._listener.fileno())
             self._listener.close()
@@ -183,55 +173,30 @@ class ControlSocket:
 
     def _accept(self) -> None:
         with contextlib.suppress(OSError):
-            connection, _ = self._listener.accept()
-            if len(self._clients) >= MAX_CLIENTS:
-                connection.close()
-                return
-            connection.setblocking(False)
-            descriptor = connection.fileno()
-            self._clients[descriptor] = _Client(connection)
-            self._server.watch(descriptor, partial(self._receive, descriptor))
+            client, _ = self._listener.accept()
+            client.setblocking(False)
+            self._clients[client] = b""
+            self._server.watch(client.fileno(), partial(self._receive, client))
 
-    def _receive(self, descriptor: int) -> None:
-        client = self._clients[descriptor]
+    def _receive(self, client: socket.socket) -> None:
+        """Carry out the orders that have arrived. A client that does not read its replies is dropped."""
         try:
-            data = client.connection.recv(MAX_LINE)
-        except BlockingIOError:
-            return
+            data = client.recv(MAX_LINE)
+            *lines, rest = (self._clients[client] + data).split(b"\n")
+            for line in lines:
+                reply = json.dumps(carry_out(self._server, line.decode(errors="replace"))).encode() + b"\n"
+                if client.send(reply) < len(reply):
+                    raise BlockingIOError
         except OSError:
-            data = b""
-        *lines, client.orders = (client.orders + data).split(b"\n")
-        for line in lines:
-            reply = carry_out(self._server, line.decode(errors="replace"))
-            client.replies += json.dumps(reply).encode() + b"\n"
-        if len(client.orders) > MAX_LINE:
-            client.replies += json.dumps({"error": f"an order has at most {MAX_LINE} bytes"}).encode() + b"\n"
-            data = b""
-        self._reply(descriptor)
-        if not data:
-            self._drop(descriptor)
+            data = rest = b""
+        self._clients[client] = rest
+        if not data or len(rest) > MAX_LINE:
+            self._drop(client)
 
-    def _reply(self, descriptor: int) -> None:
-        """Send replies; what does not fit is sent when the program has read, and until then it gives no orders."""
-        client = self._clients[descriptor]
-        try:
-            sent = client.connection.send(client.replies) if client.replies else 0
-        except BlockingIOError:
-            sent = 0
-        except OSError:
-            self._drop(descriptor)
-            return
-        client.replies = client.replies[sent:]
-        if client.replies:
-            self._server.watch(descriptor, partial(self._reply, descriptor), to_write=True)
-        else:
-            self._server.watch(descriptor, partial(self._receive, descriptor))
-
-    def _drop(self, descriptor: int) -> None:
-        client = self._clients.pop(descriptor, None)
-        if client is not None:
-            self._server.unwatch(descriptor)
-            client.connection.close()
+    def _drop(self, client: socket.socket) -> None:
+        del self._clients[client]
+        self._server.unwatch(client.fileno())
+        client.close()
 
 
 def _listen(path: Path) -> socket.socket:
@@ -241,8 +206,8 @@ def _listen(path: Path) -> socket.socket:
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         listener.bind(os.fspath(path))
-        path.chmod(0o600)  # before `listen`: nobody can connect earlier
-        listener.listen(MAX_CLIENTS)
+        path.chmod(0o600)  # before `listen`, so before a client can connect
+        listener.listen()
     except OSError as error:
         listener.close()
         kind = RequestError if "too long" in str(error) else LinkError

@@ -66,7 +66,7 @@ class FaultyBus:
         return getattr(self.__dict__["simulator"], name)
 
     def set(self, script: Script | str, now: float) -> None:
-        """Replace the faults from `now` (s) on; "" has none. Exchanges and times count anew.
+        """Replace the faults from `now` (s) on; "" has none. Exchanges and times count from there.
 
         Raises RequestError for a bad script and for a fault that is not possible here; the former faults stay then.
         """

@@ -24,7 +24,6 @@ from motorbus.simulation.slcan import SlcanAdapter
 from motorbus.simulation.tcp import TcpPort
 from motorbus.simulation.wire import Wire
 
-MAX_CLIENTS: Final = 16
 MAX_WAIT: Final = 1.0  # s
 RETRY: Final = 0.01
 """s after which a program that does not read, or a full wire, is tried again."""
@@ -111,11 +110,10 @@ class Server:
         os.close(self._ring)
         self._wake = -1
 
-    def watch(self, descriptor: int, act: Callable[[], None], *, to_write: bool = False) -> None:
-        """Call `act` whenever this descriptor is readable, or writable; replaces the former watch."""
+    def watch(self, descriptor: int, act: Callable[[], None]) -> None:
+        """Call `act` whenever this descriptor is readable; replaces the former watch."""
         self.unwatch(descriptor)
-        event = selectors.EVENT_WRITE if to_write else selectors.EVENT_READ
-        self._selector.register(descriptor, event, act)
+        self._selector.register(descriptor, selectors.EVENT_READ, act)
 
     def unwatch(self, descriptor: int) -> None:
         """End the watch of this descriptor, if there is one."""
@@ -178,9 +176,6 @@ class Server:
             return
         if not self._slcan:
             self.unwatch(port.fileno())  # a serial line has one program; the next one waits
-        elif len(self.clients) >= MAX_CLIENTS:
-            stream.close()
-            return
         self._add(Client(stream, SlcanAdapter() if self._slcan else None))
 
     def _add(self, client: Client | CanChannel) -> None:
@@ -195,8 +190,8 @@ class Server:
             return
         self._send(client, client.receive())
 
-    def _receive_polled(self, client: CanChannel, patience: float) -> None:
-        found = client.receive(patience)
+    def _receive_polled(self, client: CanChannel, wait: float) -> None:
+        found = client.receive(wait)
         with self.lock:
             self._send(client, found)
             self._run()
@@ -269,7 +264,7 @@ class ServerThread:
 
     @contextmanager
     def still(self) -> Iterator[None]:
-        """Nothing happens on the bus meanwhile, so that this thread may use the devices."""
+        """Stop the bus meanwhile, so that this thread may use the devices."""
         with self.server.lock:
             yield
 

@@ -20,7 +20,7 @@ ERROR: Final = b"\a"
 VERSION: Final = b"1013"  # hardware 1.0, software 1.3; hosts read the four digits as numbers
 SERIAL: Final = b"SIMU"
 MAX_LINE: Final = 32  # characters; a 29-bit frame of 8 bytes has 26
-MINUTE: Final = 60_000  # ms; timestamps begin anew after it
+MINUTE: Final = 60_000  # ms; timestamps are 0 again after it
 CRYSTAL: Final = 8_000_000  # Hz after the fixed divider by two
 BUS_ERROR: Final = 1 << 7  # of the status
 

@@ -10,12 +10,9 @@ from typing import Any
 
 import pytest
 
-from motorbus.core.request import Data
-from motorbus.errors import MotorbusError, OutcomeUnknown, VerificationFailed
 from motorbus.families.feetech import FAMILY, Servo
-from motorbus.families.feetech.protocol import Instruction
 from motorbus.families.feetech.registers.codes import ALARM_BITS, alarms
-from motorbus.link.base import Delivery, PerfectLine, Side
+from motorbus.link.base import PerfectLine
 from motorbus.link.memory import MemoryLink
 from tests.support.world import make_bus
 
@@ -73,7 +70,7 @@ def keep(rig: Rig, servo: Servo) -> None:
     rig.count += 1
     servo.write(max_temperature=wanted)
     assert rig.servos[1].memory["max_temperature"] == wanted
-    assert rig.servos[1].locked
+    assert rig.servos[1].memory["lock"]
 
 
 def position(rig: Rig, servo: Servo) -> None:
@@ -135,55 +132,3 @@ def test_d4_a_stop_visits_all_whatever_they_have_to_say() -> None:
         servo.disable_torque()
         assert rig.servos[id].memory["torque_enable"] == 0
         assert servo.alarm != ()
-
-
-class Lost(PerfectLine):
-    """Loses the writes, so many of them, on their way to the servo; reads pass."""
-
-    def __init__(self, most: int) -> None:
-        self.most = most
-        self.lost = 0
-
-    def carry(self, sender: Side, data: Data, at: float) -> list[Delivery]:
-        assert isinstance(data, bytes)
-        if sender is Side.HOST and data[4] == Instruction.WRITE and self.lost < self.most:
-            self.lost += 1
-            return []
-        return super().carry(sender, data, at)
-
-
-def _at_level(level: int) -> tuple[Rig, Servo]:
-    rig = Rig()
-    rig.servos[1].memory["status_return_level"] = level
-    servo = Servo(rig.bus, 1)
-    servo.prepare()
-    return rig, servo
-
-
-@pytest.mark.parametrize("level", [0, ACKNOWLEDGED_TOO])
-@pytest.mark.parametrize("what", ANSWERED)
-def test_d5_what_is_not_acknowledged_is_done_all_the_same(what: str, level: int) -> None:
-    rig, servo = _at_level(level)
-    for _ in range(3):
-        ANSWERED[what](rig, servo)
-    assert rig.bus.statistics.of(1).retries == 0
-
-
-@pytest.mark.parametrize("level", [0, ACKNOWLEDGED_TOO])
-def test_d5_a_write_that_was_lost_is_never_called_done(level: int) -> None:
-    """Acknowledged or not: it is said again until it is so, or the error says that it is not, or that nobody knows."""
-    rig, servo = _at_level(level)
-    for lost in range(1, 8):
-        rig.put(line := Lost(lost))
-        told: type[MotorbusError] | None = None
-        try:
-            write(rig, servo)
-        except MotorbusError as error:
-            told = type(error)
-        assert line.lost >= 1
-        assert told in (None, VerificationFailed, OutcomeUnknown)
-        assert told is None or level == 0 or line.lost > 2, "said three times"
-        rig.put(PerfectLine())
-        write(rig, servo)
-        rig.stir()
-        position(rig, servo)

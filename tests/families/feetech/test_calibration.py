@@ -118,13 +118,6 @@ def test_a_shaft_that_is_turned_meanwhile_is_noticed_and_the_offset_put_back() -
         assert simulation[1].memory["lock"] == 1
 
 
-def test_an_offset_that_the_register_cannot_mean_is_refused() -> None:
-    with world() as (_, servo, simulation):
-        simulation[1].memory.live[31:33] = b"\x00\x20"
-        with pytest.raises(DeviceError, match="cannot mean"):
-            servo.calibrate(1.0)
-
-
 @pytest.mark.parametrize("name", TURNING)
 def test_many_turns_are_one_setting_of_limits_and_phase(name: str) -> None:
     with world(name) as (bus, servo, simulation):

@@ -84,11 +84,13 @@ def test_example_2_the_present_position_is_1304(bus: Bus) -> None:
 
 
 def test_example_3_a_broadcast_of_an_id_is_refused(bus: Bus) -> None:
+    servo = motorbus.feetech.Servo(bus, 1)
+    servo.prepare()
     wire = Wire(bus)
     with pytest.raises(motorbus.RequestError):
         motorbus.feetech.Servo(bus, 254)
     with pytest.raises(motorbus.RequestError):
-        motorbus.feetech.Servo(bus, 1).write(id=1)
+        servo.write(id=1)
     assert wire.take() == ([], [])
 
 

@@ -199,7 +199,7 @@ class TestServoGroup:
                 assert exact(damaged, 1.0) is None
             assert exact(whole[:-1], 1.0) is None
             assert exact(frames[1] + frames[0], 1.0) is None
-            nodes[1].forget_settings()
+            nodes[1].known.forget()
             assert exact(whole, 1.0) is None
 
     def test_registers_are_read_by_name(self) -> None:
@@ -223,7 +223,6 @@ class TestServoGroup:
                 )
                 bus.run(request)
             assert sent[0] == sent[1]
-            assert request.prechecked
             assert [one.value for one in request.setpoints] == pytest.approx(goals, abs=0.003)
             assert all((one.low or 0.0) <= one.value <= (one.high or 0.0) for one in request.setpoints)
 
@@ -234,7 +233,6 @@ class TestServoGroup:
             nodes = servos(bus)
             write = ServoGroup(nodes).write("goal_position")
             request = write([2.0, 3.2, 2.0])
-            assert not request.prechecked
             with traffic(bus) as sent, pytest.raises(LimitExceeded):
                 bus.run(request)
             assert sent == []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import inf, nan
 from typing import Any
 
 import pytest
@@ -104,7 +103,7 @@ class TestOverload:
                     simulation[1].alarm = 0
 
             link.write = clears
-            found = servo.recover_overload(rest=0.2)
+            found = servo.recover_overload()
             assert found.tripped == ("overload",)
             assert simulation[1].memory["torque_enable"] == 1
 
@@ -113,15 +112,8 @@ class TestOverload:
             servo.enable_torque()
             simulation[1].alarm = 0x20
             with pytest.raises(DeviceError, match="still set"):
-                servo.recover_overload(rest=0.1)
+                servo.recover_overload()
             assert simulation[1].memory["torque_enable"] == 0
-
-    @pytest.mark.parametrize("rest", [-1.0, nan, inf, 1e9, "1", True])
-    def test_a_rest_is_a_time(self, rest: Any) -> None:
-        with world() as (bus, servo, _), traffic(bus) as sent:
-            with pytest.raises(RequestError):
-                servo.recover_overload(rest=rest)
-            assert sent == []
 
 
 # -- diagnosis -------------------------------------------------------------------------------------------------

@@ -88,8 +88,10 @@ def test_an_scs_becomes_a_servo_again_by_known_limits() -> None:
         before = servo.read("limits")
         servo.set_mode("pwm")
         assert servo.read_raw("limits") == {"min_position_limit": 0, "max_position_limit": 0}
+        known, servo.known.former_limits = servo.known.former_limits, None
         with pytest.raises(RequestError, match="needs limits"):
-            Servo(servo.bus, 1).set_mode("position")
+            servo.set_mode("position")
+        servo.known.former_limits = known
         servo.set_mode("position")
         assert servo.read("limits") == before
         for wrong in ((4.0, 0.5), (-1.0, 1.0), (0.0, 99.0)):
@@ -216,7 +218,7 @@ class TestStep:
             servo.set_mode("step")
             servo.enable_torque()
             start = shaft(simulation, bus)
-            simulation.faults = "exchange 1: drop"
+            simulation.faults = "exchange 2: drop"
             with pytest.raises(OutcomeUnknown):
                 servo.step(0.2, wait=False)
             simulation.faults = ""

@@ -9,25 +9,10 @@ import pytest
 
 from motorbus.core.family import IdChanged
 from motorbus.errors import LimitExceeded, RequestError
-from motorbus.families.kst import broadcast_read, broadcast_write
+from motorbus.families.kst import broadcast_write
 from motorbus.families.kst.profiles import SAVE as LETTERS
 from tests.families.kst.bench import Bench
 from tests.simulators.kst.host import SAVE
-
-
-def test_broadcast_read_leaves_out_duplicates_refusals_and_silence() -> None:
-    with Bench(1, 2, 3, 4, duplicate="2", profile="kst-ext") as bench:
-        for number, servo in enumerate(bench.simulator.servos):
-            servo.raw_position = 10 * number
-        bench[4].unplug()
-        found = bench.bus.run(broadcast_read("present_position", bench.settings))
-        assert found == {1: 0.0, 3: pytest.approx(0.0349, abs=1e-4)}
-        assert bench.sent() == ["600#4002600000000000"]
-        with pytest.raises(RequestError, match="can only be written"):
-            bench.bus.run(broadcast_read("bit_rate_code", bench.settings))
-        assert bench.sent() == []
-    with Bench(1, settings={"profile": "kst-ext"}) as bench:
-        assert bench.bus.run(broadcast_read("status", bench.settings)) == {}
 
 
 def write(bench: Bench, name: str, value: float, **how: Any) -> tuple[int, ...]:

@@ -43,8 +43,7 @@ def test_capabilities_belong_to_the_profile(profile: str) -> None:
         axis = FAMILY.open().axis(bench.servo().identify())
     assert axis.names == FAMILY.open().axis(Identity(1, "", "", profile)).names
     assert {"state", "position", "move", "stop", "limits", "stream"} <= axis.names
-    assert {"enable_torque", "cap_torque", "cap_current"}.isdisjoint(axis.names)
-    assert ("current" in axis) is ("temperature" in axis) is (profile != "kst")
+    assert {"enable_torque", "cap_torque"}.isdisjoint(axis.names)
     assert not FAMILY.open().axis(Identity(1, "", "", "")).names
     assert not any(hasattr(Servo, name) for name in ("enable_torque", "disable_torque"))
 
@@ -64,7 +63,6 @@ IMPOSSIBLE: dict[str, Callable[[Any], object]] = {
     "endless timeout": lambda servo: servo.provision(new_id=9, timeout=math.inf),
     "a timeout with a unit": lambda servo: servo.provision(new_id=9, timeout="120s"),
     "current": lambda servo: servo.current(),
-    "reports": lambda servo: servo.set_reports(True),
     "mid point": lambda servo: servo.set_mid_point(),
 }
 

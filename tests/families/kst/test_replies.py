@@ -49,7 +49,7 @@ def test_read_returns_the_value_of_its_own_request(probability: float, rounds: R
     line = FalseReplies(probability)
     with Bench(profile="kst-ext", line=line) as bench:
         bench.servo().write(report_interval=0.005)
-        bench.servo().set_reports(True)
+        bench.link.write(CanFrame(5, b"\1\0"))
         servo, total, failed = bench.servo(), rounds(100_000, 1_000), 0
         for count in range(total):
             bench[5].raw_position = raw = count * 719 % 1800 - 900

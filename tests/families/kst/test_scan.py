@@ -76,10 +76,10 @@ def test_scan_without_a_reply_names_the_other_id_format(sent: str, accepted: str
 class Without800k(MemoryLink):
     """An adapter that lacks a rate, as slcan."""
 
-    def tune(self, rate: int, listen_only: bool = False) -> None:
+    def tune(self, rate: int) -> None:
         if rate == 800_000:
             raise LinkError("this adapter has no such rate")
-        super().tune(rate, listen_only)
+        super().tune(rate)
 
 
 def test_rate_that_the_adapter_lacks_is_skipped() -> None:

@@ -1,4 +1,4 @@
-"""Settings of newer firmware: reports, mid point, travel limits, reverse bit; writes that survive power-off."""
+"""Settings of newer firmware: mid point, travel limits, reverse bit; writes that survive power-off."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from math import radians
 
 import pytest
 
-from motorbus.errors import Interrupted, OutcomeUnknown, RequestError, VerificationFailed
+from motorbus.errors import Interrupted, OutcomeUnknown, VerificationFailed
 from motorbus.families.kst import Servo
 from tests.families.kst.bench import Answers, Bench
 from tests.simulators.kst.host import SAVE
@@ -15,35 +15,6 @@ from tests.simulators.kst.host import SAVE
 LIMIT = "605#220A30000CFE0000"
 READ = "605#400A300000000000"
 ACK, NEW, OLD = "585#600A300000000000", "585#4B0A30000CFE0000", "585#4B0A300018FC0000"
-
-
-def test_reports_begin_and_end() -> None:
-    with Bench(profile="kst-ext") as bench:
-        servo = bench.servo()
-        servo.write(report_interval=0.01)
-        servo.set_reports(True)
-        notices = bench.bus.notices.subscribe()
-        bench.link.advance(0.1)
-        assert servo.ping()
-        assert 9 <= len([notice for notice in notices if notice.kind == "report"]) <= 11
-        servo.set_reports(False)
-        bench.link.advance(0.1)
-        assert servo.ping()
-        assert not [notice for notice in notices if notice.kind == "report"]
-        assert [text for text in bench.sent() if text[4:] != "4000300000000000"] == [
-            *("605#220022000A000000", "005#0100", "005#0200")
-        ]
-
-
-@pytest.mark.parametrize(("form", "start"), [("vendor", "005#0100"), ("standard", "000#0105")])
-def test_start_form_is_a_setting(form: str, start: str) -> None:
-    with Bench(profile="kst-ext", settings={"nmt": form}) as bench:
-        bench.servo().set_reports(True)
-        assert bench.sent() == [start]
-    with Bench(profile="kst-ext", settings={"nmt": "none"}) as bench:
-        with pytest.raises(RequestError, match="no form of start"):
-            bench.servo().set_reports(False)
-        assert bench.sent() == []
 
 
 SETTINGS: dict[str, tuple[Callable[[Servo], object], dict[str, int]]] = {

@@ -69,7 +69,8 @@ class Bench:
         self.events: list[object] = []
         self.journal = BusJournal("stepper:/dev/ttyUSB7")
         self.react: Callable[[object], None] = lambda event: None
-        driver = FAMILY.open(motor=options.get("motor", 3), dump_order=options.get("dump_order", "little"))
+        settings = ("motor", "dump_order", "ramp_tick_ms")
+        driver = FAMILY.open(**{name: options[name] for name in settings if name in options})
         self.bus = Bus(self.link, driver, interlock=DeviceLimits(), report=self._report, journal=self.journal)
         self.device = Controller(self.bus)
         self._trace = self.bus.trace.subscribe(limit=1_000_000)

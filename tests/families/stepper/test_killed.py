@@ -68,11 +68,11 @@ def test_jog_that_was_killed_is_reported_refused_and_recovered(
     assert killed.returncode == -signal.SIGKILL, killed.stderr
     code, printed = run(f"info {bus}#1", capfd)
     assert code == 0
-    assert "loan of project 1" in printed
+    assert "temporary use of project 1" in printed
     assert f"`motorbus recover {bus}`" in printed
     code, printed = run(f"jog {bus}#1{JOG}", capfd)
     assert code == 2
-    assert "loan of project 1" in printed
+    assert "temporary use of project 1" in printed
     assert stored(bus) != before
     code, printed = run(f"recover {bus} --yes", capfd)
     assert code == 0

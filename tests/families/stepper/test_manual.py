@@ -26,7 +26,7 @@ from motorbus.families.stepper.driver import stop as stopping
 from motorbus.families.stepper.driver.plan import PlannedMove, plan_move
 from motorbus.families.stepper.execution.machine import Phase
 from motorbus.families.stepper.parameters import Project, Step
-from tests.families.stepper.bench import STOP_MOTOR, STOP_PROJECT, Bench, bench, made
+from tests.families.stepper.bench import STOP_MOTOR, STOP_PROJECT, TURN, Bench, bench, made
 
 ORDER = {
     "jog_forward": "FF AA 03 0A",
@@ -71,23 +71,35 @@ def test_move_goes_by_the_angle_in_whole_pulses(one: Bench, angle: float) -> Non
     assert one.simulated.machine.phase is Phase.IDLE
 
 
-@pytest.mark.parametrize("project", [made(microsteps=7, step_angle=91), made(microsteps=60000, step_angle=1)])
-def test_turn_without_whole_pulses_or_of_many_is_met(project: Project) -> None:
+def test_turn_without_whole_pulses_is_met() -> None:
+    project = made(microsteps=7, step_angle=91)
     with bench(project) as one:
         moved = one.device.move_by(1.0, velocity=tau / 60)
         pulses = float(project.pulses_per_turn or 0)
-        assert one.simulated.position == pytest.approx(1.0 / tau * pulses, abs=pulses / 36000 + 1)
+        assert one.simulated.position == pytest.approx(1.0 / tau * pulses, abs=1)
         assert moved.angle == pytest.approx(one.simulated.position / pulses * tau, abs=1e-3)
 
 
 @pytest.mark.parametrize("tick", [0.5, 1.0, 10.0])
-def test_wait_is_long_enough_in_each_reading_of_the_ramp(tick: float) -> None:
+def test_move_returns_when_its_estimated_time_and_the_margin_have_passed(tick: float) -> None:
     with bench(made(), ramp_tick_ms=tick) as one:
         moved = one.device.jog(2 * tau, 1.0)
         assert one.simulated.position == round(moved.angle / tau * 1600)
-        before = one.link.now()
-        one.device.move_by(0.5)
-        assert one.link.now() - before < 1.5
+        begun = next(at for at, data in one.line.replies if data[2:4] == b"\x03\x0c")
+        ended = next(at for at, data in one.line.replies if data[2:4] == b"\x03\x0d")
+        motion = one.simulated.store.working.step(1)
+        assert motion == TURN, "project 1 is restored"
+        assert moved.seconds < ended - begun < moved.seconds + 0.05
+
+
+def test_move_of_a_controller_with_a_slower_ramp_is_stopped_at_its_estimated_time() -> None:
+    with bench(made()) as one:
+        one.simulated.machine.tick_ms = 10.0
+        moved = one.device.jog(2 * tau, 1.0)
+        assert STOP_PROJECT in one.sent()
+        one.run(Sleep(1.0))
+        assert 0.9 * moved.angle < one.simulated.position / 1600 * tau < moved.angle
+        assert one.simulated.machine.phase is Phase.IDLE
 
 
 def test_velocity_is_in_whole_rpm(one: Bench) -> None:
@@ -127,9 +139,8 @@ def test_start_frequency_lies_below_the_running_one(one: Bench) -> None:
 def test_impossible_motion_is_refused_before_anything_is_written(
     one: Bench, call: Callable[[Controller], object]
 ) -> None:
-    with pytest.raises(RequestError) as caught:
+    with pytest.raises(RequestError):
         call(one.device)
-    assert caught.value.unmoved
     assert {frame[6:8] for frame in one.sent()} <= {"3E", "00"}
 
 
@@ -149,9 +160,8 @@ def test_project_1_without_speed_or_geometry_moves_nothing(project: Project) -> 
             one.device.home,
             lambda: one.device.move_by(1.0),
         ):
-            with pytest.raises(RequestError) as caught:
+            with pytest.raises(RequestError):
                 call()
-            assert caught.value.unmoved
         assert orders(one) == []
     with bench(made(Step(distance=5))) as one:
         assert one.device.move_by(1.0, velocity=tau).angle > 0
@@ -178,9 +188,8 @@ def test_jog_without_end_is_stopped_and_waited_for(one: Bench, name: str, sign: 
 
 def test_acknowledgement_that_is_lost_stops_the_motor(one: Bench) -> None:
     one.line.change = lambda data: b"" if data[2:4] == b"\x03\x0c" else data
-    with pytest.raises(OutcomeUnknown) as caught:
+    with pytest.raises(OutcomeUnknown):
         one.device.jog(tau, 1.0)
-    assert not caught.value.unmoved
     sent = [frame for frame in one.sent() if frame.startswith("FF AA 03 0") or frame == STOP_PROJECT]
     start = sent.index("FF AA 03 0C 00 00 00 00 00 00 B8")
     assert sent[start + 1 : start + 3] == [STOP_MOTOR, STOP_PROJECT]
@@ -213,9 +222,8 @@ def test_gate_judges_what_a_motion_asks(one: Bench) -> None:
     }
     for call, asked in calls.items():
         gate.asked.clear()
-        with pytest.raises(Refused) as caught:
+        with pytest.raises(Refused):
             call()
-        assert caught.value.unmoved
         assert [setpoint.quantity for setpoint in gate.asked] == [quantity for quantity, _ in asked]
         values = [setpoint.value for setpoint in gate.asked]
         assert values == pytest.approx([value for _, value in asked], rel=1e-3)
@@ -245,7 +253,6 @@ def test_stop_of_another_task_ends_it(one: Bench, name: str, after: float) -> No
 
     one.run(gather(move(), stop()))
     assert isinstance(told[0], Interrupted)
-    assert told[0].unmoved is (not orders(one))
     assert one.simulated.machine.phase is Phase.IDLE
     assert one.simulated.store.working == made()
     assert one.journal.unfinished() is None
@@ -272,30 +279,21 @@ def test_home_ends_at_the_switch_and_counts_from_it() -> None:
     with bench(made(), **AT_HOME) as one:
         homed = one.device.home(deadline=8.0)
         assert homed.velocity == pytest.approx(tau)
-        assert str(homed) == f"input 5 was active after {homed.seconds:.1f} s in reverse at 60 RPM"
         assert homed.seconds == pytest.approx(0.5, abs=0.2)
         assert one.simulated.status()["homed"] is True
         assert one.simulated.position == 0
-        with pytest.raises(NotHomed, match="before homing") as caught:
+        with pytest.raises(NotHomed, match="before homing"):
             one.device.home()
-        assert caught.value.unmoved
         one.device.move_by(tau)
         assert one.device.home(velocity=2 * tau).velocity == pytest.approx(2 * tau)
-        one.device.move_by(tau)
-        assert one.device.home(at_most=0.55 * tau).velocity == pytest.approx(33 * tau / 60)
-        one.device.move_by(tau)
-        one.sent()
-        assert one.device.home(at_most=2 * tau).velocity == pytest.approx(tau)
-        assert "6E" not in {frame[6:8] for frame in one.sent()}, "step 1 is slow enough"
         assert one.simulated.store.working == made()
 
 
 @pytest.mark.parametrize("switch", ["never", "free"])
 def test_home_is_stopped_at_the_deadline(switch: str) -> None:
     with bench(made(), home_switch=switch) as one:
-        with pytest.raises(NotHomed, match="within 1 s") as caught:
+        with pytest.raises(NotHomed, match="within 1 s"):
             one.device.home(deadline=1.0)
-        assert not caught.value.unmoved
         assert [frame for frame in one.sent() if not frame.startswith("FF AA 00 0B")][-2:] == [
             STOP_MOTOR,
             STOP_PROJECT,
@@ -363,7 +361,7 @@ def test_planned_move_keeps_its_limits(one: Bench) -> None:
     one.run(plan.prepare(plan.shortest))
     step = one.simulated.store.working.step(1)
     assert step.speed == 119
-    assert step.acceleration * max(1000, 119 * 1600 / 60) <= 40.0 / tau * 1600
+    assert step.acceleration * 1000 <= 40.0 / tau * 1600
     one.run(plan.finish())
     with pytest.raises(RequestError, match="which is 1 RPM"):
         planned(one, 3.0, velocity=0.1)

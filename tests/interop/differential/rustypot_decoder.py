@@ -1,10 +1,10 @@
-"""rustypot, unmodified, on a pseudo-terminal whose other end says the stream that is due.
+"""rustypot, unmodified, on a pseudo-terminal whose other end sends the stream of the request.
 
-    python -S -P tests/interop/differential/rustypot_decoder.py
+    python -S -P tests/interop/differential/rustypot_decoder.py TIMEOUT
 
-Nothing of ours is in this process; lines in and out are those of `sdk_decoder.py`, and "patience" in a line is how long
-the library waits for bytes that do not come (s). The other end is a child process, for the library keeps Python to
-itself while it waits: it learns by a pipe what to say, and says it when a whole request has come.
+Nothing of this project is in the process; input and output are those of `sdk_decoder.py`. The other end is a child
+process, because the library holds the interpreter lock while it waits. It gets the stream by a pipe, and sends it
+when a whole request has arrived.
 """
 
 from __future__ import annotations
@@ -19,18 +19,16 @@ import tty
 from importlib import import_module
 from typing import Any
 
-QUICK = 0.004
-
 
 def serve(master: int, orders: int, answers: int) -> None:
-    """The other end: an order is the stream in hexadecimal, or an empty line that asks what has been heard."""
-    heard, stream, said, pending = b"", b"", True, b""
+    """The other end: an order is "." and a stream in hexadecimal, or an empty line that asks what has arrived."""
+    arrived, stream, is_sent, pending = b"", b"", True, b""
     while True:
         ready, _, _ = select.select([master, orders], [], [])
         if master in ready:
-            heard += os.read(master, 65536)
-            if not said and _is_whole(heard):
-                said = True
+            arrived += os.read(master, 65536)
+            if not is_sent and is_whole(arrived):
+                is_sent = True
                 os.write(master, stream)
         if orders in ready:
             data = os.read(orders, 65536)
@@ -38,12 +36,12 @@ def serve(master: int, orders: int, answers: int) -> None:
                 return
             *lines, pending = (pending + data).split(b"\n")
             for line in lines:
-                os.write(answers, heard.hex().encode() + b"\n")
+                os.write(answers, arrived.hex().encode() + b"\n")
                 if line:
-                    heard, said, stream = b"", False, bytes.fromhex(line.decode().strip("."))
+                    arrived, is_sent, stream = b"", False, bytes.fromhex(line.decode().strip("."))
 
 
-def _is_whole(packet: bytes) -> bool:
+def is_whole(packet: bytes) -> bool:
     return len(packet) > 3 and len(packet) >= packet[3] + 4
 
 
@@ -64,69 +62,56 @@ class Line:
         os.close(master)
         self.file = os.fdopen(self.answers)
 
-    def tell(self, order: str) -> str:
-        """Hand over an order; gives what the child had heard until then, in hexadecimal."""
-        os.write(self.orders, order.encode() + b"\n")
+    def order(self, text: str) -> str:
+        """Send an order; returns what had arrived until then, in hexadecimal."""
+        os.write(self.orders, text.encode() + b"\n")
         return self.file.readline().strip()
 
 
-class Decoder:
-    """One controller for each patience that is asked for."""
+def decode(line: Line, controller: Any, case: dict[str, Any]) -> tuple[str, dict[int, Any]]:
+    termios.tcflush(line.slave, termios.TCIFLUSH)
+    line.order("." + case["stream"])
+    try:
+        values = call(controller, **case)
+    except Exception:
+        return line.order(""), {}
+    while not is_whole(bytes.fromhex(sent := line.order(""))):  # a request without a reply is on its way
+        time.sleep(0.001)
+    return sent, values
 
-    def __init__(self) -> None:
-        self.rustypot: Any = import_module("rustypot")
-        self.lines: dict[float, tuple[Line, Any]] = {}
 
-    def decode(self, case: dict[str, Any]) -> dict[str, Any]:
-        patience = case.get("patience", QUICK)
-        if patience not in self.lines:
-            line = Line()
-            self.lines[patience] = line, self.rustypot.Sts3215PyController(line.name, 1_000_000, patience)
-        line, controller = self.lines[patience]
-        termios.tcflush(line.slave, termios.TCIFLUSH)
-        line.tell("." + case["stream"])
-        try:
-            gives = {"ok": getattr(self, case["kind"])(controller, case)}
-        except Exception as error:
-            gives = {"no": str(error)}
-        sent = line.tell("")
-        while "ok" in gives and not _is_whole(
-            bytes.fromhex(sent)
-        ):  # what is not answered may still be on its way
-            time.sleep(QUICK)
-            sent = line.tell("")
-        return {"sent": sent, **gives}
-
-    def ping(self, controller: Any, case: dict[str, Any]) -> int:
-        """It says no more than yes or no."""
-        if not controller.ping(case["node"]):
-            raise LookupError("False")
-        return 0
-
-    def read(self, controller: Any, case: dict[str, Any]) -> list[Any]:
-        data, alarm = controller.read_raw_data_with_error(case["node"], case["address"], case["count"])
-        return [list(data), alarm]
-
-    def write(self, controller: Any, case: dict[str, Any]) -> Any:
-        data = list(bytes.fromhex(case["data"]))
-        return controller.write_raw_data_with_error(case["node"], case["address"], data)
-
-    def sync_read(self, controller: Any, case: dict[str, Any]) -> dict[str, list[int]]:
-        found = controller.sync_read_raw_data(case["nodes"], case["address"], case["count"])
-        return {str(node): list(data) for node, data in zip(case["nodes"], found, strict=True)}
-
-    def sync_write(self, controller: Any, case: dict[str, Any]) -> None:
-        data, nodes = bytes.fromhex(case["data"]), case["nodes"]
-        size = len(data) // len(nodes)
-        shares = [list(data[place * size : (place + 1) * size]) for place in range(len(nodes))]
-        controller.sync_write_raw_data(nodes, case["address"], shares)
+def call(
+    controller: Any,
+    kind: str,
+    node: int,
+    address: int,
+    size: int,
+    data: str,
+    nodes: list[int],
+    stream: str,
+) -> dict[int, Any]:
+    values = list(bytes.fromhex(data))
+    if kind == "ping":  # it says yes or no
+        return {node: True} if controller.ping(node) else {}
+    if kind == "read":
+        return {node: list(controller.read_raw_data(node, address, size))}
+    if kind == "write":
+        return {node: controller.write_raw_data_with_error(node, address, values)}
+    if kind == "sync_read":
+        found = controller.sync_read_raw_data(nodes, address, size)
+        return {node: list(one) for node, one in zip(nodes, found, strict=True)}
+    size = len(values) // len(nodes)
+    controller.sync_write_raw_data(
+        nodes, address, [values[at : at + size] for at in range(0, len(values), size)]
+    )
+    return {}
 
 
 def main() -> None:
-    """Answer every line."""
-    decoder = Decoder()
-    for line in sys.stdin:
-        print(json.dumps(decoder.decode(json.loads(line))))
+    line = Line()
+    controller = import_module("rustypot").Sts3215PyController(line.name, 1_000_000, float(sys.argv[1]))
+    for text in sys.stdin:
+        print(json.dumps(decode(line, controller, json.loads(text))))
 
 
 if __name__ == "__main__":

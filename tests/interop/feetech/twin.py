@@ -1,8 +1,7 @@
-"""A simulated bus for a stranger's client, and our own look into the same servos' memory.
+"""A simulated bus for a foreign client, and an own look into the memory of the same servos.
 
-The simulator runs in a process of its own on a real pseudo-terminal. The observer has the terminal open too, from
-before the client came, and asks while the client is idle: so what a client was told, and what it has written, is
-judged by what the servo holds and not by the client's own word.
+The simulator runs in a process of its own on a pseudo-terminal. The observer has the terminal open as well, and reads
+while the client is idle: so a client is judged by what the servo holds.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ ABSENT: Final = 7
 RATE: Final = 1_000_000
 QUIET: Final = 0.05
 """s without a byte after which the line counts as quiet."""
-PATIENCE: Final = 2.0
+TIMEOUT: Final = 2.0
 TRIES: Final = 5
 
 
@@ -60,7 +59,6 @@ class Kind(NamedTuple):
 STS: Final = Kind("sts3215", "sts", "little", 777, 2048)
 SCS: Final = Kind("scs0009", "scs", "big", 1284, 512)
 HLS: Final = Kind("hls3925", "hls", "little", 3850, 2048)
-STS3045BL: Final = Kind("sts3045bl", "sts", "little", 1290, 2048)
 KINDS: Final = (STS, SCS, HLS)
 
 
@@ -112,16 +110,11 @@ class Twin:
                 self.order(f"plug {node}")
         self.order("power-cycle")
         self._tune(RATE)
-        self.settle()
+        self.drain(0.0)
 
-    def settle(self) -> None:
-        """Drop what is on its way, until nothing comes any more."""
-        while self._bytes(0.0):
-            pass
-
-    def hush(self) -> None:
-        """The same, with patience: something late may still be under way."""
-        while self._bytes(QUIET):
+    def drain(self, quiet: float = QUIET) -> None:
+        """Drop what arrives until nothing has come for this time (s)."""
+        while self._bytes(quiet):
             pass
 
     def read(self, node: int, address: int, count: int) -> list[int]:
@@ -143,16 +136,16 @@ class Twin:
     def _asked(self, packet: bytes, node: int, count: int) -> protocol.Packet:
         """The answer with so many parameters; what a client has left unread is passed over."""
         for _ in range(TRIES):
-            self.settle()
+            self.drain(0.0)
             os.write(self._terminal, packet)
-            while data := self._bytes(PATIENCE):
+            while data := self._bytes(TIMEOUT):
                 for answer, fault in self._parser.feed(data):
                     if not fault and answer[2] == node and len(answer) == protocol.OVERHEAD + count:
                         return protocol.decode(answer)
         raise AssertionError(f"no answer to {packet.hex(' ')}")
 
-    def _bytes(self, patience: float) -> bytes:
-        ready, _, _ = select.select([self._terminal], [], [], patience)
+    def _bytes(self, timeout: float) -> bytes:
+        ready, _, _ = select.select([self._terminal], [], [], timeout)
         return os.read(self._terminal, 4096) if ready else b""
 
     def _tune(self, rate: int) -> int:

@@ -30,30 +30,18 @@ def listed(major: int, minor: int, order: str) -> str:
         for (there, lowest, highest, needed), name in FIRMWARE.items()
         if (there, needed) == (major, order) and lowest <= minor <= highest
     ]
-    assert len(found) <= 1
-    return found[0] if found else ""
+    return "".join(found)
 
 
-def test_every_firmware_has_its_map_or_none() -> None:
+def test_firmware_and_byte_order_choose_the_map_whatever_the_model_is() -> None:
     for major, minor, order in product((0, 1, 2, 3, 4, 20, 255), range(256), ("little", "big")):
         assert map_for(major, minor, order) == listed(major, minor, order)
-
-
-def test_every_model_with_every_firmware_has_the_map_of_its_byte_order() -> None:
     firmwares = [(major, minor) for major in (0, 1, 2, 3, 4, 20) for minor in range(0, 80, 3)]
     for (number, model), firmware, end in product(MODELS.items(), firmwares, (0, 1)):
         assert choose(firmware, number, end) == (listed(*firmware, model.order), model.order, model)
-
-
-@pytest.mark.parametrize(("end", "order"), [(0, "little"), (1, "big"), (255, "big")])
-def test_an_unknown_model_has_the_byte_order_of_register_2(end: int, order: str) -> None:
-    assert choose((3, 30), (10, 27), end) == (listed(3, 30, order), order, None)
-    assert choose((0, 5), (77, 7), end) == (listed(0, 5, order), order, None)
-
-
-def test_the_model_does_not_choose_the_map() -> None:
-    assert choose((3, 10), (10, 18), 0).table == "sts"
-    assert choose((3, 43), (9, 3), 0).table == "hls"
+    for end, order in ((0, "little"), (1, "big"), (255, "big")):  # of an unknown model
+        assert choose((3, 30), (10, 27), end) == (listed(3, 30, order), order, None)
+        assert choose((0, 5), (77, 7), end) == (listed(0, 5, order), order, None)
 
 
 @pytest.mark.parametrize(
@@ -76,15 +64,11 @@ def test_a_model_has_a_name_a_byte_order_and_a_number(
     assert model_number(major, minor, order) == number
 
 
-def test_all_models_of_the_vendors_configuration_are_known() -> None:
+def test_all_models_of_the_vendors_configuration_are_known_and_their_arcs_certain_or_in_doubt() -> None:
     counts = {major: sum(1 for found, _ in MODELS if found == major) for major in (5, 6, 8, 9, 10)}
     assert counts == {5: 12, 6: 14, 8: 25, 9: 19, 10: 23}
     for model in MODELS.values():
         assert {TABLES[name]["goal_position"].order for name in model.maps} == {model.order}
-
-
-def test_an_arc_is_that_of_the_counts_or_in_doubt() -> None:
-    for model in MODELS.values():
         count = TABLES[model.maps[0]]["present_position"].scale
         assert model.arc_doubt or count * model.resolution == pytest.approx(model.arc * pi / 180)
     certain = {model.name for model in MODELS.values() if model.order == "big" and not model.arc_doubt}
@@ -102,9 +86,6 @@ def test_alarms_have_the_names_of_the_series() -> None:
     assert alarms(0x10, "smbl") == alarms(0x10, "of no map") == ("angle",)
 
 
-# -- traits ----------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", TABLES)
 def test_every_role_is_that_of_a_row_in_ram(name: str) -> None:
     traits, table = TRAITS[name], TABLES[name]
@@ -116,9 +97,8 @@ def test_every_role_is_that_of_a_row_in_ram(name: str) -> None:
         assert traits.duty_row(table).encode(-1000) in (b"\xe8\x07", b"\x07\xe8")
 
 
-@pytest.mark.parametrize(
-    ("name", "code", "limits", "mode"),
-    [
+def test_the_mode_follows_from_register_or_limits() -> None:
+    modes = [
         ("sts", 0, (0, 4095), Mode.POSITION),
         ("sts", 3, (0, 0), Mode.STEP),
         ("smcl", 3, (0, 0), None),
@@ -126,15 +106,9 @@ def test_every_role_is_that_of_a_row_in_ram(name: str) -> None:
         ("hls", 4, (0, 4095), None),
         ("scs", None, (0, 0), Mode.PWM),
         ("scs", None, (0, 1023), Mode.POSITION),
-    ],
-)
-def test_the_mode_follows_from_register_or_limits(
-    name: str, code: int | None, limits: tuple[int, int], mode: Mode | None
-) -> None:
-    assert TRAITS[name].mode_of(code, limits) is mode
-
-
-def test_the_code_of_a_mode_is_another_on_hls() -> None:
+    ]
+    for name, code, limits, mode in modes:
+        assert TRAITS[name].mode_of(code, limits) is mode
     assert (TRAITS["sts"].code(Mode.PWM), TRAITS["hls"].code(Mode.PWM)) == (2, 3)
     assert TRAITS["sts"].code(Mode.CURRENT) is None
     assert TRAITS["scs"].has == (Mode.POSITION, Mode.PWM)

@@ -40,20 +40,6 @@ def straight_time(pulses: int, start: int, rate: Fraction, run: Fraction) -> Dec
         return 2 * (peak - decimal(first)) / decimal(rate)
 
 
-def stair_time(pulses: int, start: int, rise: int, run: Fraction) -> Decimal:
-    """A move in which each pulse is `rise` Hz faster than the one before, added up one by one."""
-    with localcontext(prec=40):
-        first = Fraction(max(start, 1))
-        if not pulses or not run:
-            return Decimal(0)
-        if run <= first or not rise:
-            return decimal(pulses / run)
-        total = Decimal(0)
-        for i in range(pulses):
-            total += 1 / decimal(min(run, first + rise * i, first + rise * (pulses - 1 - i)))
-        return total
-
-
 def order_of(total: int, first: int, last: int, count: int) -> list[int]:
     """The steps of one pass, written out."""
     plain = list(range(1, total + 1))
@@ -62,7 +48,7 @@ def order_of(total: int, first: int, last: int, count: int) -> list[int]:
     return plain[: first - 1] + plain[first - 1 : last] * count + plain[last:]
 
 
-def time_of(project: dict[str, Any], by_pulse: bool) -> Decimal:
+def time_of(project: dict[str, Any]) -> Decimal:
     """How long a project takes when every input it waits for is there: all steps of all passes, added up."""
     with localcontext(prec=40):
         total = Decimal(0)
@@ -72,13 +58,8 @@ def time_of(project: dict[str, Any], by_pulse: bool) -> Decimal:
             geometry = project["microsteps"], project["step_angle"]
             pulses = pulses_of(step["distance"], project["turn_distance"], *geometry)
             run = running(step["speed"], *geometry)
-            move = (
-                stair_time(pulses, step["start_frequency"], step["acceleration"], run)
-                if by_pulse
-                else straight_time(
-                    pulses, step["start_frequency"], Fraction(step["acceleration"] * 1000), run
-                )
-            )
+            rate = Fraction(step["acceleration"] * 1000)
+            move = straight_time(pulses, step["start_frequency"], rate, run)
             times[number] = move + Decimal(step["delay"]) / 1000
         for number in order_of(len(steps), *project["loop"]):
             total += times[number]

@@ -54,7 +54,7 @@ def test_an_invalid_frame_gives_its_reason(vector: Vector) -> None:
         ("FF AA 03 07 E8 03 00 00 00 01 9F", "request: Set the pause after a step, delay 1000 ms, step 1"),
         (
             "FF AA 03 01 08 00 B4 00 00 00 69",
-            "request: Set microsteps and step angle, microsteps 8, step angle 1.8° (180)",
+            "request: Set microsteps and step angle, microsteps 8 per full step, step angle 180 hundredths of a degree",
         ),
         ("FF AA 00 0C 05 01 00 00 00 00 BB", "request: Set an output, port 5 (both LEDs), level 1 (active)"),
         (
@@ -92,7 +92,7 @@ def test_the_fault_has_the_reason(data: str, fault: str) -> None:
 def test_every_byte_of_a_dump_has_a_name() -> None:
     one = only(DUMP_B)
     named = {part.name: part.meaning for part in one.parts}
-    assert (named["microsteps"], named["step_2_distance"]) == ("16", "56814 units")
+    assert (named["microsteps"], named["step_2_distance"]) == ("16 per full step", "56814 units")
     assert (named["step_3_output"], named["step 4"]) == ("8 (all off)", "all 0")
     assert [part.start for part in one.parts if part.name == "reserved"] == [18, 23, 42, 62, 82]
 

@@ -16,6 +16,7 @@ from motorbus.families.stepper.execution import ramp, sequence
 from motorbus.families.stepper.execution.machine import Machine, Phase
 from motorbus.families.stepper.execution.ramp import Ramp
 from motorbus.families.stepper.parameters import Project, Step, decode_image, with_steps
+from motorbus.families.stepper.program.estimate import earliest_end
 from tests.protocol.stepper import exact
 from tests.protocol.stepper.vectors import DUMP_A, DUMP_B, behaviour
 
@@ -42,17 +43,14 @@ def at(machine: Machine, kind: str) -> list[float]:
 # -- one move ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("reading", ["time", "pulse"])
 @pytest.mark.parametrize("vector", behaviour("motion"), ids=lambda v: f"{v['distance']}-{v['speed']}rpm")
-def test_a_known_move_has_its_pulses_and_its_duration(vector: dict[str, Any], reading: str) -> None:
+def test_a_known_move_has_its_pulses_and_its_duration(vector: dict[str, Any]) -> None:
     made = Project(**{name: vector[name] for name in ("microsteps", "step_angle", "turn_distance")})
     step = Step(**{name: vector[name] for name in ("distance", "start_frequency", "acceleration", "speed")})
     pulses, speed = ramp.pulses_of(made, step), ramp.ramp_of(made, step)
     assert pulses == vector["pulses"]
     assert speed.run == pytest.approx(vector["frequency"], abs=5e-4)
-    assert ramp.duration(speed, pulses, {"time": 1.0, "pulse": 0.0}[reading]) == pytest.approx(
-        vector[reading], abs=6e-7
-    )
+    assert ramp.move_of(made, step).duration == pytest.approx(vector["time"], abs=6e-7)
     if vector["peak"]:
         assert ramp.motion(speed, pulses, 1).peak == pytest.approx(vector["peak"], abs=5e-3)
 
@@ -67,11 +65,9 @@ def moves(draw: st.DrawFn) -> tuple[int, int, int, Fraction]:
 @given(moves())
 def test_durations_are_those_of_exact_arithmetic(move: tuple[int, int, int, Fraction]) -> None:
     pulses, start, growth, run = move
-    speed = Ramp(float(max(start, 1)), float(run), float(growth))
+    speed = Ramp(float(max(start, 1)), float(run), growth * 1000.0)
     wanted = float(exact.straight_time(pulses, start, Fraction(growth * 1000), run))
-    assert ramp.duration(speed, pulses, 1.0) == pytest.approx(wanted, rel=1e-9)
-    by_pulse = float(exact.stair_time(pulses, start, growth, run))
-    assert by_pulse * (1 - 1e-9) <= ramp.duration(speed, pulses, 0.0) <= by_pulse * (1 + 1e-6)
+    assert ramp.motion(speed, pulses, 1).duration == pytest.approx(wanted, rel=1e-9)
 
 
 @given(moves(), st.floats(0, 1))
@@ -79,7 +75,7 @@ def test_pulses_only_grow_and_a_slow_stop_is_never_longer(
     move: tuple[int, int, int, Fraction], share: float
 ) -> None:
     pulses, start, growth, run = move
-    made = ramp.motion(Ramp(float(max(start, 1)), float(run), float(growth)), pulses, 1)
+    made = ramp.motion(Ramp(float(max(start, 1)), float(run), growth * 1000.0), pulses, 1)
     counts = [made.done(made.duration * n / 40) for n in range(41)]
     assert counts == sorted(counts)
     assert counts[-1] == made.done(made.duration + 1) == (pulses if run else 0)
@@ -92,17 +88,17 @@ def test_pulses_only_grow_and_a_slow_stop_is_never_longer(
 
 
 def test_a_slow_stop_goes_down_to_the_start_frequency() -> None:
-    made = ramp.motion(Ramp(50.0, 8000.0, 30.0), 8000, 1)
+    made = ramp.motion(Ramp(50.0, 8000.0, 30_000.0), 8000, 1)
     slow = made.slowing(0.6)
     assert slow is not None
     assert slow.duration == pytest.approx((8000 - 50) / 30_000)
     assert slow.pulses == int((8000**2 - 50**2) / 60_000)
-    assert ramp.motion(Ramp(500.0, 50.0, 30.0), 100, 1).slowing(1.0) is None
+    assert ramp.motion(Ramp(500.0, 50.0, 30_000.0), 100, 1).slowing(1.0) is None
 
 
 @pytest.mark.parametrize("pulses", [None, 1, 100, 8000])
 def test_the_moment_of_a_pulse(pulses: int | None) -> None:
-    made = ramp.motion(Ramp(50.0, 8000.0, 30.0), pulses, -1)
+    made = ramp.motion(Ramp(50.0, 8000.0, 30_000.0), pulses, -1)
     for count in (1, 2, 50, 99, 100, 4000, 8000, 20_000):
         moment = made.moment(count)
         if pulses is not None and count > pulses:
@@ -112,11 +108,12 @@ def test_the_moment_of_a_pulse(pulses: int | None) -> None:
     assert (made.moment(0), made.sign) == (0, -1)
 
 
-def test_the_slowest_reading_bounds_move_and_stop() -> None:
-    made = project(RAMPED, TURN, stop_mode=0)
-    assert ramp.slowest(made, RAMPED, 32000) == pytest.approx(2 * 15 + (32000 - 25500) / 1600)
-    assert ramp.slowest_stop(made) == pytest.approx(15.0)  # 1500 Hz by 1 Hz in 10 ms
-    assert ramp.slowest_stop(replace(made, stop_mode=1)) == 0
+def test_the_tick_of_the_ramp_scales_move_and_stop() -> None:
+    made = project(replace(RAMPED, distance=32000), stop_mode=0)
+    step = made.step(1)
+    assert ramp.move_of(made, step, 10.0).duration == pytest.approx(2 * 15 + (32000 - 25500) / 1600)
+    assert ramp.stop_seconds(made, step, 10.0) == pytest.approx(15.0)  # 1500 Hz by 1 Hz in 10 ms
+    assert ramp.stop_seconds(replace(made, stop_mode=1), step, 10.0) == 0
 
 
 # -- order ---------------------------------------------------------------------------------------------
@@ -136,8 +133,8 @@ def test_a_known_order(vector: dict[str, Any]) -> None:
 
 def test_no_project_ends_before_all_its_pauses_and_pulses() -> None:
     made = project(replace(TURN, delay=500), replace(TURN, stop_input=1, delay=100), project_loop=3)
-    assert sequence.earliest_end(made) == pytest.approx(3 * (1599 / 1600 + 0.5 + 0.1))
-    assert sequence.earliest_end(replace(made, project_loop=255)) is None
+    assert earliest_end(made) == pytest.approx(3 * (1599 / 1600 + 0.5 + 0.1))
+    assert earliest_end(replace(made, project_loop=255)) == inf
 
 
 # -- a project -----------------------------------------------------------------------------------------
@@ -194,7 +191,7 @@ def test_three_hundred_projects_take_exactly_their_time() -> None:
         machine.start(made, 0.0)
         while machine.until < inf:
             machine.advance(machine.until)
-        wanted = float(exact.time_of(plain, by_pulse=False))
+        wanted = float(exact.time_of(plain))
         assert at(machine, "completed") == [pytest.approx(wanted, rel=1e-9, abs=1e-6)], plain
 
 
@@ -318,16 +315,6 @@ def test_stop_project_leaves_a_jog_alone_and_stop_motor_ends_it() -> None:
 
 
 # -- manual motion and power -----------------------------------------------------------------------------
-
-
-def test_the_other_jog_command_stops_and_reverses() -> None:
-    machine = Machine()
-    machine.jog(project(RAMPED, stop_mode=0), 1, 0.0)
-    assert machine.jog(project(RAMPED, stop_mode=0), -1, 5.0)
-    assert machine.phase is Phase.SLOWING
-    machine.advance(9.0)
-    assert (machine.phase, machine.frequency(9.0)) == (Phase.JOG, -1600)
-    assert not machine.jog(project(RAMPED), -1, 9.0)
 
 
 def test_one_move_is_that_of_step_1() -> None:

@@ -24,10 +24,6 @@ def made(*steps: Step, **values: Any) -> Project:
     return replace(with_steps(MOTOR, steps or (GOOD, BACK)), **values)
 
 
-def rules(project: Project, **conditions: Any) -> list[str]:
-    return [finding.rule for finding in lint(project, **conditions)]
-
-
 def test_a_good_project_has_no_findings() -> None:
     assert lint(made()) == []
     assert lint(made(project_loop=5, loop_first=1, loop_last=2, loop_count=3)) == []
@@ -43,12 +39,14 @@ def test_dump_b_has_the_two_findings_that_were_computed_by_hand() -> None:
 @pytest.mark.parametrize(
     ("rule", "step", "project", "text"),
     [
-        ("L1", 0, Project(number=3), "it was cleared"),
+        ("L1", 0, Project(number=3), "the project has no steps"),
         ("L1", 0, made(turn_distance=0), "turn_distance is 0"),
         ("L3", 1, made(replace(GOOD, distance=1), turn_distance=3), "533.333 pulses, 0.333 lost"),
         ("L5", 1, made(replace(GOOD, start_frequency=0)), "start 0 Hz, running 16000 Hz"),
         ("L5", 2, made(GOOD, replace(BACK, start_frequency=16000)), "start 16000 Hz"),
         ("L5", 1, made(replace(GOOD, speed=0)), "speed 0"),
+        ("L2", 0, made(loop_first=2, loop_last=1, loop_count=2), "2 to 1 is no range"),
+        ("L4", 1, made(replace(GOOD, speed=6000), BACK), "160000 Hz, more than 100000 Hz"),
         ("L6", 1, made(replace(GOOD, acceleration=0)), "acceleration 0"),
         ("L7", 1, made(replace(GOOD, distance=100)), "rpm at most, 600 rpm wanted"),
         ("L8", 1, made(Step()), "nothing at all"),
@@ -76,20 +74,13 @@ def test_a_rule_finds_it(rule: str, step: int, project: Project, text: str) -> N
     assert text in found.text
 
 
-def test_rules_that_depend_on_conditions() -> None:
-    assert rules(made(), highest=10_000) == ["L4", "L4"]
-    waiting = made(replace(GOOD, start_input=5), BACK)
-    assert rules(waiting) == []
-    assert rules(waiting, unattended=True) == ["L22"]
-
-
 @given(projects())
 def test_any_project_is_judged_and_estimated(project: Project) -> None:
-    for finding in lint(project, unattended=True):
+    for finding in lint(project):
         assert finding.rule in RULES
         assert "\n" not in str(finding)
     found = estimate(project)
-    assert 0 <= found.low <= found.seconds <= found.high
+    assert found.seconds >= 0
     low, high = reach(project)
     assert low <= 0 <= high
 
@@ -101,17 +92,16 @@ def test_dump_b_is_estimated_as_computed_by_hand() -> None:
     found = estimate(B)
     assert found.seconds == pytest.approx(41.613525, abs=1e-6)
     assert (found.waits, found.cuts, found.endless) == (6, 6, False)
-    assert str(found).startswith("at least 41.6 s + 6 waits; 38.9 s to 75.6 s in other readings")
-    assert "6 times at most" in str(found)
+    assert str(found).startswith("about 41.6 s + 6 waits for an input; less")
+    assert "up to 6 times" in str(found)
     endless = estimate(replace(B, project_loop=255))
     assert endless.seconds == pytest.approx(13.871175, abs=1e-6)
     assert "for each pass, endless" in str(endless)
 
 
-def test_the_band_is_that_of_the_readings() -> None:
-    found = estimate(A)
-    assert found.low == found.seconds == pytest.approx(1.685587, abs=1e-6)
-    assert found.high == pytest.approx(2.428, abs=1e-3)
+def test_the_estimate_follows_the_tick_of_the_ramp() -> None:
+    assert estimate(A).seconds == pytest.approx(1.685587, abs=1e-6)
+    assert estimate(A, 10.0).seconds == pytest.approx(2.428, abs=1e-3)
 
 
 def test_net_displacement_counts_the_loop_and_what_moves() -> None:

@@ -6,8 +6,6 @@ from math import inf
 
 import pytest
 
-from motorbus.core.plant import move
-from motorbus.errors import RequestError
 from motorbus.families.feetech.simulator.servo import Servo
 from tests.simulators.feetech.host import Host, packet, word
 
@@ -37,12 +35,6 @@ def test_overload_as_shipped_is_more_than_80_percent_for_2_s() -> None:
     assert (host.read(1, LOAD), host.read(1, CURRENT)) == (200, 100)  # 20 % are left: 0.65 A
 
 
-@pytest.mark.parametrize("share", [0.8, -0.8, 0.3])
-def test_80_percent_are_not_more_than_80(share: float) -> None:
-    host, _ = holding(share)
-    assert not tripped(host.wait(3600.0))
-
-
 @pytest.mark.parametrize(
     ("model", "share", "settings", "seconds", "load"),
     [
@@ -63,16 +55,21 @@ def test_registers_decide(
     assert host.read(1, LOAD, order="big" if model == "scs" else "little") == load
 
 
-@pytest.mark.parametrize("settings", [(35, 0), (36, 0), (LIMIT, *word(800))])
-def test_threshold_or_time_of_0_and_a_lower_limit_never_trip(settings: tuple[int, ...]) -> None:
-    host, _ = holding(0.9)
-    host.write(1, *settings)
-    assert not tripped(host.wait(100.0))
-
-
-def test_hls_has_no_overload_registers() -> None:
-    host, servo = holding(0.9, "hls")
-    assert (servo.overload.next, tripped(host.wait(100.0))) == (inf, False)
+@pytest.mark.parametrize(
+    ("model", "share", "settings"),
+    [
+        ("sts", 0.9, (35, 0)),
+        ("sts", 0.9, (36, 0)),
+        ("sts", 0.9, (LIMIT, *word(800))),
+        ("sts", -0.8, ()),  # 80 % are not more than 80
+        ("hls", 0.9, ()),  # it has no such registers
+    ],
+)
+def test_what_never_trips(model: str, share: float, settings: tuple[int, ...]) -> None:
+    host, servo = holding(share, model)
+    if settings:
+        host.write(1, *settings)
+    assert (tripped(host.wait(3600.0)), servo.trips_at) == (False, inf)
 
 
 def test_time_starts_again_after_a_relief_and_not_after_a_command() -> None:
@@ -97,7 +94,7 @@ def test_exact_moment_however_late_the_host_asks() -> None:
     host.write(1, POSITION, *word(2000), 0, 0, *word(1000))
     hit = 1.0 + 0.5 + 0.5 * 1000 / 25_400
     assert servo.motion.done_at == pytest.approx(hit)
-    assert servo.overload.next == pytest.approx(hit + 2.0)
+    assert servo.trips_at == pytest.approx(hit + 2.0)
     host.wait(1000.0)
     assert servo.motion.start == pytest.approx(hit + 2.0)
     assert (tripped(host), servo.raw_position) == (True, 1500)
@@ -109,20 +106,11 @@ def test_what_ends_it(switch: str, left: int) -> None:
     host.wait(2.0).write(1, TORQUE, 0)
     assert host.read(1, ALARM, 1) == left
     servo.release_shaft()
-    host.wait(1.0).write(1, TORQUE, 1)
+    host.wait(1.0).write(1, POSITION, *word(3048))
+    assert host.wait(0.2).read(1, 58) == (680 if left else 3400)  # 20 % of 3400
     assert host.read(1, ALARM, 1) == left
     servo.power_cycle()
     assert host.read(1, ALARM, 1) == 0
-
-
-def test_tripped_servo_moves_with_the_torque_that_is_left() -> None:
-    host, servo = holding(0.9)
-    host.wait(2.0)
-    servo.release_shaft()
-    host.write(1, POSITION, *word(3048))
-    assert host.wait(0.5).read(1, 58) == 680  # 20 % of 3400
-    assert host.write(1, TORQUE, 0) == ["FF FF 01 02 20 DC"]
-    assert not servo.motion.moving(host.now)
 
 
 # -- world -----------------------------------------------------------------------------------------
@@ -152,16 +140,6 @@ def test_blocked_shaft_stops_at_the_obstacle_and_presses(goal: int, stands: int)
     assert host.wait(2.0).servo.raw_position == goal
 
 
-def test_overshoot_over_both_bounds_stops_at_the_first() -> None:
-    host = Host()
-    servo = host.servo
-    host.write(1, TORQUE, 1)
-    servo.blocked = (2000.0, 2100.0)
-    servo.course = servo.course._replace(motion=move(host.now, 2048, 9000, velocity=3400, speed=3400))
-    host.write(1, 41, 1, *word(1000), 0, 0, *word(3400))  # it cannot brake within 52 counts
-    assert host.wait(1.0).servo.raw_position == 2100
-
-
 def test_pushed_shaft() -> None:
     host = Host(position=1000).wait(0.0)
     host.servo.push_shaft(100 * COUNT)
@@ -173,13 +151,3 @@ def test_pushed_shaft() -> None:
     host.servo.push_shaft(-100 * COUNT)
     assert host.servo.raw_position == 1000
     assert host.wait(1.0).servo.raw_position == 1100
-
-
-def test_impossible_influences() -> None:
-    servo = Host().servo
-    with pytest.raises(RequestError, match=r"the shaft is at 180.0 deg|3\.14"):
-        servo.block_shaft((0.0, 1.0))
-    with pytest.raises(RequestError, match="too far"):
-        servo.push_shaft(100.0)
-    with pytest.raises(RequestError, match="150%"):
-        servo.load_shaft(1.5)

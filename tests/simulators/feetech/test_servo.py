@@ -7,8 +7,6 @@ import pytest
 from motorbus.families.feetech.registers.codes import alarms
 from tests.simulators.feetech.host import (
     ACK,
-    ACTION,
-    BOOTLOADER,
     CALIBRATE,
     CLEAR_TURNS,
     MODELS,
@@ -35,24 +33,17 @@ def moving_host(**options: object) -> Host:
 # -- torque ----------------------------------------------------------------------------------------
 
 
-def test_as_shipped_limp_in_the_middle_and_locked() -> None:
-    host = Host()
-    assert [host.read(1, address, 1) for address in (TORQUE, LOCK, MOVING)] == [0, 1, 0]
-    assert host.read(1, PRESENT) == 2048
-
-
 @pytest.mark.parametrize("name", MODELS)
 def test_writing_the_goal_switches_torque_on_with_sts_only(name: str) -> None:
     host = Host((1,), name)
+    host.write(1, VELOCITY, 1)
+    assert host.read(1, TORQUE, 1) == 0
     host.write(1, GOAL, *(big(100) if name.startswith("scs") else word(100)))
     assert host.read(1, TORQUE, 1) == (1 if name == "sts" else 0)
-
-
-@pytest.mark.parametrize("address", [OFFSET, ACCELERATION, VELOCITY, LOCK])
-def test_writing_other_registers_leaves_torque_off(address: int) -> None:
-    host = Host()
-    host.write(1, address, 1)
-    assert host.read(1, TORQUE, 1) == 0
+    if name in ("scs", "scs2", "hls"):  # 128 means nothing there
+        before = host.servo.raw_position
+        assert host.write(1, TORQUE, 128) == ACK
+        assert (host.servo.raw_position, host.read(1, TORQUE, 1)) == (before, 128)
 
 
 @pytest.mark.parametrize(("switch", "goes_to"), [("zero", 0), ("present", 1304)])
@@ -60,12 +51,8 @@ def test_torque_on_without_a_goal(switch: str, goes_to: int) -> None:
     host = Host(position=1304, goal_at_power_up=switch)
     host.write(1, TORQUE, 1)
     assert host.wait(2.0).read(1, PRESENT) == goes_to
-
-
-def test_torque_at_power_up_holds() -> None:
     host = Host(torque_at_power_up="yes", position=700)
-    assert host.read(1, TORQUE, 1) == 1
-    assert host.wait(2.0).read(1, PRESENT) == 700
+    assert (host.read(1, TORQUE, 1), host.wait(2.0).read(1, PRESENT)) == (1, 700)
 
 
 @pytest.mark.parametrize(
@@ -85,6 +72,19 @@ def test_without_torque_it_is_limp_where_it_is(address: int, data: tuple[int, ..
 # -- position mode ---------------------------------------------------------------------------------
 
 
+def test_acceleration_in_hundreds_of_counts_and_resolution_in_counts_of_a_position() -> None:
+    host = Host(position=0)
+    host.write(1, ACCELERATION, 5, *word(4000), 0, 0, *word(1000))  # 500 counts/s² up to 1000 counts/s
+    assert host.wait(1.0).read(1, PRESENT_VELOCITY) == 500
+    assert host.read(1, PRESENT) == 250
+    host = Host(position=1000)
+    host.write(1, 30, 2)
+    assert host.read(1, PRESENT) == 500
+    host.write(1, GOAL, *word(700))
+    assert host.wait(3.0).read(1, PRESENT) == 700
+    assert host.servo.motion.position(host.now) == 1400
+
+
 def test_new_goal_on_the_way_takes_over_without_a_jump() -> None:
     host = moving_host()
     before = host.read(1, PRESENT)
@@ -92,14 +92,6 @@ def test_new_goal_on_the_way_takes_over_without_a_jump() -> None:
     assert (host.read(1, PRESENT), host.read(1, PRESENT_VELOCITY)) == (before, 1000)
     assert host.wait(0.01).read(1, PRESENT) > before  # it brakes first
     assert host.wait(5.0).read(1, PRESENT) == 1500
-
-
-def test_acceleration_in_hundreds_of_counts() -> None:
-    host = Host(position=0)
-    host.write(1, ACCELERATION, 5, *word(4000), 0, 0, *word(1000))  # 500 counts/s² up to 1000 counts/s
-    assert host.wait(1.0).read(1, PRESENT_VELOCITY) == 500
-    assert host.read(1, PRESENT) == 250
-    assert host.wait(1.0).read(1, PRESENT_VELOCITY) == 1000
 
 
 @pytest.mark.parametrize(
@@ -145,15 +137,6 @@ def test_limits_0_and_phase_bit_4_count_over_many_turns() -> None:
     assert host.wait(10.0).read(1, PRESENT) == 5_000 | 0x8000
     host.servo.power_cycle()  # the turn count is lost
     assert host.read(1, PRESENT) == (-5_000) % 4096
-
-
-def test_resolution_multiplies_the_angle_of_a_count() -> None:
-    host = Host(position=1000)
-    host.write(1, 30, 2)
-    assert host.read(1, PRESENT) == 500
-    host.write(1, GOAL, *word(700))
-    assert host.wait(3.0).read(1, PRESENT) == 700
-    assert host.servo.motion.position(host.now) == 1400
 
 
 def test_phase_bit_7_reverses_position_and_drive() -> None:
@@ -202,15 +185,20 @@ def test_velocity_mode_turns_and_stops() -> None:
     assert host.read(1, MOVING, 1) == 0
 
 
-def test_mode_takes_effect_while_locked_and_is_lost() -> None:
-    host = moving_host()
-    host.write(1, MODE, 1)
-    assert host.wait(5.0).read(1, PRESENT_VELOCITY) == 1000
-    host.servo.power_cycle()
-    assert host.read(1, MODE, 1) == 0
+def test_unknown_mode_rests() -> None:
+    host = Host((1,), "hls")
+    host.write(1, TORQUE, 1)
+    host.write(1, MODE, 4)
+    host.write(1, GOAL, *word(100), *word(500), *word(60))
+    assert host.wait(2.0).read(1, PRESENT) == 2048
 
 
-def test_positive_duty_of_sts_turns_to_smaller_angles() -> None:
+def test_positive_duty_of_sts_turns_to_smaller_angles_and_scs_with_both_limits_0_is_a_motor() -> None:
+    host = Host((1,), "scs")
+    host.write(1, 9, 0, 0, 0, 0)
+    host.write(1, TORQUE, 1)
+    host.write(1, DUTY, *big(500, sign_bit=10))
+    assert host.wait(1.0).read(1, PRESENT_VELOCITY, order="big") == 1024
     host = Host()
     host.write(1, MODE, 2)
     host.write(1, TORQUE, 1)
@@ -218,14 +206,6 @@ def test_positive_duty_of_sts_turns_to_smaller_angles() -> None:
     assert host.wait(1.0).read(1, PRESENT_VELOCITY) == 1700 | 0x8000
     host.write(1, DUTY, *word(-250, sign_bit=10))
     assert host.wait(1.0).read(1, PRESENT_VELOCITY) == 850
-
-
-def test_scs_with_both_limits_0_is_a_motor() -> None:
-    host = Host((1,), "scs")
-    host.write(1, 9, 0, 0, 0, 0)
-    host.write(1, TORQUE, 1)
-    host.write(1, DUTY, *big(500, sign_bit=10))
-    assert host.wait(1.0).read(1, PRESENT_VELOCITY, order="big") == 1024
 
 
 def test_each_write_of_the_goal_is_a_step_from_the_last_goal() -> None:
@@ -251,21 +231,20 @@ def test_current_mode_of_hls_turns_unless_the_load_is_as_strong(load: float, vel
     assert host.wait(2.0).read(1, PRESENT_VELOCITY) == velocity  # in 50 counts/s
 
 
-def test_unknown_mode_rests() -> None:
-    host = Host((1,), "hls")
-    host.write(1, TORQUE, 1)
-    host.write(1, MODE, 4)
-    host.write(1, GOAL, *word(100), *word(500), *word(60))
-    assert host.wait(2.0).read(1, PRESENT) == 2048
-
-
 # -- feedback --------------------------------------------------------------------------------------
 
 
-def test_feedback_at_rest_in_one_read() -> None:
+def test_feedback_at_rest_and_under_load() -> None:
     # position 2048, velocity 0, load 0, 7.4 V, 30 °C, none pending, no alarm, at rest, goal 0, current 0
     found = Host().say(packet(1, READ, 56, 15))
     assert found == ["FF FF 01 11 00 00 08 00 00 00 00 4A 1E 00 00 00 00 00 00 00 7D"]
+    host = Host(goal_at_power_up="present")
+    host.servo.load_shaft(-0.2)
+    assert (host.read(1, LOAD), host.read(1, CURRENT)) == (0, 0)  # limp
+    host.write(1, TORQUE, 1)
+    assert (host.read(1, LOAD), host.read(1, CURRENT)) == (200 | 0x400, 100 | 0x8000)  # of 3.25 A
+    host.write(1, PHASE, 12 + 32)  # no current feedback
+    assert (host.read(1, LOAD), host.read(1, CURRENT)) == (200 | 0x400, 0)
 
 
 @pytest.mark.parametrize(("start", "goal", "sign", "load_sign"), [(0, 4000, 0, 0), (4000, 0, 0x8000, 0x400)])
@@ -277,17 +256,6 @@ def test_feedback_on_the_way(start: int, goal: int, sign: int, load_sign: int) -
     assert host.read(1, LOAD) == 500 | load_sign  # half of the top speed
     assert (host.read(1, MOVING, 1), host.read(1, 67)) == (1, goal)
     assert host.read(1, CURRENT) == 23 | sign  # 150 mA in 6.5 mA
-
-
-@pytest.mark.parametrize(("share", "load", "current"), [(0.2, 200, 100), (-0.2, 200 | 0x400, 100 | 0x8000)])
-def test_load_that_is_held_shows_in_load_and_current(share: float, load: int, current: int) -> None:
-    host = Host(goal_at_power_up="present")
-    host.servo.load_shaft(share)
-    assert (host.read(1, LOAD), host.read(1, CURRENT)) == (0, 0)  # limp
-    host.write(1, TORQUE, 1)
-    assert (host.read(1, LOAD), host.read(1, CURRENT)) == (load, current)  # of 3.25 A
-    host.write(1, PHASE, 12 + 32)  # no current feedback
-    assert (host.read(1, LOAD), host.read(1, CURRENT)) == (load, 0)
 
 
 # -- calibration -----------------------------------------------------------------------------------
@@ -304,9 +272,6 @@ def test_offset_counts_in_position_mode_only_and_wraps() -> None:
     assert host.read(1, PRESENT) == 4095
     host.write(1, GOAL, *word(3000))
     assert host.wait(3.0).read(1, PRESENT) == 3000
-
-
-def test_position_begins_within_one_turn_when_the_offset_changes() -> None:
     host = Host(position=100)
     host.write(1, PHASE, 12 + 16)  # positions over many turns
     host.write(1, OFFSET, *word(500, sign_bit=11))
@@ -331,14 +296,9 @@ def test_128_makes_the_present_pose_the_middle() -> None:
     assert host.read(1, OFFSET) == 96 | 0x800  # the encoder is at 1952
     assert (host.read(1, PRESENT), host.read(1, TORQUE, 1)) == (2048, 1)
     assert host.wait(3.0).read(1, PRESENT) == 2048
-
-
-@pytest.mark.parametrize("name", ["scs", "scs2", "hls"])
-def test_128_means_nothing_in_other_maps(name: str) -> None:
-    host = Host((1,), name)
-    before = host.servo.raw_position
-    assert host.write(1, TORQUE, 128) == ACK
-    assert (host.servo.raw_position, host.read(1, TORQUE, 1)) == (before, 128)
+    host = Host(position=0)  # the pose that needs 2048 is one count beside
+    host.write(1, TORQUE, 128)
+    assert (host.read(1, OFFSET), host.read(1, PRESENT)) == (2047 | 0x800, 2047)
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -349,12 +309,6 @@ def test_0x0b_sets_the_position_of_sts_and_hls(name: str) -> None:
     assert host.servo.raw_position == (1024 if known else 300)
     assert host.say(packet(1, CALIBRATE)) == (ACK if known else [])
     assert host.servo.raw_position == (2048 if known else 300)
-
-
-def test_pose_that_needs_2048_is_one_count_beside() -> None:
-    host = Host(position=0)
-    host.write(1, TORQUE, 128)
-    assert (host.read(1, OFFSET), host.read(1, PRESENT)) == (2047 | 0x800, 2047)
 
 
 @pytest.mark.parametrize(("lock", "kept"), [(1, 0), (0, 952)])
@@ -396,22 +350,6 @@ def test_loss_of_supply_resets_ram_and_leaves_the_shaft(cut: str) -> None:
     assert host.read(1, ACCELERATION, 1) == 3
 
 
-def test_unplugged_servo_has_no_supply_to_cycle() -> None:
-    host = Host()
-    host.servo.unplug()
-    host.servo.power_cycle()
-    assert host.write(1, ACCELERATION, 3) == []
-
-
-def test_ram_is_loaded_from_the_eeprom() -> None:
-    host = Host()
-    host.write(1, LOCK, 0)
-    host.write(1, 16, *word(600))
-    assert host.read(1, LIMIT) == 1000
-    host.wait(1.0).servo.power_cycle()
-    assert host.read(1, LIMIT) == 600
-
-
 def test_options_of_power_up() -> None:
     assert Host(lock_at_power_up="no").read(1, LOCK, 1) == 0
     host = Host(startup_time=0.05)
@@ -419,13 +357,6 @@ def test_options_of_power_up() -> None:
     host.servo.power_cycle()
     assert host.write(1, ACCELERATION, 1) == []
     assert host.wait(0.06).read(1, 5, 1) == 1
-
-
-def test_servo_in_the_bootloader_is_limp() -> None:
-    host = moving_host()
-    there = host.servo.raw_position
-    host.say(packet(1, BOOTLOADER))
-    assert host.wait(1.0).read(1, PRESENT) == there
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -445,15 +376,6 @@ def test_alarm_of_the_unload_mask_makes_it_limp_until_it_ends(bits: int, limp: b
     assert host.wait(3.0).read(1, PRESENT) == (there if limp else 3000)
     host.servo.alarm = 0
     assert host.wait(3.0).read(1, PRESENT) == 3000
-
-
-def test_second_reg_write_replaces_the_first() -> None:
-    host = Host()
-    for place in (1000, 2000):
-        assert host.say(packet(1, REG_WRITE, GOAL, *word(place))) == ACK
-    assert (host.read(1, 64, 1), host.read(1, GOAL)) == (1, 0)
-    assert host.say(packet(1, ACTION)) == ACK
-    assert (host.read(1, 64, 1), host.read(1, GOAL)) == (0, 2000)
 
 
 def test_status_as_plain_data() -> None:

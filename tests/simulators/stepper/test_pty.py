@@ -11,8 +11,7 @@ from pathlib import Path
 from motorbus.families.stepper.protocol import RATE
 from motorbus.families.stepper.simulator import simulate
 from motorbus.simulation.pty import PtyMaster
-from motorbus.simulation.server import Server
-from tests.support.mounts import served
+from motorbus.simulation.server import Server, ServerThread
 
 TESTS = Path(__file__).resolve().parents[2]
 VECTORS = TESTS / "vectors" / "stepper"
@@ -20,7 +19,7 @@ VECTORS = TESTS / "vectors" / "stepper"
 
 def test_foreign_client_writes_reads_saves_starts_and_receives_the_end() -> None:
     bus = simulate((1,), shipped="cleared")
-    with closing(PtyMaster()) as master, served(Server(bus, master, rate=RATE, pace=True)):
+    with closing(PtyMaster()) as master, ServerThread(Server(bus, master, rate=RATE, pace=True)):
         client = [sys.executable, "-I", str(TESTS / "interop" / "stepper_client.py"), master.slave_name]
         files = [str(VECTORS / "manual.json"), str(VECTORS / "dumps.json")]
         ended = subprocess.run([*client, *files], capture_output=True, text=True, timeout=60, check=False)

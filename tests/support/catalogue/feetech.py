@@ -145,14 +145,14 @@ def restore(rig: Rig) -> None:
     """RESET, known as factory restore: what was set is as shipped."""
     memory = rig.servos[1].memory
     exchange = _once(rig, protocol.factory_restore(1))
-    shipped = memory.layout.shipped[13]
+    shipped = memory.shipped[13]
     _written(rig, exchange, lambda: memory.live[13], shipped)
 
 
 def _set_apart(rig: Rig) -> None:
     rig.link.advance(2.0)  # a servo is deaf while it restores itself
     memory = rig.servos[1].memory
-    memory.live[13] = memory.layout.shipped[13] - 1
+    memory.live[13] = memory.shipped[13] - 1
 
 
 def calibration(position: int | None) -> Kind:

@@ -16,7 +16,6 @@ from motorbus.errors import DeviceError, MotorbusError, NoReply
 from motorbus.families.kst import (
     FAMILY,
     Servo,
-    broadcast_read,
     broadcast_write,
 )
 from motorbus.families.kst.driver.requests import read_row, write_row
@@ -178,20 +177,6 @@ def save(rig: KstRig) -> None:
     rig.link.advance(0.5)
 
 
-def start_reports(rig: KstRig) -> None:
-    """Nobody answers a start or a stop."""
-    rig.servo.set_reports(True)
-    rig.servo.set_reports(False)
-
-
-def broadcast_reading(rig: KstRig) -> None:
-    raw = rig.stir()
-    row = rig.servo.table["present_position"]
-    told = rig.run(broadcast_read("present_position", rig.settings))
-    assert set(told) <= set(NODES)
-    assert set(told.values()) <= {row.to_value(raw)}
-
-
 def broadcast_move(rig: KstRig) -> None:
     """Who acknowledges has got the target."""
     raw = rig.stir() // 2
@@ -234,10 +219,8 @@ KINDS: dict[str, Kind] = {
     "write 1 byte that is kept": Kind(set_bit_rate),
     "save": Kind(save),
     "save that is acknowledged": Kind(save, options={"save_reply": "ack"}),
-    "start and stop of reports": Kind(start_reports),
     "start and move": Kind(write_2, profile="xqpower"),
     "stop": Kind(stopping, sure=False),  # it is said again in the next round of a stop
-    "broadcast read": Kind(broadcast_reading, alone=False),
     "broadcast write": Kind(broadcast_move, alone=False),
     "broadcast of a bit rate": Kind(broadcast_rate, alone=False),
     "broadcast save": Kind(broadcast_saving, alone=False),

@@ -12,7 +12,7 @@ from motorbus.families.stepper.program.backup import Backup
 from motorbus.families.stepper.program.file import Program
 from tests.conformance.cuts import Call, Command
 
-LENT = with_steps(
+MANUAL = with_steps(
     Project(
         number=1, microsteps=8, step_angle=180, turn_distance=400, loop_first=1, loop_last=2, loop_count=3
     ),
@@ -21,8 +21,8 @@ LENT = with_steps(
         Step(distance=50, start_frequency=50, acceleration=30, speed=120),
     ),
 )
-"""A project 1 in which every field that is lent has a value of its own."""
-STORED = replace(LENT, number=2, turn_distance=77)
+"""A project 1 in which every field that a motion changes has a value of its own."""
+STORED = replace(MANUAL, number=2, turn_distance=77)
 WRITTEN = replace(
     with_steps(STORED, (*STORED.steps[:1], Step(distance=56814, speed=300, start_frequency=200))), stop_mode=1
 )
@@ -37,7 +37,7 @@ BACKUP = Backup(
 def stepper(method: str, *arguments: Any, name: str = "", selected: int = 1, **fields: Any) -> Command:
     def prepare(device: Any) -> None:
         device.store.selected_at_power_on = selected
-        for number, project in {1: LENT, 2: STORED, 3: replace(STORED, number=3)}.items():
+        for number, project in {1: MANUAL, 2: STORED, 3: replace(STORED, number=3)}.items():
             device.put(number, project)
         device.power_cycle()
 
@@ -57,8 +57,8 @@ def stepper(method: str, *arguments: Any, name: str = "", selected: int = 1, **f
     )
 
 
-def lent(method: str, *arguments: Any, **fields: Any) -> Command:
-    """A manual motion with a loan of project 1."""
+def motion(method: str, *arguments: Any, **fields: Any) -> Command:
+    """A manual motion with temporary use of project 1."""
     return stepper(method, *arguments, journalled=True, **fields)
 
 
@@ -73,13 +73,13 @@ HOMING = {"velocity": tau, "deadline": 5.0}
 AT_HOME = {"home_switch": "wired", "home_at": -30}
 
 COMMANDS = [
-    lent("jog", tau, 0.5, pairs=50),
-    lent("jog", tau, 0.5, name="-relabel", quirks=RELABELLED, selected=2, cuts=20, pairs=50),
-    lent("move_by", -tau, options={"velocity": tau}, pairs=50),
-    lent("home", options=HOMING, quirks=AT_HOME, then=Call("jog", (tau, 0.5)), cuts=40, pairs=50),
-    lent("home", name="-relabel", options=HOMING, quirks={**AT_HOME, **RELABELLED}, selected=2,
+    motion("jog", tau, 0.5, pairs=50),
+    motion("jog", tau, 0.5, name="-relabel", quirks=RELABELLED, selected=2, cuts=20, pairs=50),
+    motion("move_by", -tau, options={"velocity": tau}, pairs=50),
+    motion("home", options=HOMING, quirks=AT_HOME, then=Call("jog", (tau, 0.5)), cuts=40, pairs=50),
+    motion("home", name="-relabel", options=HOMING, quirks={**AT_HOME, **RELABELLED}, selected=2,
          then=Call("jog", (tau, 0.5)), cuts=20),
-    lent("run", 1, guarded=False, pairs=50),
+    motion("run", 1, guarded=False, pairs=50),
     edit("write_project", Program(project=WRITTEN), atomic=True, restart=1, pairs=50),
     edit("write_project", Program(project=WRITTEN), name="-relabel", quirks=STORED_VIEW, selected=2, cuts=20),
     edit("restore", BACKUP, restart=1, cuts=40, pairs=50),

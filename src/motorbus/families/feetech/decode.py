@@ -1,4 +1,4 @@
-"""FEETECH packets as text, field by field, with the reason why a packet is invalid.
+"""FEETECH packets as text, field by field, with the reason why a packet is invalid; and recorded packets by kind.
 
 Instruction and status packets have the same form: FF FF 01 02 01 FB is a PING to servo 1, and also the answer of a
 servo 1 with a voltage alarm. The fifth byte and the packets before decide; where both are possible, both are shown.
@@ -12,18 +12,20 @@ import re
 from collections.abc import Callable, Mapping
 from functools import partial
 from types import MappingProxyType
-from typing import Final, NamedTuple
+from typing import Any, Final
 
 from motorbus.core.decode import Fields, counted
 from motorbus.core.family import Explanation
-from motorbus.core.register import Register, RegisterMap
+from motorbus.core.recording import RecordedEvent, RecordedFrame
+from motorbus.core.register import RegisterMap
+from motorbus.core.request import Noise
 from motorbus.families.feetech import protocol
 from motorbus.families.feetech.models import choose
 from motorbus.families.feetech.protocol import BROADCAST, HEADER, MAX_ID, RULES, Instruction, Packet
 from motorbus.families.feetech.registers import TABLES
 from motorbus.families.feetech.registers.codes import alarms
 
-HEAD: Final = 5  # registers that identify a servo
+IDENTITY: Final = 5  # registers that identify a servo
 FOREIGN: Final[Mapping[bytes, str]] = {
     b"\xff\xff\xfd\x00": "a Dynamixel 2.0 packet, which no FEETECH servo answers",
     b"\x55\x55": "a packet of LX or Hiwonder servos, which no FEETECH servo answers",
@@ -32,17 +34,72 @@ FOREIGN: Final[Mapping[bytes, str]] = {
 BEGIN: Final = re.compile(rb"(?<!\xff)(?=\xff\xff)")  # of a header; the last two FF of a run are the header
 
 
+class _Kinds:
+    """Tells instruction and status packets apart by the packets before.
+
+    A packet with the id and length of an expected reply is that reply, a repeated instruction is its echo or a reply,
+    and any other packet is an instruction if a servo can carry it out.
+    """
+
+    def __init__(self) -> None:
+        self._last = b""
+        self._expected: dict[int, tuple[int, int]] = {}  # address and size of the registers in a reply, by id
+
+    def kind(self, data: bytes, packet: Packet) -> tuple[str, int | None]:
+        """ "request", "reply" or "either", and the address of the registers in an expected reply."""
+        id, code, parameters = packet
+        if data == self._last and id != BROADCAST:
+            return "either", None
+        address, size = self._expected.pop(id, (None, -1))
+        if id != BROADCAST and size == len(parameters):
+            return "reply", address
+        if id != BROADCAST and not protocol.suits(code, parameters):
+            return "reply", None
+        self._last = data
+        if code == Instruction.SYNC_READ and len(parameters) >= 3:
+            self._expected |= dict.fromkeys(parameters[2:], (parameters[0], parameters[1]))
+        elif id != BROADCAST:
+            self._expected[id] = (parameters[0], parameters[1]) if code == Instruction.READ else (0, 0)
+        return "request", None
+
+
+class Recording:
+    """Decoder of recorded packets of servos, of a host, or of both; see `core.recording.RecordingReceiver`."""
+
+    code_meaning: Final = "the fifth byte: the instruction of a request, the alarm bits of a reply"
+
+    def __init__(self, direction: str = "") -> None:
+        self._parser: Final = protocol.parser(MAX_ID if direction == "rx" else BROADCAST)
+        self._kind: Final = {"rx": "reply", "tx": "request"}.get(direction, "")
+        self._kinds: Final = _Kinds()
+
+    def feed(self, data: Any) -> list[RecordedEvent]:
+        """Take a chunk of bytes; return the events that are complete."""
+        return [self._event(*found) for found in self._parser.feed(data)]
+
+    def flush(self) -> list[RecordedEvent]:
+        """End of data: return the packets in the held bytes, and the remainder as noise."""
+        return [self._event(*found) for found in self._parser.feed(b"", end=True)]
+
+    def _event(self, data: bytes, fault: str) -> RecordedEvent:
+        if fault:
+            return Noise(data, fault)
+        packet = protocol.decode(data)
+        kind = self._kind or self._kinds.kind(data, packet)[0]
+        return RecordedFrame(data, kind, packet.id, packet.code)
+
+
 def decode(data: bytes, maps: Mapping[int, str] = MappingProxyType({}), usual: str = "") -> list[Explanation]:
     """All packets and all runs of other bytes, in order; their parts cover every byte. Never raises.
 
     `maps` has the names of the register maps of known servos by id; `usual` is that of all others, "" for unknown.
     """
-    talk = _Talk({id: TABLES[name] for id, name in maps.items() if name in TABLES}, TABLES.get(usual))
+    text = _Text({id: TABLES[name] for id, name in maps.items() if name in TABLES}, TABLES.get(usual))
     parser = protocol.parser()
     found: list[Explanation] = []
-    for piece, fault in [*parser.feed(data), *parser.feed(b"", end=True)]:
+    for piece, fault in (*parser.feed(data), *parser.feed(b"", end=True)):
         if not fault:
-            found.append(talk.explain(piece))
+            found.append(text.explain(piece))
         elif fault == "checksum":
             found.append(_invalid(piece))
         else:
@@ -50,156 +107,103 @@ def decode(data: bytes, maps: Mapping[int, str] = MappingProxyType({}), usual: s
     return found
 
 
-class _Asked(NamedTuple):
-    """What the next status packet of a servo carries: so many bytes from this register on."""
-
-    address: int
-    size: int
-
-
-class _Talk:
-    """The packets before: the last instruction, what each servo was asked for, the maps of identified servos."""
+class _Text:
+    """Explains valid packets one after the other; knows the maps of identified servos."""
 
     def __init__(self, maps: dict[int, RegisterMap], usual: RegisterMap | None) -> None:
-        self.maps = maps
-        self.usual = usual
-        self.last = b""
-        self.asked: dict[int, _Asked] = {}
+        self._maps = maps
+        self._usual = usual
+        self._kinds = _Kinds()
 
     def explain(self, data: bytes) -> Explanation:
-        """A packet is an instruction if its form allows that and no answer of this form is due."""
         packet = protocol.decode(data)
-        is_one = packet.id != BROADCAST
-        if data == self.last and is_one:
-            return self._instruction(
-                data, packet, f"the same again: an echo, or {self._status_title(packet)}"
-            )
-        asked = self.asked.pop(packet.id, None)
-        answers = asked is not None and asked.size == len(packet.parameters)
-        if is_one and (answers or not protocol.suits(packet.code, packet.parameters)):
-            return self._status(data, packet, asked if answers else None)
-        self.last = data
-        self._expect(packet)
-        return self._instruction(data, packet, f"or {self._status_title(packet)}" if is_one else "")
-
-    def _expect(self, packet: Packet) -> None:
-        parameters = packet.parameters
-        if packet.code == Instruction.SYNC_READ and len(parameters) >= 3:
-            self.asked.update(dict.fromkeys(parameters[2:], _Asked(*parameters[:2])))
-        elif packet.id != BROADCAST:
-            whole = packet.code == Instruction.READ and len(parameters) == 2
-            self.asked[packet.id] = _Asked(*parameters) if whole else _Asked(0, 0)
-
-    # -- packets -------------------------------------------------------------------------------------------------
-
-    def _status(self, data: bytes, packet: Packet, asked: _Asked | None) -> Explanation:
-        values = packet.parameters
-        if asked and asked.address == 0 and len(values) >= HEAD:
-            choice = choose((values[0], values[1]), (values[3], values[4]), values[2])
-            if choice.table:
-                self.maps[packet.id] = TABLES[choice.table]
-        title = self._status_title(packet)
-        if packet.code in RULES or packet.code & 0xC0:
-            title += f" (or {_instruction_title(packet)})"
+        id, code, parameters = packet
+        kind, address = self._kinds.kind(data, packet)
+        to = "everyone" if id == BROADCAST else f"servo {id}"
+        instruction = f"{protocol.instruction_name(code)} to {to}"
+        alarm = self._alarms(packet)
+        status = (
+            f"status packet of servo {id}{f' with {counted(len(parameters))}' if parameters else ''}: {alarm}"
+        )
         fields = _head(data)
-        fields.take(1, "error", self._alarms(packet))
-        if asked:
-            self._values(fields, packet.id, asked.address, len(values))
+        fault = ""
+        if kind == "reply":
+            if address == 0 and len(parameters) >= IDENTITY:
+                major, minor, end, *model = parameters[:IDENTITY]
+                table = choose((major, minor), (model[0], model[1]), end).table
+                if table:
+                    self._maps[id] = TABLES[table]
+            title = f"{status} (or {instruction})" if code in RULES or code & 0xC0 else status
+            fields.take(1, "error", self._alarms(packet))
+            if address is not None:
+                self._values(fields, id, address, len(parameters))
         else:
-            _unnamed(fields, len(values))
-        return _explanation(fields, data, title)
-
-    def _instruction(self, data: bytes, packet: Packet, also: str) -> Explanation:
-        fields = _head(data)
-        doubt = f"; as an error byte: {self._alarms(packet)}" if packet.id != BROADCAST else ""
-        fields.take(1, "instruction", protocol.instruction_name(packet.code) + doubt)
-        fault = _impossible(packet)
-        if not protocol.suits(packet.code, packet.parameters):
-            _unnamed(fields, len(packet.parameters))
-        else:
-            self._parameters(fields, packet)
-        return _explanation(fields, data, _instruction_title(packet) + (f" ({also})" if also else ""), fault)
-
-    def _status_title(self, packet: Packet) -> str:
-        count = len(packet.parameters)
-        carried = f" with {counted(count)}" if count else ""
-        return f"status packet of servo {packet.id}{carried}: {self._alarms(packet)}"
+            also = "the same again: an echo, or " if kind == "either" else "or "
+            title = instruction if id == BROADCAST else f"{instruction} ({also}{status})"
+            doubt = "" if id == BROADCAST else f"; as an error byte: {alarm}"
+            fields.take(1, "instruction", protocol.instruction_name(code) + doubt)
+            fault = _impossible(packet)
+            if protocol.suits(code, parameters):
+                self._parameters(fields, packet)
+        _unnamed(fields, len(fields.rest) - 1)
+        fields.take_rest("checksum", "right")
+        return Explanation(data, title, tuple(fields.parts), fault)
 
     def _alarms(self, packet: Packet) -> str:
         if not packet.code:
             return "no alarm"
         return f"alarm {self._by_map(packet.id, lambda table: ', '.join(alarms(packet.code, table.name)))}"
 
-    # -- parameters ----------------------------------------------------------------------------------------------
-
     def _parameters(self, fields: Fields, packet: Packet) -> None:
-        count = len(packet.parameters)
-        match packet.code:
-            case Instruction.READ | Instruction.SYNC_READ:
-                self._span(fields, packet)
-            case Instruction.WRITE | Instruction.REG_WRITE:
-                address = self._address(fields, packet)
-                self._values(fields, packet.id, address, count - 1)
-            case Instruction.SYNC_WRITE:
-                address = self._address(fields, packet)
-                length = packet.parameters[1]
-                fields.take(1, "length", f"{counted(length)} for each servo")
-                for at in range(2, count, length + 1):
-                    fields.take(1, "id", _id(packet.parameters[at]))
-                    self._values(fields, packet.parameters[at], address, length)
-            case Instruction.CALIBRATE:
-                fields.take(count, "position", _word(packet.parameters))
-            case _:
-                _unnamed(fields, count)
-
-    def _span(self, fields: Fields, packet: Packet) -> None:
-        address, count = packet.parameters[:2]
-
-        def names(table: RegisterMap) -> str:
-            return ", ".join(row.name for row in table.values() if address <= row.address < address + count)
-
-        self._address(fields, packet)
-        covered = self._by_map(packet.id, names)
-        fields.take(1, "count", counted(count) + (f": {covered}" if covered else ""))
-        for id in packet.parameters[2:]:
-            fields.take(1, "id", _id(id))
-
-    def _address(self, fields: Fields, packet: Packet) -> int:
-        address = packet.parameters[0]
-        name = self._by_map(packet.id, lambda table: _name(address, table))
-        fields.take(1, "address", f"register {address}, {name}")
-        return address
+        id, code, parameters = packet
+        if code == Instruction.CALIBRATE:
+            fields.take(len(parameters), "position", _word(parameters))
+            return
+        if len(parameters) < 2:
+            return
+        address, count = parameters[:2]
+        row_name = self._by_map(id, lambda table: _name(address, table))
+        fields.take(1, "address", f"register {address}, {row_name}")
+        if code in (Instruction.WRITE, Instruction.REG_WRITE):
+            self._values(fields, id, address, len(parameters) - 1)
+        elif code == Instruction.SYNC_WRITE:
+            fields.take(1, "length", f"{counted(count)} for each servo")
+            while len(fields.rest) > 1:
+                servo = fields.rest[0]
+                fields.take(1, "id", _id(servo))
+                self._values(fields, servo, address, count)
+        else:
+            span = range(address, address + count)
+            covered = self._by_map(
+                id, lambda table: ", ".join(row.name for row in table.values() if row.address in span)
+            )
+            fields.take(1, "count", counted(count) + (f": {covered}" if covered else ""))
+            for servo in parameters[2:]:
+                fields.take(1, "id", _id(servo))
 
     def _values(self, fields: Fields, id: int, address: int, count: int) -> None:
         """The next bytes, which are registers from `address` on."""
-        table = self._table(id)
-        data = fields.rest[:count]
-        at = 0
-        while at < count:
-            row = table.at(address + at)
-            size = row.size if row and at + row.size <= count else 1
-            piece = data[at : at + size]
-            name = row.name if row and row.size == size else "data"
-            fields.take(size, name, self._by_map(id, partial(_value, address + at, piece)))
-            at += size
+        end = address + count
+        while address < end:
+            row = self._table(id).at(address)
+            if row is not None and address + row.size > end:
+                row = None
+            size, name = (row.size, row.name) if row is not None else (1, "data")
+            fields.take(size, name, self._by_map(id, partial(_value, address, fields.rest[:size])))
+            address += size
 
     def _table(self, id: int) -> RegisterMap:
-        return self.maps.get(id) or self.usual or TABLES["sts"]
+        return self._maps.get(id) or self._usual or TABLES["sts"]
 
     def _by_map(self, id: int, text: Callable[[RegisterMap], str]) -> str:
         """A text by the map of this servo, or by STS with a remark if other maps give another one."""
         shown = text(self._table(id))
-        if id in self.maps or self.usual or all(text(table) == shown for table in TABLES.values()):
+        if id in self._maps or self._usual or all(text(table) == shown for table in TABLES.values()):
             return shown
         return f"{shown}, by the STS map"
 
 
 # -- texts -----------------------------------------------------------------------------------------------------
-
-
-def _explanation(fields: Fields, data: bytes, title: str, fault: str = "") -> Explanation:
-    fields.take_rest("checksum", "right")
-    return Explanation(data, title, tuple(fields.parts), fault)
 
 
 def _head(data: bytes) -> Fields:
@@ -217,11 +221,6 @@ def _id(id: int) -> str:
     if id == BROADCAST:
         return "everyone (254)"
     return f"servo {id}" if id <= MAX_ID else "impossible: 255 is read as part of the header"
-
-
-def _instruction_title(packet: Packet) -> str:
-    receiver = "everyone" if packet.id == BROADCAST else f"servo {packet.id}"
-    return f"{protocol.instruction_name(packet.code)} to {receiver}"
 
 
 def _impossible(packet: Packet) -> str:
@@ -243,19 +242,14 @@ def _name(address: int, table: RegisterMap) -> str:
     if row := table.at(address):
         return row.name
     before = table.at(address - 1)
-    if before and before.size == 2:
-        return f"second byte of {before.name}"
-    return "not in the map"
+    return f"second byte of {before.name}" if before and before.size == 2 else "not in the map"
 
 
 def _value(address: int, data: bytes, table: RegisterMap) -> str:
     row = table.at(address)
     if row is None or row.size != len(data):
         return f"register {address}, {_name(address, table)}: {data[0]}"
-    return _meaning(row, row.decode(data))
-
-
-def _meaning(row: Register, raw: int) -> str:
+    raw = row.decode(data)
     if raw in row.choices:
         return f"{raw} ({row.choices[raw]})"
     if row.bits:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from math import radians, tau
-from types import MappingProxyType
 from typing import Final, NamedTuple, TypeAlias
 
 
@@ -41,13 +40,9 @@ _SCS15_ARC: Final = (
     200.0,
     "SCS15/SCS115 manual V1.02: 0.19° a count, so 195°; Waveshare SC15 guide: 180°; a public script: 200°",
 )
-_ARCS: Final[Mapping[tuple[int, int], tuple[float, str]]] = {
-    (5, 4): (SCS_ARC, ""),
-    (5, 15): _SCS15_ARC,
-    (5, 25): _SCS15_ARC,
-}
-_ARC_UNKNOWN: Final = "no source for this model; 300° is the arc of an SCS0009"
-_NOTES: Final[Mapping[tuple[int, int], str]] = {
+_ARCS: Final = {(5, 4): (SCS_ARC, ""), (5, 15): _SCS15_ARC, (5, 25): _SCS15_ARC}
+_ARC_UNKNOWN: Final = (SCS_ARC, "no source for this model; 300° is the arc of an SCS0009")
+_NOTES: Final = {
     (5, 4): "FD calls it SCS009",
     (8, 44): "lerobot calls it sm8512bl",
     (9, 2): "rustypot calls it STS3036",
@@ -92,29 +87,30 @@ def _models(
     for minors, name in names.items():
         for minor in minors if isinstance(minors, range) else (minors,):
             number = (major, minor)
-            arc = (360.0, "") if order == "little" else _ARCS.get(number, (SCS_ARC, _ARC_UNKNOWN))
+            arc = (360.0, "") if order == "little" else _ARCS.get(number, _ARC_UNKNOWN)
             yield number, Model(name, order, maps, *arc, _NOTES.get(number, ""))
 
 
-_ALL: Final = (
-    *_models(5, "big", ("scs",), _SCS),
-    *_models(6, "little", ("smcl",), _SMS),
-    *_models(8, "little", ("smbl",), _SMS_BRUSHLESS),
-    *_models(8, "little", ("smcl", "smbl"), _SMS_MAJOR_8),
-    *_models(9, "little", ("sts",), _STS),
-    *_models(9, "big", ("scs2",), _SCS_2),
-    *_models(10, "little", ("sts",), _HTS),
-    *_models(10, "little", ("hls",), _HLS),
+MODELS: Final[Mapping[tuple[int, int], Model]] = dict(
+    sorted(
+        (
+            *_models(5, "big", ("scs",), _SCS),
+            *_models(6, "little", ("smcl",), _SMS),
+            *_models(8, "little", ("smbl",), _SMS_BRUSHLESS),
+            *_models(8, "little", ("smcl", "smbl"), _SMS_MAJOR_8),
+            *_models(9, "little", ("sts",), _STS),
+            *_models(9, "big", ("scs2",), _SCS_2),
+            *_models(10, "little", ("sts",), _HTS),
+            *_models(10, "little", ("hls",), _HLS),
+        )
+    )
 )
-MODELS: Final[Mapping[tuple[int, int], Model]] = MappingProxyType(dict(sorted(_ALL)))
 """(model major, model minor) -> model. It identifies a servo and does not prove a capability."""
-NO_LOAD: Final[Mapping[str, float]] = MappingProxyType(
-    {
-        "STS3215": 3400 * tau / 4096,  # STS3215 memory table V3.6
-        "STS3250": radians(60) / 0.133,  # data sheet A/0, 12 V
-        "SCS15": 55 * tau / 60,  # data sheet, 6 V
-    }
-)
+NO_LOAD: Final[Mapping[str, float]] = {
+    "STS3215": 3400 * tau / 4096,  # STS3215 memory table V3.6
+    "STS3250": radians(60) / 0.133,  # data sheet A/0, 12 V
+    "SCS15": 55 * tau / 60,  # data sheet, 6 V
+}
 """Model -> its velocity (rad/s) without load, where a source tells it."""
 
 

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from enum import IntEnum
-from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from motorbus.core.framing import FrameParser, FrameReceiver
@@ -57,23 +56,21 @@ class Rule(NamedTuple):
     all: bool = False
 
 
-RULES: Final[Mapping[int, Rule]] = MappingProxyType(
-    {
-        Instruction.PING: Rule(0, 0, one=True, all=True),
-        Instruction.READ: Rule(2, 2, one=True),
-        Instruction.WRITE: Rule(2, MAX_PARAMETERS, one=True, all=True),
-        Instruction.REG_WRITE: Rule(2, MAX_PARAMETERS, one=True, all=True),
-        Instruction.ACTION: Rule(0, 0, one=True, all=True),
-        Instruction.RESET: Rule(0, 0, one=True),
-        Instruction.BOOTLOADER: Rule(0, 0),
-        Instruction.UNKNOWN_09: Rule(0, 0),
-        Instruction.CLEAR_TURNS: Rule(0, 0, one=True),
-        Instruction.CALIBRATE: Rule(0, 2, one=True),
-        Instruction.UPGRADE: Rule(0, 0),
-        Instruction.SYNC_READ: Rule(3, MAX_PARAMETERS, all=True),
-        Instruction.SYNC_WRITE: Rule(4, MAX_PARAMETERS, all=True),
-    }
-)
+RULES: Final[Mapping[int, Rule]] = {
+    Instruction.PING: Rule(0, 0, one=True, all=True),
+    Instruction.READ: Rule(2, 2, one=True),
+    Instruction.WRITE: Rule(2, MAX_PARAMETERS, one=True, all=True),
+    Instruction.REG_WRITE: Rule(2, MAX_PARAMETERS, one=True, all=True),
+    Instruction.ACTION: Rule(0, 0, one=True, all=True),
+    Instruction.RESET: Rule(0, 0, one=True),
+    Instruction.BOOTLOADER: Rule(0, 0),
+    Instruction.UNKNOWN_09: Rule(0, 0),
+    Instruction.CLEAR_TURNS: Rule(0, 0, one=True),
+    Instruction.CALIBRATE: Rule(0, 2, one=True),
+    Instruction.UPGRADE: Rule(0, 0),
+    Instruction.SYNC_READ: Rule(3, MAX_PARAMETERS, all=True),
+    Instruction.SYNC_WRITE: Rule(4, MAX_PARAMETERS, all=True),
+}
 _NAMES: Final = {
     Instruction.RESET: "RESET (factory restore)",
     Instruction.BOOTLOADER: "enter bootloader (0x08)",
@@ -114,31 +111,19 @@ def frame(id: int, code: int, parameters: bytes = b"") -> bytes:
 
 def instruction(id: int, code: int, parameters: bytes = b"") -> bytes:
     """An instruction packet that obeys `RULES`."""
-    if not suits(code, parameters) or not _reaches(code, id):
-        raise _refusal(id, code, len(parameters))
-    return frame(id, code, parameters)
-
-
-def _reaches(code: int, id: int) -> bool:
-    rule = RULES[code]
-    return rule.all if id == BROADCAST else rule.one and 0 <= id <= MAX_ID
-
-
-def _refusal(id: int, code: int, count: int) -> RequestError:
-    name = instruction_name(code)
     rule = RULES.get(code, Rule(0, 0))
+    if suits(code, parameters) and (rule.all if id == BROADCAST else rule.one and 0 <= id <= MAX_ID):
+        return frame(id, code, parameters)
+    name = instruction_name(code)
     if not (rule.one or rule.all):
-        return RequestError(f"{name} is never sent", cause="it may leave the servo without its program")
-    if not 0 <= id <= BROADCAST:
-        return RequestError(f"id {id} is impossible", expected=f"0 to {MAX_ID}", node=id)
-    if id == BROADCAST and not rule.all:
-        return RequestError(
-            f"{name} cannot be sent to all servos (id {BROADCAST})", expected=f"0 to {MAX_ID}"
-        )
-    if id != BROADCAST and not rule.one:
-        return RequestError(f"{name} cannot be sent to one servo", expected=f"id {BROADCAST}", node=id)
-    allowed = f"{rule.fewest} to {rule.most} bytes"
-    return RequestError(f"{name} with {count} parameter bytes is impossible", expected=allowed)
+        raise RequestError(f"{name} is never sent", cause="it may leave the servo without its program")
+    if suits(code, parameters):
+        ids = [f"0 to {MAX_ID}"] * rule.one + [f"{BROADCAST} for all servos"] * rule.all
+        raise RequestError(f"{name} cannot be sent to id {id}", expected=" or ".join(ids))
+    raise RequestError(
+        f"{name} with {len(parameters)} parameter bytes is impossible",
+        expected=f"{rule.fewest} to {rule.most} bytes",
+    )
 
 
 def ping(id: int) -> bytes:
@@ -268,11 +253,10 @@ def is_valid(data: bytes) -> bool:
 
 def parser(top: int = BROADCAST) -> FrameParser:
     """A parser of packets with an id up to `top`: `MAX_ID` for status packets, `BROADCAST` for instructions too."""
+    highest = bytes((top,))
 
     def size(data: bytes) -> int | None:
-        if len(data) < 3:
-            return None
-        if data[2] > top:
+        if data[2:3] > highest:
             return 0
         if len(data) < 4:
             return None

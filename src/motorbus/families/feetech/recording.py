@@ -18,8 +18,6 @@ class Recording:
     any other packet is an instruction if a servo can execute it.
     """
 
-    code_meaning: Final = "the fifth byte: the instruction of a request, the alarm bits of a reply"
-
     def __init__(self, direction: str = "") -> None:
         self._parser: Final = protocol.parser(MAX_ID if direction == "rx" else BROADCAST)
         self._kind: Final = {"rx": "reply", "tx": "request"}.get(direction, "")

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from types import MappingProxyType
 from typing import Final
 
 from motorbus.core.register import Coding, Register, RegisterMap, changed
@@ -112,7 +111,7 @@ class Traits:
 NO_TRAITS: Final = Traits()  # of an unknown map
 
 _SMBL: Final = Traits(
-    modes=MappingProxyType({0: Mode.POSITION, 1: Mode.VELOCITY, 2: Mode.PWM, 3: Mode.STEP}),
+    modes={0: Mode.POSITION, 1: Mode.VELOCITY, 2: Mode.PWM, 3: Mode.STEP},
     duty="goal_time",
     limit="torque_limit",
     time="goal_time",
@@ -131,30 +130,28 @@ _SCS: Final = Traits(
     phase_bits=ZERO_BIT,
     measures_current=False,
 )
-TRAITS: Final[Mapping[str, Traits]] = MappingProxyType(
-    {
-        "sts": replace(_SMBL, goal_switches_on=True),  # feetech-cli, measured on STS3215
-        "smbl": _SMBL,
-        "smcl": Traits(
-            modes=MappingProxyType({0: Mode.POSITION, 1: Mode.VELOCITY, 2: Mode.PWM}),
-            duty="goal_time",
-            time="goal_time",
-            acceleration="acceleration",
-            calibrates="offset",
-        ),
-        "scs": _SCS,
-        # assumption: the second kind lacks SYNC READ as an SCS0009 does
-        "scs2": replace(_SCS, calibrates="offset", measures_current=True),
-        "hls": Traits(
-            modes=MappingProxyType({0: Mode.POSITION, 1: Mode.VELOCITY, 2: Mode.CURRENT, 3: Mode.PWM}),
-            current="goal_torque",
-            limit="torque_limit",
-            acceleration="acceleration",
-            many_turns=True,
-            calibrates="instruction",
-            clear_turns=True,
-            phase_bits=TURNS_BIT,
-        ),
-    }
-)
+TRAITS: Final[Mapping[str, Traits]] = {
+    "sts": replace(_SMBL, goal_switches_on=True),  # feetech-cli, measured on STS3215
+    "smbl": _SMBL,
+    "smcl": Traits(
+        modes={0: Mode.POSITION, 1: Mode.VELOCITY, 2: Mode.PWM},
+        duty="goal_time",
+        time="goal_time",
+        acceleration="acceleration",
+        calibrates="offset",
+    ),
+    "scs": _SCS,
+    # assumption: the second kind lacks SYNC READ as an SCS0009 does
+    "scs2": replace(_SCS, calibrates="offset", measures_current=True),
+    "hls": Traits(
+        modes={0: Mode.POSITION, 1: Mode.VELOCITY, 2: Mode.CURRENT, 3: Mode.PWM},
+        current="goal_torque",
+        limit="torque_limit",
+        acceleration="acceleration",
+        many_turns=True,
+        calibrates="instruction",
+        clear_turns=True,
+        phase_bits=TURNS_BIT,
+    ),
+}
 """Map -> how its servos are commanded."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Final
 
 from motorbus.core.family import DeviceTypes, Family, LinkSpec, Option
-from motorbus.families.kst.driver.broadcast import broadcast_read, broadcast_write
+from motorbus.families.kst.driver.broadcast import broadcast_write
 from motorbus.families.kst.driver.bus import KstDriver
 from motorbus.families.kst.driver.feedback import RawStatus, Status
 from motorbus.families.kst.driver.motion import Promise
@@ -31,7 +31,6 @@ __all__ = [
     "ScanWarning",
     "Servo",
     "Status",
-    "broadcast_read",
     "broadcast_write",
     "scan",
     "settings_of",
@@ -41,7 +40,9 @@ _SETTINGS: Final = (
     Option("profile", str, "kst", "the make of the servos; no servo reports it", tuple(PROFILES)),
     Option("id_format", str, "std", "identifiers of 11 bits (std) or 29 (ext)", ID_FORMATS),
     Option("sized", str, "no", "whether writes state their length", SIZED),
-    Option("nmt", str, "profile", "form of start and stop: profile, none, vendor or standard", NMT),
+    Option(
+        "nmt", str, "profile", "start before a move: by the profile, none, or standard (NMT of CiA 301)", NMT
+    ),
 )
 
 _COMMANDS: Final = (

@@ -48,13 +48,6 @@ def decode(data: bytes, profile: Profile = PROFILES["kst"]) -> list[Explanation]
     return found
 
 
-CODE_MEANING: Final = (
-    "of SDO frames specifier, index and sub-index as one number of 32 bits; of others the identifier without the "
-    "node"
-)
-"""The meaning of `Explanation.code`."""
-
-
 class _Frame:
     """One frame; `fields`, `row` (of its object), `fault`, `kind`, `node` and `code` are set while it is decoded."""
 
@@ -156,7 +149,7 @@ class _Frame:
             return f"{ampere}, {degrees}"
         else:
             text = self._meaning(row, data)
-            if self._is_ambiguous:
+            if name == "present_position" and "status" not in self.profile.table:
                 note = f"; or, if command 7 was meant, the status 0x{data[0]:02X} 0x{data[1]:02X}"
         self.fields.take(size, name, text + note)
         return text
@@ -182,15 +175,6 @@ class _Frame:
         whose = self.profile.name if row.name in self.profile.table else KST_EXT.name
         return f"{text}, outside {low} to {high} of profile {whose}"
 
-    @property
-    def _is_ambiguous(self) -> bool:
-        """The object is the position, which the manual also calls the status."""
-        return (
-            self.row is not None
-            and self.row.name == "present_position"
-            and "status" not in self.profile.table
-        )
-
     def _angle(self, raw: int) -> str:
         return f"{self._degrees(raw)} (raw {raw}, {self.profile.counts_per_degree} per degree)"
 
@@ -200,23 +184,22 @@ class _Frame:
     # -- other frames --------------------------------------------------------------------------------------------
 
     def _notification(self, notification: Notification) -> str:
+        """Decode the data of a notification; return their text."""
         data = notification.data
         match notification.kind:
             case "report":
-                what = self._angle(notifications.decode_report(data))
-                self.fields.take(2, "position", what)
+                name, size, what = "position", 2, self._angle(notifications.decode_report(data))
             case "alarm":
-                what = notifications.alarm_text(data)
-                self.fields.take_rest("alarm", what)
+                name, size, what = "alarm", len(data), notifications.alarm_text(data)
             case "heartbeat":
                 guard = ", toggle bit of node guarding set" if data[0] & 0x80 else ""
-                what = notifications.STATES[data[0] & 0x7F] + guard
-                self.fields.take_rest("state", what)
+                name, size, what = "state", 1, notifications.STATES[data[0] & 0x7F] + guard
             case _:  # an emergency
-                what = f"code 0x{int.from_bytes(data[:2], 'little'):04X}"
-                self.fields.take(2, "error code", what)
-                self.fields.take(1, "error register", f"0x{data[2]:02X}")
-                self.fields.take_rest("vendor", "defined by the maker")
+                name, size, what = "error code", 2, f"code 0x{int.from_bytes(data[:2], 'little'):04X}"
+        self.fields.take(size, name, what)
+        if notification.kind == "emergency":
+            self.fields.take(1, "error register", f"0x{data[2]:02X}")
+            self.fields.take_rest("vendor", "defined by the maker")
         return what
 
     def _start(self, start: notifications.Start) -> str:

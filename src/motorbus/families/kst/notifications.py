@@ -6,7 +6,7 @@
     heartbeat   0x700 + node                   1 byte (CiA 301)
 
 The length of a frame tells a report from a reply, never the first byte. Source: the KST CAN protocol manual has none of
-this; public drivers of these servos (a flight-controller driver, an STM32 driver, a driver of XQPOWER servos) do.
+this; public drivers of these servos (a autopilot driver, an STM32 driver, a driver of XQPOWER servos) do.
 """
 
 from __future__ import annotations
@@ -43,17 +43,13 @@ class Start(NamedTuple):
     on: bool
 
 
-def encode_start(form: str, node: int, on: bool) -> CanFrame:
-    """Start or stop the reports of one node or of all (0); it has no reply.
-
-    "vendor": identifier = node, `01 00` or `02 00`. "standard": NMT of CiA 301, identifier 0, `01 node` or `02 node`.
-    """
-    command = 1 if on else 2
-    return CanFrame(node, bytes((command, 0))) if form == "vendor" else CanFrame(0, bytes((command, node)))
+def encode_start(node: int) -> CanFrame:
+    """Start one node or all (0) by NMT of CiA 301, `01 node`: it then moves, and reports. It has no reply."""
+    return CanFrame(0, bytes((1, node)))
 
 
 def decode_start(frame: CanFrame) -> Start | None:
-    """A start or stop in either form, or None."""
+    """A start (1) or stop (2), or None. "vendor": identifier = node, `01 00`; "standard": identifier 0, `01 node`."""
     identifier, data, _ = frame
     if len(data) != 2 or data[0] not in (1, 2) or (identifier and data[1]):
         return None

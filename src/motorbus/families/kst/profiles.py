@@ -35,8 +35,8 @@ VERSIONS: Final = ("firmware_version", "software_version")
 REVERSED: Final = 5  # the bit of `function_enable` that turns the sense of rotation round
 
 MANUAL: Final = "KST CAN protocol manual"
-FLIGHT: Final = "public flight-controller driver for KST servos"
-FLIGHT_2: Final = "second public flight-controller driver for KST servos"
+AUTOPILOT: Final = "public autopilot driver for KST servos"
+AUTOPILOT_2: Final = "second public autopilot driver for KST servos"
 DEMO: Final = "public STM32 demo driver for KST servos"
 KINGMAX_DRIVER: Final = "public ESP32 driver for the Kingmax BLS4510S"
 XQPOWER_DRIVER: Final = "public PX4 module and tools for XQPOWER servos, after the vendor's can-sd-v022"
@@ -104,20 +104,20 @@ _LATER_ROWS = (
     *(
         _angle(
             name=name, address=address, access=Access.READ_WRITE, storage=Storage.EEPROM,
-            low=low, high=low + 1000, effect=Effect.PERSISTENT, source=FLIGHT,
+            low=low, high=low + 1000, effect=Effect.PERSISTENT, source=AUTOPILOT,
             note="needs a save; in reversed sense a change of one limit changes the other too",
         )
         for name, address, low in (("negative_limit", 0x300A, -1000), ("positive_limit", 0x300B, 0))
     ),
     _kept(
         name="function_enable", address=0x300F, high=255, protected=True, bits={REVERSED: "reversed"},
-        source=f"{FLIGHT}; {DEMO}",
+        source=f"{AUTOPILOT}; {DEMO}",
         note="bit 5 reverses the sense; the other bits are unknown, so only read-modify-write; a write may fail, or be "
         "undone by a restart",
     ),
     Register(
         name="status", address=0x6005, subindex=0, size=4, access=Access.READ, storage=Storage.RAM,
-        high=0xFFFFFFFF, source=f"{FLIGHT}; {DEMO}",
+        high=0xFFFFFFFF, source=f"{AUTOPILOT}; {DEMO}",
         conflict="manual: status at 0x6002; four public drivers: at 0x6005. Chosen: 0x6005",
         note="bytes 0 and 1 current (0.01 A, unsigned), byte 2 temperature (°C, signed), byte 3 unused",
     ),
@@ -137,7 +137,7 @@ KST: Final = RegisterMap("kst", _MANUAL_ROWS, title="KST CAN servo, as its proto
 KST_EXT: Final = KST.derive(
     "kst-ext",
     *_LATER_ROWS,
-    *_reaching(KST, 1000, pi / 1800, f"{FLIGHT}; {FLIGHT_2}; {DEMO}"),
+    *_reaching(KST, 1000, pi / 1800, f"{AUTOPILOT}; {AUTOPILOT_2}; {DEMO}"),
     title="KST CAN servo with newer firmware",
 )
 KINGMAX: Final = KST_EXT.derive(
@@ -194,7 +194,7 @@ class Profile:
 _KST = Profile(
     table=KST,
     nmt="none",
-    source=f"{MANUAL}; the wait after a save: {FLIGHT}",
+    source=f"{MANUAL}; the wait after a save: {AUTOPILOT}",
     conflicts="the manual has one frame for position (command 6) and status (command 7); it prints CAN ids of four "
     "bytes and calls the frames standard",
 )
@@ -202,7 +202,7 @@ _KST_EXT = replace(
     _KST,
     table=KST_EXT,
     nmt="vendor",
-    source=f"{FLIGHT}; {DEMO}; the rest: {MANUAL}",
+    source=f"{AUTOPILOT}; {DEMO}; the rest: {MANUAL}",
     conflicts="range ±100° where the manual has ±90°; status at 0x6005 where the manual has 0x6002; version at 0x100B "
     "where the manual has 0x100A; the demo driver uses 29-bit ids, the others 11-bit ones",
 )
@@ -270,8 +270,7 @@ def current(profile: Profile, raw: int) -> float:
 
 def temperature(raw: int) -> int:
     """Temperature (°C) in the raw value of `status`."""
-    byte = raw >> 16 & 0xFF
-    return byte - 256 if byte > 127 else byte
+    return (raw >> 16 & 0xFF ^ 0x80) - 0x80
 
 
 def bit_rate_code(rate: int) -> int:

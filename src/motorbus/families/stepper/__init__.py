@@ -15,11 +15,12 @@ from typing import Final
 from motorbus.core.family import DeviceTypes, Family, LinkSpec, Option
 from motorbus.families.stepper.driver.bus import StepperDriver
 from motorbus.families.stepper.driver.controller import AsyncController, Controller
-from motorbus.families.stepper.driver.io import InputChanged, Watched
+from motorbus.families.stepper.driver.io import InputChanged
 from motorbus.families.stepper.driver.manual import Homed, Moved
 from motorbus.families.stepper.driver.projects import Written
 from motorbus.families.stepper.driver.run import Outcome, Ran
 from motorbus.families.stepper.driver.stop import Promise
+from motorbus.families.stepper.execution.ramp import TICK_MS
 from motorbus.families.stepper.parameters import TABLES
 from motorbus.families.stepper.program.backup import Backup
 from motorbus.families.stepper.program.estimate import Estimate
@@ -42,7 +43,6 @@ __all__ = [
     "Promise",
     "Ran",
     "StepperDriver",
-    "Watched",
     "Written",
 ]
 
@@ -51,6 +51,10 @@ _SETTINGS: Final = (
     Option(
         "dump_order", str, "little", "byte of a number that is first in a dump: the lowest or the highest",
         ("little", "big"), "the manual has the lowest first in requests and does not say it of the dump",
+    ),
+    Option(
+        "ramp_tick_ms", float, TICK_MS, "ms in which the frequency grows by the acceleration", (),
+        "the manual does not say it; time a run of two lengths to find it",
     ),
 )  # fmt: skip
 

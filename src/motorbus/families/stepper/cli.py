@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from math import pi, tau
 from pathlib import Path
@@ -23,9 +22,10 @@ from motorbus.families.stepper.driver.controller import Controller
 from motorbus.families.stepper.driver.io import InputChanged
 from motorbus.families.stepper.driver.run import Outcome, Ran
 from motorbus.families.stepper.execution import ramp, sequence
-from motorbus.families.stepper.parameters import PARAMETERS
+from motorbus.families.stepper.parameters import PARAMETERS, Project
 from motorbus.families.stepper.program import estimate
 from motorbus.families.stepper.program.file import Program
+from motorbus.families.stepper.program.lint import Finding
 
 app = App(name="stepper", help="Commands of stepper controllers only.", help_epilogue="")
 
@@ -55,21 +55,12 @@ class StepPlan(Struct, frozen=True):
     stop: int | None
 
 
-class Finding(Struct, frozen=True):
-    """A mistake of a program."""
-
-    level: str
-    rule: str
-    step: int
-    text: str
-
-
 class Checked(Struct, frozen=True, tag="checked"):
-    """The steps of a program, its findings, and the estimated time."""
+    """The estimated time of a program, its steps, and its findings."""
 
+    estimate: str
     steps: list[StepPlan]
     findings: list[Finding]
-    estimate: str
 
 
 class Difference(Struct, frozen=True):
@@ -87,13 +78,6 @@ class Result(Struct, frozen=True, tag="project"):
     outcome: str
     detail: str = ""
     seconds: float | None = None
-
-
-class Text(Struct, frozen=True, tag="program"):
-    """A project as a program file."""
-
-    project: int
-    text: str
 
 
 class Ports(Struct, frozen=True, tag="ports"):
@@ -127,28 +111,21 @@ def check(file: Path, /, *, common: Common = Common()) -> int:
     Exit code 1 if a finding is an error.
     """
     program = Program.load(str(file))
-    steps = [_step(program, number) for number in estimate.numbers(program.project)]
-    found = [Finding(one.level, one.rule, one.step, one.text) for one in program.lint()]
-    checked = Checked(steps, found, str(program.estimate()))
-    if common.json:
-        emit(checked, common)
-    else:
-        emit(steps, common)
-        for one in program.lint():
-            print(one)
-        print(checked.estimate)
+    steps = [_step(program.project, number) for number in range(1, program.project.total_steps + 1)]
+    found = program.lint()
+    emit(Checked(str(program.estimate()), steps, found), common)
     return Exit.FAILURE if any(one.level == "error" for one in found) else Exit.OK
 
 
-def _step(program: Program, number: int) -> StepPlan:
-    project, step = program.project, program.project.step(number)
+def _step(project: Project, number: int) -> StepPlan:
+    step = project.step(number)
     return StepPlan(
         step=number,
         times=sequence.times(project, number),
         units=step.sign * step.distance,
         pulses=ramp.pulses_of(project, step),
         frequency=ramp.ramp_of(project, step).run,
-        motion=estimate.step_seconds(project, step),
+        motion=ramp.move_of(project, step).duration,
         pause=step.delay / 1000,
         output=PARAMETERS["output"].choices[step.output] if step.output else "",
         wait=step.start_input or None,
@@ -178,19 +155,17 @@ def write(
     """
     program = Program.load(str(file))
     number = project or program.project.number
-    wanted = replace(program, project=replace(program.project, number=number))
     with open_devices(common, (device,)) as devices:
         target = _controller(devices)
-        changes = target.device.difference(wanted)
+        changes = target.device.difference(program, number)
         rows = [Difference(name, old, new) for name, (old, new) in changes.items()]
-        if writing.dry_run:
+        if writing.dry_run or not (writing.yes or common.json):
             emit(rows, common)
+        if writing.dry_run:
             return
-        if rows and not writing.yes:
-            if not common.json:
-                emit(rows, common)
+        if rows:
             confirm(f"write {len(rows)} parameters to project {number} of {target.name}", writing)
-        written = target.device.write_project(wanted)
+        written = target.device.write_project(program, number)
         emit(Result(number, written.proof, f"parameters changed: {len(written.changes)}"), common)
 
 
@@ -220,7 +195,7 @@ def read(
             stream.write(text)
         emit(Result(number, "read", str(to)), common)
     elif common.json:
-        emit(Text(number, text), common)
+        emit(Result(number, "read", text), common)
     else:
         print(text, end="")
 
@@ -253,17 +228,11 @@ def run(
     endless = seconds is not None
     with open_devices(common, (device,)) as devices:
         target = _controller(devices)
-        way = _way(target.device.read_project(project))
-        question = f"start project {project} of {target.name}, {way}" if way else ""
-
-        def start(one: Any) -> None:
-            one.start_project(project, endless=endless)
-
         if writing.dry_run:
-            carry_out(writing, target, start)
+            carry_out(writing, target, lambda one: one.start_project(project, endless=endless))
             return
-        if question:
-            confirm(question, writing)
+        if way := _way(target.device.read_project(project)):
+            confirm(f"start project {project} of {target.name}, {way}", writing)
         procedure = Controller.run.function(target.device, project, timeout=seconds, endless=endless)
         try:
             with progress(f"project {project}") as advance:
@@ -274,7 +243,7 @@ def run(
     emit(Result(project, ran.outcome.value, f"{ran.why}; estimate: {ran.predicted}", ran.seconds), common)
     if error := ERRORS.get(ran.outcome):
         advice = (
-            "" if ran.outcome is Outcome.STOPPED else f"it may still run: `motorbus stop {device}` ends it"
+            "" if ran.outcome is Outcome.STOPPED else f"`motorbus stop {device}` ends it if it still runs"
         )
         raise error(f"project {project}: {ran.outcome.value}: {ran.why}", advice=advice)
 
@@ -290,7 +259,7 @@ def _way(program: Program) -> str:
 
 def _report(advance: Callable[..., None], event: object) -> None:
     if isinstance(event, InputChanged):
-        note(f"{event.at:.3f} s: input {event.port} {'active' if event.active else 'inactive'}")
+        note(f"input {event.port} is {'active' if event.active else 'inactive'}")
     elif isinstance(event, Progress):
         advance(event.done, event.total, event.what)
 
@@ -318,8 +287,6 @@ def io(
     """
     wanted = [_level(text) for text in levels]
     seconds = parse_quantity(watch, "time") if watch else 0.0
-    if wanted and watch:
-        raise RequestError("outputs and --watch", expected="one of them")
     with open_devices(common, (device,)) as devices:
         target = _controller(devices)
         one: Any = target.device
@@ -331,10 +298,8 @@ def io(
         if watch:
             procedure = Controller.watch_inputs.function(one, seconds=seconds)
             with progress("inputs") as advance:
-                found = target.bus.run(procedure, report=partial(_report, advance)).levels
-        else:
-            found = one.inputs()
-        emit(Ports(inputs={str(port): active for port, active in found.items()}), common)
+                target.bus.run(procedure, report=partial(_report, advance))
+        emit(Ports(inputs={str(port): active for port, active in one.inputs().items()}), common)
 
 
 def _level(text: str) -> tuple[int, bool]:

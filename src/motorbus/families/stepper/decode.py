@@ -7,18 +7,9 @@ from motorbus.core.family import Explanation
 from motorbus.core.recording import RecordedFrame
 from motorbus.errors import RequestError
 from motorbus.families.stepper import parameters, protocol
-from motorbus.families.stepper.parameters import PARAMETERS, ROW_LENGTH, TABLE, Order
+from motorbus.families.stepper.parameters import ALL_OUTPUTS, PARAMETERS, ROW_LENGTH, TABLE, UNITS, Order
 from motorbus.families.stepper.protocol import REPLY_LENGTH, Command
 from motorbus.families.stepper.recording import Recording
-
-_COUNTS = {
-    "turn_distance": "units per turn",
-    "distance": "units",
-    "start_frequency": "Hz",
-    "acceleration": "Hz",
-    "speed": "RPM",
-    "delay": "ms",
-}
 
 
 def explain(data: bytes, order: Order = "little") -> list[Explanation]:
@@ -45,7 +36,7 @@ def _notice(data: bytes) -> Explanation:
     return Explanation(data, "notice: the project has ended", tuple(fields.parts))
 
 
-def _head(fields: Fields, data: bytes, command: Command | None) -> str:
+def _take_head(fields: Fields, data: bytes, command: Command | None) -> str:
     """Take header and command; return the title of the command."""
     fields.take(2, "header", "FF AA")
     if command is None:
@@ -60,14 +51,15 @@ def _head(fields: Fields, data: bytes, command: Command | None) -> str:
 def _request(data: bytes) -> Explanation:
     command = protocol.command_at(data)
     fields, values, faults = Fields(data), {}, []
-    title = _head(fields, data, command)
+    title = f"request: {_take_head(fields, data, command)}"
     for name, at in command.fields.items() if command else ():
-        _take_unused(fields, at)
+        _take_unused(fields, data, at)
         size = PARAMETERS[name].size
         values[name] = int.from_bytes(data[at : at + size], "little")
-        fields.take(size, name, _meaning(name, values[name], command))
-        title += f", {name.replace('_', ' ')} {_meaning(name, values[name], command)}"
-    _take_unused(fields, len(data) - 1)
+        meaning = _meaning(name, values[name], command)
+        fields.take(size, name, meaning)
+        title += f", {name.replace('_', ' ')} {meaning}"
+    _take_unused(fields, data, len(data) - 1)
     due = sum(data[:-1]) & 0xFF
     if data[-1] != due:
         faults.append(f"the checksum is {data[-1]:02X}, {due:02X} is correct")
@@ -79,28 +71,24 @@ def _request(data: bytes) -> Explanation:
             protocol.check(command.name, values, expert=True)
         except RequestError as error:
             faults.append(f"{error.summary}: {error.expected}")
-    return Explanation(data, f"request: {title}", tuple(fields.parts), "; ".join(faults))
+    return Explanation(data, title, tuple(fields.parts), "; ".join(faults))
 
 
-def _take_unused(fields: Fields, until: int) -> None:
-    start = sum(len(part.data) for part in fields.parts)
-    unused = fields.rest[: until - start]
-    fields.take(len(unused), "unused", "0" if not any(unused) else "not 0")
+def _take_unused(fields: Fields, data: bytes, until: int) -> None:
+    unused = data[len(data) - len(fields.rest) : until]
+    fields.take(len(unused), "unused", "not 0" if any(unused) else "0")
 
 
 def _reply(data: bytes, order: Order) -> Explanation:
     command = protocol.command_at(data)
     assert command is not None, "a reply is one to a command"
     fields, fault = Fields(data), ""
-    title = f"reply: {_head(fields, data, command)}"
+    title = f"reply: {_take_head(fields, data, command)}"
     repeats = command.repeats[1:] if len(command.code) > 1 else command.repeats
     for name, raw in zip(repeats, data[REPLY_LENGTH - len(repeats) : REPLY_LENGTH], strict=True):
-        if not name:
-            fields.take(1, "unused", "0")
-            continue
         row = "project" if name == "selected" else name
-        fields.take(1, row, _meaning(row, raw, command))
-        title += f", {row} {_meaning(row, raw, command)}"
+        fields.take(1, row or "unused", _meaning(row, raw, command) if row else "0")
+        title += f", {row} {_meaning(row, raw, command)}" if row else ""
     if len(data) > REPLY_LENGTH:
         fault = _image(fields, order, data[3])
     return Explanation(data, title, tuple(fields.parts), fault)
@@ -112,19 +100,21 @@ def _image(fields: Fields, order: Order, number: int) -> str:
     for name, row in TABLE.items():
         if row.address < at:
             continue  # in a step that is all 0
-        step = row.address // ROW_LENGTH
         fields.take(row.address - at, "reserved", _reserved(image[at : row.address]))
+        step, offset = divmod(row.address, ROW_LENGTH)
         at = row.address + row.size
-        if step and not row.address % ROW_LENGTH and not any(image[row.address :][:ROW_LENGTH]):
+        if step and not offset and not any(image[row.address :][:ROW_LENGTH]):
             at = row.address + ROW_LENGTH
             fields.take(ROW_LENGTH, f"step {step}", "all 0")
         else:
             fields.take(row.size, name, _meaning(name, int.from_bytes(image[row.address : at], order)))
     fields.take_rest("reserved", _reserved(image[at:]))
     project = parameters.decode_image(image, order)
-    faults = [] if project.is_cleared else parameters.check_project(project, expert=True)
-    if project.number != number and not project.is_cleared:
+    if project.is_cleared:
+        return ""
+    if project.number != number:
         return f"the reply names project {number} and its image {project.number}"
+    faults = parameters.check_project(project, expert=True)
     return f"{faults[0].summary} ({faults[0].expected})" if faults else ""
 
 
@@ -134,13 +124,9 @@ def _reserved(data: bytes) -> str:
 
 def _meaning(name: str, raw: int, command: Command | None = None) -> str:
     """A number in words; the ports of outputs differ from those of inputs."""
-    if name == "port" and command and command.name == "set_output":
-        return {parameters.ALL_OUTPUTS: f"{raw} (all outputs)", parameters.LEDS: f"{raw} (both LEDs)"}.get(
-            raw, str(raw)
-        )
+    if name == "port" and raw >= ALL_OUTPUTS and command and command.name == "set_output":
+        return f"{raw} ({'all outputs' if raw == ALL_OUTPUTS else 'both LEDs'})"
     name = name if name in PARAMETERS else name.split("_", 2)[2]
-    if name == "step_angle":
-        return f"{raw / 100:g}° ({raw})"
     if raw in PARAMETERS[name].choices:
         return f"{raw} ({PARAMETERS[name].choices[raw]})"
-    return f"{raw} {_COUNTS[name]}" if name in _COUNTS else str(raw)
+    return f"{raw} {UNITS[name]}" if name in UNITS else str(raw)

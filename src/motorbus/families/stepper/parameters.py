@@ -22,7 +22,6 @@ PROJECTS: Final = 4
 STEPS: Final = 10
 ROW_LENGTH: Final = 20
 IMAGE_LENGTH: Final = (1 + STEPS) * ROW_LENGTH
-BLANK: Final = bytes(IMAGE_LENGTH)
 
 REVERSE: Final = 1  # of a direction; homing always runs in reverse
 IMMEDIATE: Final = 1  # of a stop mode
@@ -45,15 +44,12 @@ def _row(
 ) -> Register:
     """`items` are those of the manual; in its item 15 a place is [row][byte], x for the row of a step."""
     more = {"access": Access.READ_WRITE, "effect": Effect.PERSISTENT} | more
-    source = f"{MANUAL}, {items.replace('@', _place(address, size))}"
+    place = f"{address}..{address + size - 1}" if size > 1 else f"{address}"
+    source = f"{MANUAL}, {items.replace('@', place)}"
     return Register(
         name=name, address=address, size=size, low=low, high=high, storage=Storage.EEPROM, source=source,
         note=note, **more,
     )  # fmt: skip
-
-
-def _place(address: int, size: int) -> str:
-    return f"{address}..{address + size - 1}" if size > 1 else f"{address}"
 
 
 _INPUTS: Final = {0: "none", **{number: f"input {number}" for number in STEP_INPUTS}}
@@ -211,7 +207,7 @@ class Project:
     @property
     def used(self) -> tuple[Step, ...]:
         """The steps that are carried out."""
-        return self.steps[: self.total_steps]
+        return () if self.is_cleared else self.steps[: self.total_steps]
 
     @property
     def pulses_per_turn(self) -> Fraction | None:
@@ -238,8 +234,8 @@ class Project:
 
     @property
     def is_cleared(self) -> bool:
-        """It has no steps to carry out."""
-        return self.total_steps == 0
+        """It has no steps to carry out: it was cleared, or its memory was erased and reads FF."""
+        return not 1 <= self.total_steps <= STEPS
 
 
 def with_steps(project: Project, steps: tuple[Step, ...]) -> Project:
@@ -282,17 +278,22 @@ def differences(one: Project, other: Project) -> dict[str, tuple[int, int]]:
 
 def decode_image(image: bytes, order: Order = "little") -> Project:
     """The numbers in an image; a device may hold any. Raises RequestError for another length than 220 bytes."""
-    _check_length(image)
-    return project_of({name: _number(image, row, order) for name, row in TABLE.items()})
+    if len(image) != IMAGE_LENGTH:
+        raise RequestError(f"an image of {len(image)} bytes", expected=f"{IMAGE_LENGTH} bytes")
+    return project_of(
+        {
+            name: int.from_bytes(image[row.address : row.address + row.size], order)
+            for name, row in TABLE.items()
+        }
+    )
 
 
-def encode_image(project: Project, order: Order = "little", *, over: bytes = BLANK) -> bytes:
-    """The image of a project; the bytes that the manual does not name are those of `over`.
+def encode_image(project: Project, order: Order = "little") -> bytes:
+    """The image of a project; 0 in bytes that the manual does not name.
 
-    Raises RequestError if `over` has not 220, OverflowError for a number that does not fit its bytes.
+    Raises OverflowError for a number that does not fit its bytes.
     """
-    _check_length(over)
-    image = bytearray(over)
+    image = bytearray(IMAGE_LENGTH)
     for name, raw in values_of(project).items():
         row = TABLE[name]
         image[row.address : row.address + row.size] = raw.to_bytes(row.size, order)
@@ -306,28 +307,17 @@ def checked_order(order: object) -> Order:
     raise RequestError(f"dump_order={shown(order)} is not possible", expected="little or big")
 
 
-def _number(image: bytes, row: Register, order: Order) -> int:
-    return int.from_bytes(image[row.address : row.address + row.size], order)
-
-
-def _check_length(image: bytes) -> None:
-    if len(image) != IMAGE_LENGTH:
-        raise RequestError(
-            f"an image of {len(image)} bytes", expected=f"{IMAGE_LENGTH} bytes, 11 rows of {ROW_LENGTH}"
-        )
-
-
 # -- ranges ----------------------------------------------------------------------------------------------------------
 
 UNITS: Final[Mapping[str, str]] = {
-    "microsteps": "microsteps per full step",
-    "step_angle": "hundredths of a degree (2.55° at most)",
+    "microsteps": "per full step",
+    "step_angle": "hundredths of a degree",
     "turn_distance": "units per turn",
     "distance": "units",
     "start_frequency": "Hz",
     "acceleration": "Hz",
     "speed": "RPM",
-    "delay": "ms (4 h 39 min 37.215 s at most)",
+    "delay": "ms",
 }
 """Unit of a raw value."""
 _ONE_OF: Final = ("start_input", "stop_input")
@@ -361,6 +351,15 @@ def check_value(name: str, raw: object, *, step: int = 0, expert: bool = False) 
     )
 
 
+def check_loop(first: int, last: int) -> None:
+    """Raise RequestError unless these steps are a range, or both 0."""
+    if (first or last) and not 1 <= first <= last:
+        raise RequestError(
+            f"loop_first, loop_last: {first} to {last} is no range",
+            expected="the first step, then the last, or 0 for both",
+        )
+
+
 def check_project(project: Project, *, expert: bool = False) -> list[RequestError]:
     """An error for each number of a project, and of the steps that it carries out, that no request may carry."""
     pairs = [(0, row.name, getattr(project, row.name)) for row in BASE if row.name != "number"]
@@ -372,6 +371,10 @@ def check_project(project: Project, *, expert: bool = False) -> list[RequestErro
             check_value(name, raw, step=number, expert=expert)
         except RequestError as error:
             errors.append(error)
+    try:
+        check_loop(project.loop_first, project.loop_last)
+    except RequestError as error:
+        errors.append(error)
     return errors
 
 

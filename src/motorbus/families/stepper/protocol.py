@@ -20,7 +20,7 @@ from typing import Final, NamedTuple
 from motorbus.core.register import shown
 from motorbus.core.request import Data, Effect, Event, Noise, Notification, Reply, TimeoutClass
 from motorbus.errors import RequestError
-from motorbus.families.stepper.parameters import IMAGE_LENGTH, PARAMETERS, check_value
+from motorbus.families.stepper.parameters import IMAGE_LENGTH, PARAMETERS, check_loop, check_value
 
 RATE: Final = 9600  # bit/s; 8 data bits, no parity, 1 stop bit
 HEADER: Final = b"\xff\xaa"
@@ -189,12 +189,7 @@ def check(name: str, values: Mapping[str, int], *, expert: bool = False) -> None
     for field in COMMANDS[name].fields:
         step = values.get("step", 0) if field != "step" else 0
         check_value(field, values[field], step=step, expert=expert)
-    first, last = values.get("loop_first", 0), values.get("loop_last", 0)
-    if (first or last) and not 1 <= first <= last:
-        raise RequestError(
-            f"loop_first, loop_last: {first} to {last} is no range",
-            expected="the first step, then the last, or 0 for both",
-        )
+    check_loop(values.get("loop_first", 0), values.get("loop_last", 0))
 
 
 def checked_motor(number: int) -> int:

@@ -19,8 +19,6 @@ class Recording:
     a reply are one. A frame that is incomplete at the end is noise and not searched.
     """
 
-    code_meaning: Final = "bytes 2 and 3 of a request or a reply, the command; EE DD of the notice"
-
     def __init__(self, direction: str = "") -> None:
         self._direction: Final = direction
         self._rest = b""

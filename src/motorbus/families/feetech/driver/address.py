@@ -33,15 +33,8 @@ from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown, RequestError
 from motorbus.families.feetech import protocol
 from motorbus.families.feetech.driver.eeprom import Unlocked, close_lock
 from motorbus.families.feetech.driver.identity import check_alone, learn, writable
-from motorbus.families.feetech.driver.node import IMAGE, Node, checked_id
-from motorbus.families.feetech.driver.requests import (
-    STORE,
-    Block,
-    confirmed,
-    read_block,
-    unanswered,
-    verified,
-)
+from motorbus.families.feetech.driver.node import IMAGE, BusFacts, Node, checked_id
+from motorbus.families.feetech.driver.requests import Block, read_block, unanswered
 from motorbus.families.feetech.registers.codes import BAUD_CODES, BAUD_CODES_OF
 
 ID, BAUD = 5, 6  # registers
@@ -179,29 +172,32 @@ async def _plan_and_move(node: Node, change: AddressChange) -> None:
     change = change._replace(image=await check_alone(node))
     async with BitrateRestored():
         taken = [place for place in change.places if place != change.old and await look(place)]
-        others = node.facts.second_ids.items()
-        owner = next((id for id, second in others if second == change.new.id and id != node.node), None)
-        if change.cell == ID and owner is not None:
-            raise node.refusal(f"cannot move: servo {owner} obeys {change.new.id} as its second id")
+        for id, other in node.facts.servos.items() if change.cell == ID else ():
+            if other.second_id == change.new.id and id != node.node:
+                raise node.refusal(f"cannot move: servo {id} obeys {change.new.id} as its second id")
         if change.new in taken:
             raise node.refusal(f"cannot move: the id {change.new.id} is taken at {change.new.rate} bit/s")
-    move = _Move(change._replace(taken=tuple(taken)))
+    move = _Move(change._replace(taken=tuple(taken)), node.facts)
     try:
         async with move:
-            await move_to(move.change, change.old, change.new)
+            await move_to(move.change, change.old, change.new, node.facts)
     except MotorbusError:
         if move.end != "new":
             raise
     finally:
-        node.forget_settings(written=True)
-        node.facts.changes[change.new.id] += 1
+        _forget(node.facts, change)
+
+
+def _forget(facts: BusFacts, change: AddressChange) -> None:
+    for id in (change.old.id, change.new.id):
+        facts.servos[id].forget(written=True)
 
 
 class _Move(Guard):
     """A change between its intent and its outcome in the journal; whatever happens, the servo is at one address."""
 
-    def __init__(self, change: AddressChange) -> None:
-        self.change = change
+    def __init__(self, change: AddressChange, facts: BusFacts) -> None:
+        self.change, self.facts = change, facts
         self.end = ""  # "new" or "old"
 
     async def enter(self) -> None:
@@ -216,7 +212,7 @@ class _Move(Guard):
             await SetBitrate(change.old.rate)
             self.end = "new"
         else:
-            self.end = await with_cleanup(settle(change), lambda: SetBitrate(change.old.rate))
+            self.end = await with_cleanup(settle(change, self.facts), lambda: SetBitrate(change.old.rate))
             error.add_note(f"the servo is at its {self.end} address, locked")
         await Emit(JournalEntry(change.verb, OUTCOME, {"outcome": self.end, "node": change.old.id}))
 
@@ -227,24 +223,22 @@ async def recover(node: Node, change: str, facts: Mapping[str, Any]) -> str:
     Raises NoReply if the servo is at none of its addresses: scan all rates; OutcomeUnknown if two servos could be it.
     """
     move = from_facts(change, facts)
-    node.facts.maps.update(dict.fromkeys((move.old.id, move.new.id), move.table.name))
 
     async def work() -> str:
         async with BitrateRestored():
             reached = {**move.facts(), REACHED: list(facts.get(REACHED, ()))}
             await Emit(JournalEntry(move.verb, "recovering", reached))
-            end = await settle(move)
+            end = await settle(move, node.facts)
         await Emit(JournalEntry(move.verb, OUTCOME, {"outcome": end, "node": move.old.id}))
         return end
 
     try:
         return await Exclusive(work())
     finally:
-        node.forget_settings(written=True)
-        node.facts.changes[move.new.id] += 1
+        _forget(node.facts, move)
 
 
-async def settle(change: AddressChange) -> str:
+async def settle(change: AddressChange, facts: BusFacts) -> str:
     """Find the servo, write the address that it is to have with the lock open, and lock it: "new" or "old"."""
     last: MotorbusError | None = None
     for _ in range(ROUNDS):
@@ -258,7 +252,7 @@ async def settle(change: AddressChange) -> str:
                 )
             for place in found:
                 goal = change.new if place == change.new else change.old
-                await move_to(change, place, goal)
+                await move_to(change, place, goal, facts)
                 return "new" if goal == change.new else "old"
         except (NoReply, WireError, OutcomeUnknown) as error:
             last = error
@@ -267,26 +261,24 @@ async def settle(change: AddressChange) -> str:
     raise last or NoReply(what, advice="scan all rates")
 
 
-async def move_to(change: AddressChange, here: Address, there: Address) -> None:
+async def move_to(change: AddressChange, here: Address, there: Address, facts: BusFacts) -> None:
     """Unlock, torque off, write the cell, see the servo at `there` unchanged and still unlocked, lock it."""
     await SetBitrate(here.rate)
-    unlocked = Unlocked(known(here.id, change.image), change.table)
+    unlocked = Unlocked(known(here.id, change.image, facts), change.table)
     await unlocked.enter()
     wire = protocol.write(here.id, change.cell, change.value(there))
     await unanswered(wire, Effect.IDENTITY, priority=Priority.CONFIGURATION)
     await Sleep(STORE_TIME)
-    unlocked.node = node = known(there.id, change.image)
+    unlocked.node = known(there.id, change.image, facts)
     image = await look(there)
     if not change.is_it(image) or image[change.cell : change.cell + 1] != change.value(there):
         what = f"node {change.old.id} is not seen unchanged at id {there.id}, {there.rate} bit/s"
         raise OutcomeUnknown(what, node=change.old.id)
     if change.second:  # or it would obey its former id
-        block = Block(change.second, bytes((there.id,)), Effect.PERSISTENT)
-        await confirmed(node, block, timeout=STORE)
+        await unlocked.write(Block(change.second, bytes((there.id,))), b"")
         await Sleep(STORE_TIME)
-        await verified(node, block, timeout=STORE)
     await unlocked.check_open()
-    await close_lock(node, unlocked.lock)
+    await close_lock(unlocked.node, unlocked.lock)
 
 
 async def look(place: Address) -> bytes:
@@ -298,8 +290,8 @@ async def look(place: Address) -> bytes:
         return b""
 
 
-def known(id: int, image: bytes) -> Node:
+def known(id: int, image: bytes, facts: BusFacts | None = None) -> Node:
     """A servo of which these registers were read."""
-    node = Node(id)
+    node = Node(id, facts)
     learn(node, image)
     return node

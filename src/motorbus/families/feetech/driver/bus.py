@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache
 from typing import Any, Final
 
 from motorbus.core import units
@@ -23,7 +22,7 @@ from motorbus.families.feetech.driver.goals import hold_block, rest_block
 from motorbus.families.feetech.driver.group import disable_torque_everyone, limp_requests
 from motorbus.families.feetech.driver.motion import LIMP, Promise
 from motorbus.families.feetech.driver.node import IMAGE, BusFacts, Node, checked_id
-from motorbus.families.feetech.driver.requests import DATA, PRESENT, TORQUE_ENABLE, Block
+from motorbus.families.feetech.driver.requests import DATA, PRESENT, TORQUE_ENABLE, Block, read_id
 from motorbus.families.feetech.driver.scan import scan
 from motorbus.families.feetech.registers import TABLES
 from motorbus.families.feetech.traits import TRAITS, Mode
@@ -32,18 +31,16 @@ RETURN_DELAY: Final = 254 * 2e-6
 """s; the longest delay that register 7 can ask for. Source: STS3215 memory table V3.6."""
 PROCESSING: Final = 0.001
 """s to make a reply. With the margin of the bus about twice the 2 ms that users of python-st3215 found too short."""
-SCAN_DELAY: Final = 0.010  # s for an id that probably has no servo (servolab)
 STORE_DELAY: Final = 0.100  # s for flash: more than 21 ms measured by a recovery tool, 50 to 100 ms advised
 DELAYS: Final = {
     TimeoutClass.REPLY: PROCESSING,
-    TimeoutClass.SCAN: SCAN_DELAY - RETURN_DELAY,
+    TimeoutClass.SCAN: PROCESSING,  # servolab waits 10 ms; a late reply is noticed, see scan.py
     TimeoutClass.STORE: STORE_DELAY,
 }
 COLLISION: Final = 0.8  # s in which all servos have answered a broadcast PING at 1 Mbit/s (rustypot)
 ADAPTER: Final = 0.016  # s; latency timer of an FTDI adapter as shipped (ROBOTIS-GIT/DynamixelSDK#330)
 SCHEDULING: Final = 0.005  # s that a loaded host may run late between two bytes
 AT_ONCE: Final = 60  # servos that one frame of a stop makes limp: 128 bytes
-ID: Final = 5
 PROBES: Final = (3, 9, 10, 12, 13, 14, *range(16, 27))
 """Bytes that a probe reads from register 5 on: not 2, the length of its echo, and no length in common use."""
 HELD: Final = PRESENT + 2  # bytes of registers 0 to 57, which decide how a servo is held
@@ -51,24 +48,17 @@ HELD: Final = PRESENT + 2  # bytes of registers 0 to 57, which decide how a serv
 _AXIS: Final = AxisDriver(
     state=feedback.telemetry,
     position=feedback.position,
-    velocity=feedback.velocity,
-    load=feedback.load,
-    current=feedback.current,
-    voltage=feedback.voltage,
-    temperature=feedback.temperature,
     health=feedback.health,
     enable_torque=motion.enable_torque,
     disable_torque=motion.disable_torque,
     move=motion.move,
     stop=motion.stop,
     limits=motion.limits,
-    travel=motion.travel,
     max_velocity=motion.max_velocity,
     cap_torque=motion.cap_torque,
-    cap_current=motion.cap_current,
     stream=stream.open_stream,
 )
-_POSITION_ONLY: Final = frozenset(("move", "limits", "travel", "stream"))
+_POSITION_ONLY: Final = frozenset(("move", "limits", "stream"))
 
 
 class FeetechDriver(HalfDuplexSerial):
@@ -94,7 +84,7 @@ class FeetechDriver(HalfDuplexSerial):
         self.map: Final = map
 
     def echo_test(self) -> Request[Any]:
-        return read_id(1, 1, TimeoutClass.SCAN)
+        return read_id(1, within=TimeoutClass.SCAN)
 
     def receiver(self) -> Receiver:
         return protocol.receiver()
@@ -128,13 +118,7 @@ class FeetechDriver(HalfDuplexSerial):
         """By the register map, whatever the model; a servo in another mode than position has an axis of that kind."""
         if identity.table not in TABLES:
             return AxisDriver()
-        traits = TRAITS[identity.table]
-        lacks = {
-            "current": not TABLES[identity.table]["present_current"].unit,
-            "cap_torque": not traits.limit,
-            "cap_current": not traits.current,
-        }
-        names = _AXIS.names - {name for name, missing in lacks.items() if missing}
+        names = _AXIS.names if TRAITS[identity.table].limit else _AXIS.names - {"cap_torque"}
         mode = identity.details.get("mode", Mode.POSITION.value)
         if mode != Mode.POSITION.value:
             names -= _POSITION_ONLY
@@ -147,22 +131,6 @@ class FeetechDriver(HalfDuplexSerial):
         from motorbus.families.feetech.decode import decode
 
         return decode(data, self.facts.maps, self.map)
-
-
-@cache
-def read_id(node: int, count: int, within: TimeoutClass = TimeoutClass.REPLY) -> Request[bool]:
-    """READ from the id register on; True if the id is that of the node."""
-
-    def decode(answer: Response) -> bool:
-        return bool(answer.replies) and answer.replies[0].data[DATA] == node
-
-    return Request(
-        protocol.read(node, ID, count),
-        (Expected(node, node, protocol.OVERHEAD + count),),
-        decode,
-        reply_within=within,
-        repeatable=True,
-    )
 
 
 # -- stop ------------------------------------------------------------------------------------------------------

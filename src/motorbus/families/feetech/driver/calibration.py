@@ -12,7 +12,7 @@ import math
 from typing import Final, NamedTuple
 
 from motorbus.core.register import Register, RegisterMap, is_number, shown
-from motorbus.core.request import Effect, Priority
+from motorbus.core.request import Effect
 from motorbus.core.steps import Exclusive
 from motorbus.errors import DeviceError, MotorbusError, VerificationFailed
 from motorbus.families.feetech import protocol
@@ -21,16 +21,7 @@ from motorbus.families.feetech.driver.goals import check_mode
 from motorbus.families.feetech.driver.identity import check_alone, learn, read_settings
 from motorbus.families.feetech.driver.modes import limits_block, raw_limits
 from motorbus.families.feetech.driver.node import Node
-from motorbus.families.feetech.driver.requests import (
-    DOUBTS,
-    PRESENT,
-    STORE,
-    Block,
-    acknowledged,
-    confirmed,
-    read_block,
-    verified,
-)
+from motorbus.families.feetech.driver.requests import PRESENT, STORE, Block, instruct, read_block
 from motorbus.families.feetech.registers import TABLES
 from motorbus.families.feetech.traits import TRAITS, TURNS_BIT, Mode
 
@@ -45,10 +36,7 @@ class Pose(NamedTuple):
 
 
 class Calibration(NamedTuple):
-    """What a calibration did; angles in rad, offsets as raw counts too.
-
-    `before` and `after` are what the same pose reads; `note` says what differs from the request, "" for nothing.
-    """
+    """What a calibration did; angles in rad, offsets as raw counts too. `before` and `after`: what the pose reads."""
 
     before: float
     after: float
@@ -56,7 +44,6 @@ class Calibration(NamedTuple):
     new_offset: float
     raw_old_offset: int
     raw_new_offset: int
-    note: str
 
 
 class Zero(NamedTuple):
@@ -80,9 +67,10 @@ async def zero(node: Node) -> Zero:
 async def calibrate(node: Node, to: float | None = None) -> Calibration:
     """Make the present pose read `to` rad (None: the middle of the turn) permanently; the servo goes limp.
 
-    Hold the shaft still. The limits keep their values and mean other poses afterwards. Raises RequestError, with
-    nothing changed, without a homing offset, in another mode, with counted turns, another resolution, or an impossible
-    angle; DeviceError if it does not obey; VerificationFailed if a reading does not fit.
+    Hold the shaft still. The limits keep their values and mean other poses afterwards. At the end of the range of the
+    offset register the pose may read one count beside. Raises RequestError, with nothing changed, without a homing
+    offset, in another mode, with counted turns, another resolution, or an impossible angle; DeviceError if it does not
+    obey; VerificationFailed if a reading does not fit.
     """
     if to is not None and not is_number(to):
         raise node.refusal(f"cannot be at {shown(to)}", expected="a number of rad")
@@ -99,8 +87,7 @@ async def calibrate(node: Node, to: float | None = None) -> Calibration:
         most = float(node.value(position, settings.turn - 1))
         raise node.refusal(f"cannot be at {to} rad within one turn", expected=f"0 to {most:.4f} rad")
     _plan(node, offset, await _read_pose(node, offset), goal)
-    before, planned, found = await Exclusive(_calibrate(node, table, offset, goal))
-    beside = planned.position - goal
+    before, found = await Exclusive(_calibrate(node, table, offset, goal))
     return Calibration(
         before=float(node.value(position, before.position)),
         after=float(node.value(position, found.position)),
@@ -108,44 +95,26 @@ async def calibrate(node: Node, to: float | None = None) -> Calibration:
         new_offset=float(offset.to_value(found.offset)),
         raw_old_offset=before.offset,
         raw_new_offset=found.offset,
-        note=f"this pose reads {beside:+} count beside: the offset register ends there" if beside else "",
     )
 
 
-async def _calibrate(node: Node, table: RegisterMap, row: Register, goal: int) -> tuple[Pose, Pose, Pose]:
+async def _calibrate(node: Node, table: RegisterMap, row: Register, goal: int) -> tuple[Pose, Pose]:
     async with Unlocked(node, table) as unlocked:
         before = await _read_pose(node, row)  # it may have moved when it went limp
         planned = _plan(node, row, before, goal)
         await unlocked.check_open()
+        block, old = Block(row.address, row.encode(planned.offset)), row.encode(before.offset)
         doubt = None
-        block = Block(row.address, row.encode(planned.offset), Effect.PERSISTENT)
-        unlocked.before.append(block._replace(data=row.encode(before.offset)))
         if node.traits.calibrates == "offset":
-            await confirmed(node, block, timeout=STORE)
-            await verified(node, block, timeout=STORE)
+            await unlocked.write(block, old)
         else:
-            doubt = await _instruct(node, table["present_position"].encode(goal))
+            unlocked.before.append(block._replace(data=old, effect=Effect.PERSISTENT))
+            wire = protocol.calibrate(node.node, table["present_position"].encode(goal))
+            doubt = await instruct(node, wire)  # repeated: twice has the effect of once
         found = await _read_pose(node, row)
-        if found != planned:
-            _judge(node, table, before, planned, found, doubt)
+        _check_pose(node, before, planned, found, doubt)
         await unlocked.check_open()
-    return before, planned, found
-
-
-async def _instruct(node: Node, goal: bytes) -> MotorbusError | None:
-    """Send 0x0B; gives the doubt whether it was received. Twice has the effect of once."""
-    request = acknowledged(
-        node,
-        protocol.calibrate(node.node, goal),
-        Block(0, b"", Effect.PERSISTENT),
-        priority=Priority.CONFIGURATION,
-        timeout=STORE,
-    )
-    try:
-        await request
-    except DOUBTS as error:
-        return error
-    return None
+    return before, found
 
 
 def _plan(node: Node, row: Register, pose: Pose, goal: int) -> Pose:
@@ -173,12 +142,10 @@ def _shortest(distance: int, turn: int) -> int:
     return (distance + turn // 2) % turn - turn // 2
 
 
-def _judge(
-    node: Node, table: RegisterMap, before: Pose, planned: Pose, found: Pose, doubt: MotorbusError | None
-) -> None:
+def _check_pose(node: Node, before: Pose, planned: Pose, found: Pose, doubt: MotorbusError | None) -> None:
     """Raise unless the readings fit, but for a shaft that moved a little."""
     assert node.settings is not None
-    turn, slack = node.settings.turn, round(SLACK / table["present_position"].scale)
+    turn, slack = node.settings.turn, round(SLACK / node.row("present_position").scale)
     beside = _shortest(found.position - planned.position, turn)
     moved = _shortest(found.position + found.offset - before.position - before.offset, turn)
     if abs(beside) <= slack and abs(moved) <= slack:
@@ -204,23 +171,8 @@ def _offset_row(node: Node, table: RegisterMap) -> Register:
 
 
 async def _read_pose(node: Node, row: Register) -> Pose:
-    """Offset and position. Raises DeviceError for an offset outside the range of its register."""
-    data = await read_block(node, row.address, row.size, bytes, timeout=STORE)
-    offset = row.decode(data)
-    code, sign = (
-        int.from_bytes(data, "little"),
-        row.sign_bit or 0,
-    )  # one byte on SCS2, little-endian elsewhere
-    if not row.low <= offset <= row.high or code >> (sign + 1):
-        raise DeviceError(
-            f"node {node.node}: its homing offset reads {data.hex(' ')}, which its register cannot mean",
-            expected=f"{row.low} to {row.high}, the sign at bit {row.sign_bit}",
-            advice="factory_restore() sets it to 0; nothing was changed",
-            node=node.node,
-            register=row.name,
-        )
-    assert node.table is not None
-    position = node.table["present_position"]
+    offset = await read_block(node, row.address, row.size, row.decode, timeout=STORE)
+    position = node.row("present_position")
     return Pose(await read_block(node, PRESENT, position.size, position.decode, timeout=STORE), offset)
 
 

@@ -12,7 +12,7 @@ from typing import Final, TypeAlias
 
 from motorbus.core.family import State
 from motorbus.families.feetech.driver import feedback
-from motorbus.families.feetech.driver.goals import shown_mode
+from motorbus.families.feetech.driver.goals import BOUNDED, shown_mode
 from motorbus.families.feetech.driver.identity import known, read_settings
 from motorbus.families.feetech.driver.node import Node
 from motorbus.families.feetech.driver.requests import read_block
@@ -52,9 +52,9 @@ def _rules(node: Node, raw: Raw) -> list[tuple[bool, str]]:
     """Each rule: whether it holds, and its text."""
     mode, traits, settings = node.known_mode, node.traits, node.settings
     assert settings is not None
-    low, high = raw("min_position_limit"), raw("max_position_limit")
+    low, high = settings.raw_limits
     bound = raw(traits.current) if traits.current else 1
-    bounded = mode in (Mode.POSITION, Mode.VELOCITY)
+    bounded = mode in BOUNDED
     return [
         (mode is None, f"its operating mode {shown_mode(node)} is not documented: set_mode('position')"),
         (

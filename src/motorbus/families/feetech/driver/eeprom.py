@@ -8,27 +8,19 @@ memory table V3.6; feetech-cli, measured on hardware; recovery tools (an acknowl
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Final
 
 from motorbus.core.register import RegisterMap
-from motorbus.core.request import Effect, Stops
-from motorbus.core.steps import Emit, Exclusive, Guard, catch
+from motorbus.core.request import Effect, Precondition, Stops
+from motorbus.core.steps import Exclusive, Guard, catch
 from motorbus.errors import LinkError, MotorbusError, OutcomeUnknown, RequestError
-from motorbus.families.feetech.driver.motion import disable_torque, is_limp, limp, torque_on_unless
+from motorbus.families.feetech.driver.motion import disable_torque, enable_torque_unless, is_limp, limp
 from motorbus.families.feetech.driver.node import Node
 from motorbus.families.feetech.driver.requests import STORE, Block, confirmed, read_block, verified
 
 OPEN: Final = b"\0"
 CLOSED: Final = b"\1"
 ATTEMPTS: Final = 2
-
-
-class TorqueAfterWrite(NamedTuple):
-    """An event: a servo that had torque before a write to EEPROM has it again, or not, and why."""
-
-    node: int
-    on: bool
-    why: str = ""
 
 
 class Unlocked(Guard):
@@ -42,14 +34,20 @@ class Unlocked(Guard):
         self.node = node
         self.lock = table["lock"].address
         self.before: list[Block] = []  # what the registers held that were written
-        self.stops: int | None = None
 
     async def enter(self) -> None:
         await confirmed(self.node, Block(self.lock, OPEN, Effect.PERSISTENT), timeout=STORE)
         await disable_torque(self.node)
 
+    async def write(self, block: Block, before: bytes) -> None:
+        """Write a block and read it back; it gets these bytes again if the sequence fails."""
+        block = block._replace(effect=Effect.PERSISTENT)  # nothing moves: torque is off
+        self.before.append(block._replace(data=before))
+        await confirmed(self.node, block, timeout=STORE)
+        await verified(self.node, block, timeout=STORE)
+
     async def leave(self, error: BaseException | None) -> None:
-        self.node.forget_settings(written=True)
+        self.node.known.forget(written=True)
         if error is not None and self.before:
             if await catch(self.check_open()) is not None:  # it restarted, maybe with torque on
                 await catch(disable_torque(self.node))
@@ -66,23 +64,13 @@ class Unlocked(Guard):
 
     async def check_open(self) -> None:
         """Raise OutcomeUnknown if the servo has restarted since the lock was opened."""
-        found = await read_block(self.node, self.lock, 1, bytes, timeout=STORE)
-        if found != OPEN:
+        if await read_block(self.node, self.lock, 1, bytes, timeout=STORE) != OPEN:
             raise OutcomeUnknown(
                 f"node {self.node.node} has closed its EEPROM lock by itself",
                 cause="it lost its supply for a moment; what was written may be gone at the next power-off",
                 advice="check the supply, then write again",
                 node=self.node.node,
             )
-
-    def stopped(self, stops: Stops) -> MotorbusError | None:
-        """The error if a stop has left for this servo since the first call."""
-        now = stops(self.node.node)
-        if self.stops is None:
-            self.stops = now
-        if now == self.stops:
-            return None
-        return RequestError("it was stopped while its EEPROM was written", node=self.node.node)
 
 
 async def close_lock(node: Node, lock: int) -> None:
@@ -103,8 +91,8 @@ async def store(
     """Write these registers where they differ, with the bus reserved; whether anything was written.
 
     Torque is off afterwards if so; with `keep_torque` a servo that had torque gets it back, goal := present position,
-    unless a stop came meanwhile, and `TorqueAfterWrite` is reported. `force` writes equal values too: another program
-    may have written them behind a closed lock, so that power-off loses them. Raises VerificationFailed, OutcomeUnknown.
+    unless a stop came meanwhile; an error of that is raised. `force` writes equal values too: another program may have
+    written them behind a closed lock, so that power-off loses them. Raises VerificationFailed, OutcomeUnknown.
     """
     return await Exclusive(_store(node, table, blocks, force, keep_torque))
 
@@ -116,32 +104,41 @@ async def _store(
     for block in blocks:
         found = await read_block(node, block.address, len(block.data), bytes, timeout=STORE)
         if force or found != block.data:
-            block = block._replace(effect=Effect.PERSISTENT)  # nothing moves: torque is off
-            changes.append((block, block._replace(data=found)))
+            changes.append((block, found))
     unlocked = Unlocked(node, table)
     if not changes:
         if await read_block(node, unlocked.lock, 1, bytes, timeout=STORE) == OPEN:
             await close_lock(node, unlocked.lock)
         return False
-    held = keep_torque and not await is_limp(node)
-    level = table["status_return_level"].address
+    unless = not_stopped(node) if keep_torque and not await is_limp(node) else None
 
     async def write_all() -> None:
         async with unlocked:
-            if held:
-                await confirmed(node, limp(node)._replace(unless=unlocked.stopped))  # counts the stops so far
+            if unless is not None:
+                await confirmed(node, limp(node)._replace(unless=unless))  # counts the stops so far
             for block, before in changes:
-                unlocked.before.append(before)
-                await confirmed(node, block, timeout=STORE)
-                if block.address <= level < block.address + len(block.data):
-                    node.forget_answers()
-                await verified(node, block, timeout=STORE)
+                await unlocked.write(block, before)
             await unlocked.check_open()
 
     error = await catch(write_all())
-    if held:
-        failure = await catch(torque_on_unless(node, unlocked.stopped))
-        await Emit(TorqueAfterWrite(node.node, failure is None, failure.summary if failure else ""))
+    if unless is not None:
+        failure = await catch(enable_torque_unless(node, unless))
+        if failure is not None and error is None:
+            failure.add_note("the registers are written; its torque is off")
+            raise failure
     if error is not None:
         raise error
     return True
+
+
+def not_stopped(node: Node) -> Precondition:
+    """Refuses a request if a stop has left for this servo since the first request with it."""
+    counts: list[int] = []
+
+    def refusal(stops: Stops) -> MotorbusError | None:
+        counts.append(stops(node.node))
+        if counts[-1] == counts[0]:
+            return None
+        return RequestError(f"node {node.node} was stopped while its EEPROM was written", node=node.node)
+
+    return refusal

@@ -42,9 +42,10 @@ def state_of(node: Node, data: bytes, first: int = PRESENT) -> State:
             return None
         return float(node.value(table[name], raw_in(table, name, data, first)))
 
-    tells_current = node.settings is not None and node.settings.tells_current
+    settings = node.known.last
+    tells_current = settings is not None and settings.tells_current
     return State(
-        at=node.at,
+        at=node.known.at,
         position=value("present_position"),
         velocity=value("present_velocity"),
         load=value("present_load"),
@@ -82,34 +83,33 @@ def health(node: Node) -> Runnable[Health]:
 
 def _quantity(name: str, text: str) -> Callable[[Node], Runnable[float]]:
     """The function that reads this row."""
+    what = name.removeprefix("present_")
 
     def read(node: Node) -> Runnable[float]:
-        kept = node.kept.get(name)
-        if kept is not None and kept[0] is node.settings:
-            return kept[1]
+        kept = node.known.kept.get(name)
+        if kept is not None:
+            return kept
         if node.table is None or node.settings is None:
             return _identify_then(node, read)
         if name not in node.table or not node.table[name].unit:
-            raise _unknown(node, name.removeprefix("present_"))
+            error = DeviceError(f"node {node.node}: its {what} has no known unit", advice="read_raw()")
+            raise error if node.is_writable else unknown_map(node)
         row = node.table[name]
-
-        def take(data: bytes) -> float:
-            return float(node.value(row, row.decode(data)))
-
-        request = read_block(node, row.address, row.size, take)
+        request = read_block(
+            node, row.address, row.size, lambda data: float(node.value(row, row.decode(data)))
+        )
         request.decode_exact = _exact(node, row)
-        node.kept[name] = node.settings, request
+        node.known.kept[name] = request
         return request
 
-    read.__name__ = name.removeprefix("present_")
-    read.__qualname__ = read.__name__
+    read.__name__ = read.__qualname__ = what
     read.__doc__ = text
     return read
 
 
 def _exact(node: Node, row: Register) -> ExactDecoder[float] | None:
     """Decode one whole reply without an alarm, whose value is not negative; None where the homing offset counts."""
-    settings = node.settings
+    known, settings = node.known, node.settings
     if settings is not None and settings.shift and row.name == "present_position":
         return None
     size, order = OVERHEAD + row.size, row.order
@@ -120,9 +120,9 @@ def _exact(node: Node, row: Register) -> ExactDecoder[float] | None:
         if len(data) != size or not data.startswith(head) or sum(data) & 0xFF != SOUND:
             return None
         raw = int.from_bytes(data[DATA:-1], order)
-        if raw >= sign or node.settings is not settings:
+        if raw >= sign or known.settings is not settings:
             return None
-        node.at, node.alarm = at, ()
+        known.at, known.alarm = at, ()
         return raw * scale
 
     return decode
@@ -145,9 +145,3 @@ temperature = _quantity("present_temperature", "Temperature (°C).")
 async def _identify_then(node: Node, read: Callable[[Node], Runnable[T]]) -> T:
     await known(node)
     return await read(node)
-
-
-def _unknown(node: Node, what: str) -> DeviceError:
-    if not node.is_writable:
-        return unknown_map(node)
-    return DeviceError(f"node {node.node}: its {what} has no known unit", advice="read_raw()", node=node.node)

@@ -25,6 +25,8 @@ NO_LOAD: Final = 3400  # counts/s of an STS3215 without load. Source: STS3215 me
 COUNT: Final = tau / 4096  # rad; a count of an STS3215
 FAR: Final = 1e6  # rad, beyond any position
 ROUNDING: Final = 1e-6  # units of a velocity
+COMMANDS: Final = 8  # bytes of registers 40 to 47: torque switch to goal velocity
+BOUNDED: Final = (Mode.POSITION, Mode.VELOCITY)  # modes in which the goal torque of an HLS bounds the current
 QUANTITY: Final = {Mode.VELOCITY: "velocity", Mode.PWM: "load", Mode.CURRENT: "current"}
 
 # -- setpoints -------------------------------------------------------------------------------------------------
@@ -71,12 +73,12 @@ def setpoints(node: Node, row: Register, raw: int) -> Iterator[Setpoint]:
 def speed_setpoint(node: Node, raw: int) -> Setpoint:
     """What this goal velocity orders: to turn at it in velocity mode, else the speed of the way to the goal."""
     row = node.row("goal_velocity")
-    low, high = float(node.value(row, row.low)), float(node.value(row, row.high))
+    value, low, high = (float(node.value(row, one)) for one in (raw, row.low, row.high))
     if node.known_mode is Mode.VELOCITY:
-        return Setpoint(node.node, "velocity", float(node.value(row, raw)), low, high)
+        return Setpoint(node.node, "velocity", value, low, high)
     if raw == 0 and (node.settings is None or node.settings.zero_is_maximum):
-        return Setpoint(node.node, "speed", min(NO_LOAD * COUNT, high), low, high)
-    return Setpoint(node.node, "speed", float(node.value(row, raw)), low, high)
+        value = min(NO_LOAD * COUNT, high)
+    return Setpoint(node.node, "speed", value, low, high)
 
 
 # -- blocks ----------------------------------------------------------------------------------------------------
@@ -85,13 +87,13 @@ def speed_setpoint(node: Node, raw: int) -> Setpoint:
 def motion_block(
     node: Node, to: float, velocity: float | None, acceleration: float | None, current: float | None
 ) -> Block:
-    """A whole move, in registers 41 to 47; see `_goal_block`.
+    """A whole move, in registers 41 to 47.
 
     Where a goal is not known to switch torque on, the switch comes with it, in register 40.
     """
     raw, order = position_goal(node, to)
     block = _goal_block(node, raw, order, velocity, acceleration, current)
-    return block if node.traits.goal_switches_on else with_torque(block)
+    return block if node.traits.goal_switches_on else with_torque(node, block, bytes(COMMANDS))
 
 
 def step_block(node: Node, by: float, velocity: float | None, acceleration: float | None) -> Block:
@@ -103,7 +105,7 @@ def step_block(node: Node, by: float, velocity: float | None, acceleration: floa
         what = f"node {node.node}: {by} rad is too far for one step"
         raise LimitExceeded(what, expected=f"{-most:.4g} to {most:.4g} rad", node=node.node)
     order = Setpoint(node.node, "relative", float(node.value(row, raw)), -most, most)
-    return _goal_block(node, raw, order, velocity, acceleration, None)._replace(repeatable=False)
+    return _goal_block(node, raw, order, velocity, acceleration)._replace(repeatable=False)
 
 
 def _goal_block(
@@ -112,29 +114,40 @@ def _goal_block(
     order: Setpoint,
     velocity: float | None,
     acceleration: float | None,
-    current: float | None,
+    current: float | None = None,
 ) -> Block:
     """Acceleration, goal, bound of the current or time, velocity. The time is 0, so that the velocity counts."""
     row, speed = node.row("goal_position"), raw_speed(node, velocity)
     ramp = ramp_bytes(node, acceleration)
-    data = ramp + row.encode(raw) + behind_goal(node, speed, current)
+    between = bound_bytes(node, current) or node.row(node.traits.time).encode(0)
+    data = ramp + row.encode(raw) + between + node.row("goal_velocity").encode(speed)
     return Block(row.address - len(ramp), data, Effect.MOTION, (order, speed_setpoint(node, speed)))
 
 
-def behind_goal(node: Node, speed: int, current: float | None = None) -> bytes:
-    """The registers behind a goal: bound of the current or time, and this raw velocity."""
-    between = bound_bytes(node, current) or node.row(node.traits.time).encode(0)
-    return between + node.row("goal_velocity").encode(speed)
+def with_torque(node: Node, block: Block, found: bytes) -> Block:
+    """This block with the torque switch in one packet; `found` are registers 40 to 47 as they are.
 
-
-def with_torque(block: Block, found: bytes = bytes(8)) -> Block:
-    """This block with the torque switch in the same packet; `found` are registers 40 to 47 as they are.
-
-    SCS have no register 41: it gets what was read, or 0.
+    A bound of 0 and, for a position, a velocity of 0 that means standstill would let no goal move the servo.
     """
-    between = found[1 : block.address - TORQUE_ENABLE]
+    data, used = bytearray(found), 0
+
+    def put(address: int, part: bytes) -> None:
+        nonlocal used
+        at = address - TORQUE_ENABLE
+        data[at : at + len(part)] = part
+        used = max(used, at + len(part))
+
+    put(TORQUE_ENABLE, ON)
+    put(block.address, block.data)
+    if node.traits.current and node.known_mode in BOUNDED:
+        row = node.row(node.traits.current)
+        node.known.bound = row.decode(bytes(data[row.address - TORQUE_ENABLE :][: row.size]))
+        put(row.address, bound_bytes(node))
+    row, maximum = node.row("goal_velocity"), raw_speed(node, None)
+    if maximum and node.known_mode is Mode.POSITION and not any(data[row.address - TORQUE_ENABLE :]):
+        put(row.address, row.encode(maximum))
     goals = tuple(goal._replace(stays=Stays.ON) if goal.stays else goal for goal in block.goals)
-    return block._replace(address=TORQUE_ENABLE, data=ON + between + block.data, goals=goals)
+    return block._replace(address=TORQUE_ENABLE, data=bytes(data[:used]), goals=goals)
 
 
 def hold_block(node: Node, raw: int) -> Block:
@@ -145,27 +158,15 @@ def hold_block(node: Node, raw: int) -> Block:
     return Block(row.address, row.encode(raw), row.effect, (still,))
 
 
-def rest_block(node: Node, mode: Mode | None = None) -> Block:
+def rest_block(node: Node) -> Block:
     """Velocity, duty or current 0, by the mode. Raises RequestError where no register is known for it."""
-    mode, traits = mode or checked_mode(node), node.traits
-    name = {
-        Mode.VELOCITY: "goal_velocity",
-        Mode.PWM: traits.duty,
-        Mode.CURRENT: traits.current,
-    }[mode]
-    if not name:
+    mode, traits = checked_mode(node), node.traits
+    names = {Mode.VELOCITY: "goal_velocity", Mode.PWM: traits.duty, Mode.CURRENT: traits.current}
+    if not names[mode]:
         raise no_duty(node)
-    row = node.row(name)
+    row = node.row(names[mode])
     still = Setpoint(node.node, QUANTITY[mode], 0.0, 0.0, 0.0, Stays.STILL)
     return Block(row.address, row.encode(0), row.effect, (still,))
-
-
-def with_bound(node: Node, block: Block, current: float | None = None) -> Block:
-    """This block of a goal position or velocity with the adjoining bound of the current, where the map has one."""
-    data = bound_bytes(node, current)
-    if data and node.row(node.traits.current).address < block.address:
-        return block._replace(address=block.address - len(data), data=data + block.data)
-    return block._replace(data=block.data + data)
 
 
 # -- bounds ----------------------------------------------------------------------------------------------------
@@ -220,7 +221,7 @@ def bound_bytes(node: Node, current: float | None = None) -> bytes:
         raise node.refusal("has no register that bounds its current", "leave current out: cap_torque()")
     row = node.row(node.traits.current)
     protection = node.settings.protection_current if node.settings else 0
-    raw = (abs(node.bound or 0) or protection) if current is None else node.raw(row, current)
+    raw = (abs(node.known.bound or 0) or protection) if current is None else node.raw(row, current)
     if 0 < raw <= row.high:
         return row.encode(raw)
     if current is None:
@@ -262,11 +263,18 @@ def shown_mode(node: Node) -> str:
 
 
 def checked_limits(node: Node) -> tuple[float, float]:
-    """Its limits (rad). Raises RequestError for both 0 in a map where that has no known meaning."""
-    if node.limits is None:
+    """Its limits (rad). Raises RequestError for both 0 where that has no known meaning.
+
+    Goals then count over many turns only in maps that do, and with the phase bit that lets positions count so too.
+    """
+    settings = node.settings
+    if settings is None or settings.limits is None:
         fix = "write(min_position_limit=…, max_position_limit=…), or disable_torque()"
         raise node.refusal("has position limits of 0 and 0, which has no known meaning in its map", fix)
-    return node.limits
+    if settings.many_turns and not settings.tells_turns:
+        what = "counts its goals over many turns and its position within one, so a goal may be turns away"
+        raise node.refusal(what, "set_multi_turn(True), or disable_torque()")
+    return settings.limits
 
 
 def no_duty(node: Node) -> RequestError:

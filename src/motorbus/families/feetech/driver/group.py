@@ -27,14 +27,12 @@ from motorbus.core.steps import Emit, Exclusive, SetBitrate, catch, with_cleanup
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.families.feetech import protocol
 from motorbus.families.feetech.driver.access import (
+    GAP,
     GROUPS,
-    Span,
     action_all,
     check_names,
-    check_values,
-    decode_span,
-    hand_over,
     ram_block,
+    reg_write_block,
     rows_of,
     spans,
 )
@@ -89,49 +87,40 @@ async def sync_read(names: Sequence[str], ids: Iterable[int | Node]) -> GroupRes
     check_names(names)
     nodes = as_nodes(ids)
     errors = await prepare_all(nodes)
-    raws: dict[int, dict[str, int]] = {node.node: {} for node in nodes if node.node not in errors}
     groups: dict[tuple[str, str], list[Node]] = {}
     for node in nodes:
-        if node.node in raws:
-            groups.setdefault((_table(node).name, _table(node)["present_position"].order), []).append(node)
+        if node.node not in errors:
+            table = _table(node)
+            groups.setdefault((table.name, table["present_position"].order), []).append(node)
+    values: dict[int, dict[str, Value]] = {}
     for group in groups.values():
-        for node in group:
-            if error := _lacks(node, names):
-                errors[node.node] = error
-        if group[0].node in errors:
+        table = _table(group[0])
+        if lacking := [name for name in names if name not in GROUPS and name not in table]:
+            what = f"has the map {table.name}, which has no {', '.join(lacking)}"
+            errors.update({node.node: node.refusal(what) for node in group})
             continue
-        for span in spans(rows_of(_table(group[0]), names)):
-            here = [node for node in group if node.node not in errors]
-            for part in await divided(here, span.size):
+        rows = rows_of(table, names)
+        raws: dict[int, dict[str, int]] = {node.node: {} for node in group}
+        for span in spans(rows, GAP):
+            answering = [node for node in group if node.node not in errors]
+            for part in await divided(answering, span.size):
                 for id, data in (await collect(part, span.address, span.size, errors)).items():
-                    raws[id] |= decode_span(span, data)
-    answered = [node for node in nodes if node.node not in errors]
-
-    def values(node: Node) -> dict[str, Value]:
-        rows = rows_of(_table(node), names)
-        return {row.name: node.value(row, raws[node.node][row.name]) for row in rows}
-
+                    raws[id] |= span.decode(data)
+        for node in group:
+            if node.node not in errors:
+                values[node.node] = {row.name: node.value(row, raws[node.node][row.name]) for row in rows}
+    answered = [node for node in nodes if node.node in values]
     return GroupResult(
-        {node.node: values(node) for node in answered},
+        {node.node: values[node.node] for node in answered},
         errors,
         {node.node: node.alarm for node in answered},
-        max((node.at for node in answered), default=float("-inf")),
-    )
-
-
-def _lacks(node: Node, names: Sequence[str]) -> MotorbusError | None:
-    """The error for a servo whose map lacks one of these registers."""
-    lacking = [name for name in names if name not in GROUPS and name not in _table(node)]
-    return (
-        node.refusal(f"has the map {_table(node).name}, which has no {', '.join(lacking)}")
-        if lacking
-        else None
+        max((node.known.at for node in answered), default=float("-inf")),
     )
 
 
 async def prepare_all(ids: Iterable[int | Node]) -> dict[int, MotorbusError]:
     """Identify those of these servos that are unknown; the errors by id."""
-    nodes = [node for node in as_nodes(ids) if node.settings is None or node.is_outdated]
+    nodes = [node for node in as_nodes(ids) if node.settings is None]
     errors: dict[int, MotorbusError] = {}
     for part in await divided(nodes, IMAGE):
         images = await collect(part, 0, IMAGE, errors)
@@ -152,20 +141,20 @@ async def collect(
     nodes: Sequence[Node], address: int, count: int, errors: dict[int, MotorbusError]
 ) -> dict[int, bytes]:
     """One block of each: by SYNC READ, then by READ of those that it did not return; errors of the rest by id."""
-    able = [node for node in nodes if node.traits.sync_read and not node.reads_alone]
-    able = able if len(able) > 1 else []
-    found = await _sync_blocks(able, address, count) if able else {}
+    able = [node for node in nodes if can_sync_read(node)]
+    found = await _sync_blocks(able, address, count) if len(able) > 1 else {}
     for node in nodes:
         if node.node in found:
-            node.reads_alone = False
+            node.known.reads_alone = False
             continue
         data = await catch(read_block(node, address, count, bytes))
         if isinstance(data, MotorbusError):
             errors[node.node] = data
             continue
         found[node.node] = data
-        if node in able and node.table is not None and not await _sync_blocks([node], address, count):
-            node.reads_alone = True
+        asked = len(able) > 1 and node in able and node.table is not None
+        if asked and not await _sync_blocks([node], address, count):
+            node.known.reads_alone = True
             await Emit(ReadsAlone(node.node))
     return found
 
@@ -178,6 +167,11 @@ async def _sync_blocks(nodes: Sequence[Node], address: int, count: int) -> dict[
     return {} if isinstance(found, MotorbusError) else found
 
 
+def can_sync_read(node: Node) -> bool:
+    """It answers SYNC READ, as far as is known."""
+    return node.traits.sync_read and not node.known.reads_alone
+
+
 def sync_request(
     nodes: Sequence[Node],
     address: int,
@@ -187,7 +181,7 @@ def sync_request(
 ) -> Request[T]:
     """SYNC READ one block of each of these, in this order. Raises RequestError for a servo without SYNC READ."""
     for node in nodes:
-        if not node.traits.sync_read or node.reads_alone:
+        if not can_sync_read(node):
             raise node.refusal("has no SYNC READ", "use sync_read(), which reads such servos one by one")
     ids = [node.node for node in nodes]
     return Request(
@@ -211,17 +205,16 @@ def _replies(nodes: Sequence[Node], answer: Response) -> Iterator[tuple[int, byt
 
 def positions_request(nodes: Sequence[Node]) -> Request[Positions]:
     """The present positions (rad) of identified servos with SYNC READ, in one request that may be kept."""
-    rows = {node.node: known_row(node, "present_position") for node in nodes}
-    by_id = {node.node: node for node in nodes}
+    by_id = {node.node: (node, known_row(node, "present_position")) for node in nodes}
 
     def decode(answer: Response) -> Positions:
         values = {}
         for id, data in _replies(nodes, answer):
-            row = rows[id]
-            values[id] = float(by_id[id].value(row, row.decode(data[: row.size])))
+            node, row = by_id[id]
+            values[id] = float(node.value(row, row.decode(data[: row.size])))
         return Positions(values, answer.missing, answer.at)
 
-    exact = _exact_positions(nodes, list(rows.values()))
+    exact = _exact_positions(nodes, [row for _, row in by_id.values()])
     return sync_request(nodes, PRESENT, 2, decode, exact)
 
 
@@ -230,12 +223,12 @@ def _exact_positions(nodes: Sequence[Node], rows: Sequence[Register]) -> ExactDe
 
     None for mixed byte orders, and modes that leave the offset in.
     """
+    made = [(node.known, node.settings) for node in nodes]
     if len({row.order for row in rows}) > 1 or any(
-        node.settings is None or node.settings.shift for node in nodes
+        settings is None or settings.shift for _, settings in made
     ):
         return None
     unpack = Struct(("<" if rows[0].order == "little" else ">") + "5xHx" * len(nodes)).unpack
-    made = [(node, node.settings) for node in nodes]
     ids = [node.node for node in nodes]
     scales = [float(node.value(row, 1)) for node, row in zip(nodes, rows, strict=True)]
     size = protocol.OVERHEAD + 2
@@ -252,10 +245,10 @@ def _exact_positions(nodes: Sequence[Node], rows: Sequence[Register]) -> ExactDe
         raws = unpack(data)
         if max(raws) >= 0x8000:  # negative
             return None
-        for node, settings in made:
-            if node.settings is not settings:
+        for known, settings in made:
+            if known.settings is not settings:
                 return None
-            node.at, node.alarm = at, ()
+            known.at, known.alarm = at, ()
         return Positions(dict(zip(ids, map(mul, raws, scales))), (), at)  # noqa: B905 - as many
 
     return decode
@@ -268,7 +261,7 @@ def _table(node: Node) -> RegisterMap:
 
 def known_row(node: Node, name: str) -> Register:
     """A row of an identified servo. Raises RequestError if it is not, DeviceError for an unknown map."""
-    if node.table is None or node.settings is None or node.is_outdated:
+    if node.table is None or node.settings is None:
         raise node.refusal("is not identified, so its limits and units are unknown", "run prepare_all()")
     if not node.table[name].unit:
         raise unknown_map(node)
@@ -284,39 +277,54 @@ async def sync_write(values: Mapping[One, Mapping[str, Value]]) -> None:
     No servo acknowledges it. One packet carries up to 83 servos with two bytes each. Nothing is written if a servo is
     silent or unknown, or a value cannot be written.
     """
-    await sync_write_request(*await _prepared(values, "SYNC WRITE"))
+    await sync_write_request(await _blocks(values, "SYNC WRITE"))
 
 
-async def _prepared(values: Mapping[One, Mapping[str, Value]], what: str) -> tuple[list[Node], list[Block]]:
+async def reg_write_all(values: Mapping[One, Mapping[str, Value]]) -> None:
+    """REG WRITE to each of these, `{id or servo: {name: value}}` in API units, then ACTION for all.
+
+    ACTION is not sent unless all have acknowledged; a note says which hold a REG WRITE then.
+    """
+    blocks = await _blocks(values, "REG WRITE")
+
+    async def write_all() -> None:
+        written: list[str] = []
+        for node, block in blocks.items():
+            written.append(str(node.node))
+            try:
+                await reg_write_block(node, block)
+            except MotorbusError as error:
+                error.add_note(
+                    f"servos {', '.join(written)} may hold a REG WRITE, which the next ACTION would carry out"
+                )
+                raise
+        await action_all(list(blocks))
+
+    await Exclusive(write_all())
+
+
+async def _blocks(values: Mapping[One, Mapping[str, Value]], what: str) -> dict[Node, Block]:
     """The servos, identified, and the block of each."""
-    for orders in values.values():
-        check_values(orders)
     nodes = as_nodes(values)
-    errors = await prepare_all(nodes)
-    if errors:
-        raise next(iter(errors.values()))
-    if what == "SYNC WRITE" and len({frozenset(orders) for orders in values.values()}) > 1:
-        raise RequestError(
-            "SYNC WRITE takes the same registers for every servo", advice="write() them singly"
-        )
-    return nodes, [ram_block(node, orders, what) for node, orders in zip(nodes, values.values(), strict=True)]
+    for error in (await prepare_all(nodes)).values():
+        raise error
+    return {node: ram_block(node, each, what) for node, each in zip(nodes, values.values(), strict=True)}
 
 
-def sync_write_request(nodes: Sequence[Node], blocks: Sequence[Block]) -> Request[None]:
+def sync_write_request(blocks: Mapping[Node, Block]) -> Request[None]:
     """These blocks in one SYNC WRITE. Raises RequestError if they lie at different addresses, or are too many."""
-    places = {(block.address, len(block.data)) for block in blocks}
+    places = {(block.address, len(block.data)) for block in blocks.values()}
     if len(places) > 1:
         raise RequestError(
-            "these registers are not in one place in the maps of these servos",
+            "SYNC WRITE takes registers in one place in the maps of all servos",
             advice="write the servos of each map by themselves",
         )
+    ((address, _),) = places
     return unanswered(
-        protocol.sync_write(
-            blocks[0].address, [(node.node, block.data) for node, block in zip(nodes, blocks, strict=True)]
-        ),
-        max(block.effect for block in blocks),
-        tuple(goal for block in blocks for goal in block.goals),
-        unless=unchanged(nodes),
+        protocol.sync_write(address, [(node.node, block.data) for node, block in blocks.items()]),
+        max(block.effect for block in blocks.values()),
+        tuple(goal for block in blocks.values() for goal in block.goals),
+        unless=unchanged(blocks),
     )
 
 
@@ -327,33 +335,26 @@ class GoalWriter:
     """
 
     def __init__(self, nodes: Sequence[Node]) -> None:
-        rows = [known_row(node, "goal_position") for node in nodes]
+        self._rows: Final = [known_row(node, "goal_position") for node in nodes]
         for node in nodes:
             position_goal(node, 0.0)
         if len(nodes) > protocol.sync_write_capacity(2):
             raise RequestError(f"{len(nodes)} servos are too many for one packet", advice="divide them")
         self._made: Final = [(node, node.settings) for node in nodes]
         self._nodes: Final = nodes
-        self._rows: Final = rows
-        cells = [_cell(node, row) for node, row in zip(nodes, rows, strict=True)]
+        cells = [_cell(node, row) for node, row in zip(nodes, self._rows, strict=True)]
         self._scales, self._lows, self._highs = zip(*cells, strict=True)
         self._pack: Final = Struct("<" + "BH" * len(nodes)).pack
-        self._big: Final = [number for number, row in enumerate(rows) if row.order == "big"]
+        self._big: Final = [number for number, row in enumerate(self._rows) if row.order == "big"]
         self._ids: Final = [node.node for node in nodes]
-        head = bytes((protocol.BROADCAST, 4 + 3 * len(nodes), 0x83, rows[0].address, 2))
+        head = bytes((protocol.BROADCAST, 4 + 3 * len(nodes), 0x83, self._rows[0].address, 2))
         self._head: Final = protocol.HEADER + head
         self._sum: Final = sum(head)
-        self._group: Final = SetpointGroup([node.node for node in nodes], self._setpoints, unchanged(nodes))
+        self._group: Final = SetpointGroup(self._ids, self._setpoints, unchanged(nodes))
 
     def holds(self) -> bool:
         """Whether the settings of all servos are those that it was made by."""
-        return self._outdated() is None
-
-    def _outdated(self) -> Node | None:
-        for node, settings in self._made:
-            if node.settings is not settings or node.is_outdated:
-                return node
-        return None
+        return all(node.known.settings is settings for node, settings in self._made)
 
     def __call__(self, goals: Sequence[float]) -> Request[None]:
         """The packet with these goals (rad), one for each servo; the gate judges the limits.
@@ -384,13 +385,14 @@ class GoalWriter:
 
     def _checked(self, goals: Sequence[float]) -> Request[None]:
         """The packet with a negative goal, or one outside the limits, which the gate judges."""
-        if node := self._outdated():
-            raise outdated(node)
-        blocks = []
+        for node, settings in self._made:
+            if node.known.settings is not settings:
+                raise outdated(node.node)
+        blocks = {}
         for node, row, goal in zip(self._nodes, self._rows, goals, strict=True):
             raw, order = position_goal(node, goal)
-            blocks.append(Block(row.address, row.encode(raw), row.effect, (order,)))
-        return sync_write_request(self._nodes, blocks)
+            blocks[node] = Block(row.address, row.encode(raw), row.effect, (order,))
+        return sync_write_request(blocks)
 
 
 def _cell(node: Node, row: Register) -> tuple[float, int, int]:
@@ -420,19 +422,21 @@ class ServoGroup:
 
     def read(self, *names: str) -> Request[dict[int, dict[str, Value]]]:
         """These registers of all servos that answer, by id and name; they must lie alike in the maps of all."""
-        check_names(names)
-        rows = {node.node: rows_of(_table(node), names) for node in self.servos}
-        (span, *others) = {span._replace(rows=()) for found in rows.values() for span in spans(found)}
-        if others:
+        found = {node.node: list(spans(rows_of(_table(node), names), GAP)) for node in self.servos}
+        places = {(span.address, span.size) for each in found.values() for span in each}
+        if len(places) > 1:
             raise RequestError(f"{', '.join(names)} are not in one place", advice="read fewer registers")
-        address, size, _ = span
+        ((address, size),) = places
         by_id = {node.node: node for node in self.servos}
 
         def decode(answer: Response) -> dict[int, dict[str, Value]]:
             values = {}
             for id, data in _replies(self.servos, answer):
-                raws = decode_span(Span(address, size, tuple(rows[id])), data)
-                values[id] = {row.name: by_id[id].value(row, raws[row.name]) for row in rows[id]}
+                node, (span,) = by_id[id], found[id]
+                raws = span.decode(data)
+                values[id] = {
+                    row.name: node.value(row, raws[row.name]) for row in rows_of(_table(node), names)
+                }
             return values
 
         return sync_request(self.servos, address, size, decode)
@@ -445,17 +449,16 @@ class ServoGroup:
         def make(values: Sequence[Any]) -> Request[None]:
             if len(values) != len(self.servos):
                 raise RequestError(f"{len(values)} values for {len(self.servos)} servos")
-            rows = [(value,) if len(names) == 1 else value for value in values]
-            blocks = [
-                ram_block(node, dict(zip(names, row, strict=True)), "SYNC WRITE")
-                for node, row in zip(self.servos, rows, strict=True)
-            ]
-            return sync_write_request(self.servos, blocks)
+            blocks = {}
+            for node, value in zip(self.servos, values, strict=True):
+                row = (value,) if len(names) == 1 else value
+                blocks[node] = ram_block(node, dict(zip(names, row, strict=True)), "SYNC WRITE")
+            return sync_write_request(blocks)
 
         return make
 
 
-# -- torque, REG WRITE -----------------------------------------------------------------------------------------
+# -- torque off ------------------------------------------------------------------------------------------------
 
 
 def disable_torque_everyone() -> Request[None]:
@@ -499,23 +502,3 @@ async def disable_torque_all(ids: Iterable[int | Node]) -> dict[int, MotorbusErr
 
     await with_cleanup(at_once(), one_by_one)
     return errors
-
-
-async def reg_write_all(values: Mapping[One, Mapping[str, Value]]) -> None:
-    """REG WRITE to each of these, `{id or servo: {name: value}}` in API units, then ACTION for all.
-
-    ACTION is not sent unless all have acknowledged; a note says which hold a REG WRITE then.
-    """
-    nodes, blocks = await _prepared(values, "REG WRITE")
-
-    async def hand_over_all() -> None:
-        for number, (node, block) in enumerate(zip(nodes, blocks, strict=True)):
-            try:
-                await hand_over(node, block)
-            except MotorbusError as error:
-                held = ", ".join(str(one.node) for one in nodes[: number + 1])
-                error.add_note(f"servos {held} may hold a REG WRITE, which the next ACTION would carry out")
-                raise
-        await action_all(nodes)
-
-    await Exclusive(hand_over_all())

@@ -12,25 +12,18 @@ from typing import Final, NamedTuple
 
 from motorbus.core.family import Identity
 from motorbus.core.register import Access, RegisterMap, changed
-from motorbus.core.request import Expected, Priority, Request, TimeoutClass
+from motorbus.core.request import Expected, Request, Response
 from motorbus.core.steps import Sleep
 from motorbus.errors import DeviceError, NoReply, RequestError, WireError
 from motorbus.families.feetech import protocol
 from motorbus.families.feetech.driver.node import IMAGE, Node, Settings, settings_of
-from motorbus.families.feetech.driver.requests import (
-    ACKNOWLEDGED,
-    STORE,
-    Block,
-    acknowledged,
-    read_block,
-)
+from motorbus.families.feetech.driver.requests import STORE, read_block
 from motorbus.families.feetech.models import Choice, choose, model_number
 from motorbus.families.feetech.registers import STS, TABLES
 
 ALONE: Final = 12  # reads that show two servos with one id; 4 of 10 short reads were garbled (servolab)
-SILENCE: Final = (
-    1.0  # s without a reply after which settings are read again: another servo may be there by now
-)
+SILENCE: Final = 1.0
+"""s without a reply after which settings are read again: another servo may be there by now."""
 COMMON: Final = frozenset(
     (
         *("firmware_major", "firmware_minor", "byte_order", "model_major", "model_minor", "id", "baud_rate"),
@@ -55,24 +48,16 @@ class ScanWarning(NamedTuple):
 
 async def ping(node: Node) -> bool:
     """Whether it answers. Raises WireError for bytes that are no reply."""
+
+    def decode(answer: Response) -> None:
+        node.note_reply(answer.replies[0].data[4], answer.at)
+
+    expected = Expected(node.node, node.node, protocol.OVERHEAD)
     try:
-        await ping_request(node)
+        await Request(protocol.ping(node.node), (expected,), decode, repeatable=True)
     except NoReply:
         return False
     return True
-
-
-def ping_request(node: Node, *, scanning: bool = False) -> Request[None]:
-    """PING; silence raises NoReply. `scanning`: with a short time-out."""
-    request = acknowledged(node, protocol.ping(node.node), Block(0, b""))
-    return Request(
-        request.wire,
-        (Expected(node.node, node.node, ACKNOWLEDGED),),  # PING is answered at every status return level
-        request.decode,
-        priority=Priority.CONFIGURATION if scanning else Priority.POLL,
-        reply_within=TimeoutClass.SCAN if scanning else TimeoutClass.REPLY,
-        repeatable=True,
-    )
 
 
 def identify(node: Node) -> Request[Identity]:
@@ -81,12 +66,9 @@ def identify(node: Node) -> Request[Identity]:
 
 
 async def known(node: Node) -> RegisterMap:
-    """Its register map; it is read unless its settings are known and it has answered in the last second.
-
-    It is read as well where another object has written settings at its id.
-    """
-    silent = await Sleep(0) - node.at > SILENCE
-    if node.table is None or node.settings is None or node.is_outdated or silent:
+    """Its register map; it is read unless its settings are known and it has answered in the last second."""
+    silent = await Sleep(0) - node.known.at > SILENCE
+    if node.table is None or node.settings is None or silent:
         await identify(node)
     assert node.table is not None
     return node.table
@@ -114,20 +96,19 @@ def check_map(node: Node) -> None:
 def learn(node: Node, image: bytes) -> Identity:
     """Take registers 0 to 39 of this servo."""
     chosen = choose((image[0], image[1]), (image[3], image[4]), image[2])
+    found = node.known
     if chosen.table:
-        node.table = TABLES[chosen.table]
+        found.table = TABLES[chosen.table]
         arc = node.facts.arcs.get(node.node, chosen.model.arc if chosen.model else None)
-        settings = settings_of(node.table, image, arc)
+        settings = settings_of(found.table, image, arc)
     else:
-        node.table = common_table(chosen.order)
-        settings = Settings(answers_writes=image[STS["status_return_level"].address] != 0)
-    node.facts.maps[node.node] = chosen.table
-    node.facts.second_ids.pop(node.node, None)
-    if "second_id" in node.table:
-        node.facts.second_ids[node.node] = image[node.table["second_id"].address]
-    node.identity = _identity(node, chosen, image, settings)
-    node.learn_settings(settings)
-    return node.identity
+        found.table = common_table(chosen.order)
+        settings = Settings()
+    if "second_id" in found.table:
+        found.second_id = image[found.table["second_id"].address]
+    found.identity = _identity(node, chosen, image, settings)
+    found.learn(settings)
+    return found.identity
 
 
 def _identity(node: Node, chosen: Choice, image: bytes, settings: Settings) -> Identity:

@@ -4,40 +4,23 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from motorbus.core.family import Found, State
-from motorbus.core.register import is_number, shown
-from motorbus.core.request import Effect, Priority
+from motorbus.core.family import Found
 from motorbus.core.scan import BitrateRestored
 from motorbus.core.steps import Exclusive, SetBitrate, Sleep, catch
-from motorbus.errors import (
-    DeviceError,
-    MotorbusError,
-    NoReply,
-    OutcomeUnknown,
-    VerificationFailed,
-    WireError,
-)
+from motorbus.errors import DeviceError, MotorbusError, NoReply, OutcomeUnknown, VerificationFailed, WireError
 from motorbus.families.feetech import protocol
 from motorbus.families.feetech.driver import feedback
 from motorbus.families.feetech.driver.diagnosis import alarms
 from motorbus.families.feetech.driver.identity import identify, ping, read_settings, writable
 from motorbus.families.feetech.driver.motion import disable_torque, enable_torque
 from motorbus.families.feetech.driver.node import Node
-from motorbus.families.feetech.driver.requests import (
-    DOUBTS,
-    PRESENT,
-    STORE,
-    Block,
-    acknowledged,
-    read_block,
-)
+from motorbus.families.feetech.driver.requests import PRESENT, STORE, instruct, read_block
 from motorbus.families.feetech.registers.codes import BAUD_CODES
 
 DEAF: Final = 1.1  # s without a reply after a factory restore (servolab)
 SHIPPED_ID: Final = 1
 TRIPS: Final = frozenset(("overload", "current"))  # alarms that outlast their cause
-LONGEST: Final = 3600.0  # s of rest
-
+REST: Final = 1.0  # s without torque after which an overload is forgotten # assumption
 
 # -- factory restore -------------------------------------------------------------------------------------------
 
@@ -55,7 +38,7 @@ async def factory_restore(node: Node) -> Found:
     try:
         return await Exclusive(_restore(node, shipped))
     finally:
-        node.forget_settings()
+        node.known.forget(written=True)
 
 
 async def _restore(node: Node, shipped: tuple[int, ...]) -> Found:
@@ -66,18 +49,14 @@ async def _restore(node: Node, shipped: tuple[int, ...]) -> Found:
         free = [place for place in places if place == own or not await _answers(*place)]
         await SetBitrate(before.rate)
         await disable_torque(node)
-        block = Block(0, b"", Effect.PERSISTENT, repeatable=False)
-        wire = protocol.factory_restore(node.node)
-        doubt = await catch(acknowledged(node, wire, block, priority=Priority.CONFIGURATION, timeout=STORE))
-        if isinstance(doubt, MotorbusError) and not isinstance(doubt, DOUBTS):
-            raise doubt
+        doubt = await instruct(node, protocol.factory_restore(node.node), repeatable=False)
         await Sleep(DEAF)
         place = next(iter([place for place in free if await _answers(*place)]), None)
         if place is None:
             what = f"node {node.node} does not answer after its factory values were restored"
             cause = "it has the id or rate of another servo now, or takes longer to start"
             raise NoReply(what, cause=cause, advice="scan all ids at all rates", node=node.node)
-        if isinstance(doubt, MotorbusError) and place == own:
+        if doubt is not None and place == own:
             what = f"node {node.node} has not acknowledged the order to restore its factory values"
             cause = "its model lacks this order, or the acknowledgement was lost"
             fix = "read a register that you had changed"
@@ -111,25 +90,19 @@ async def clear_turns(node: Node) -> float:
 
 
 async def _clear_turns(node: Node) -> float:
-    assert node.table is not None
-    row, turn = node.table["present_position"], node.traits.turn
+    row, turn = node.row("present_position"), node.traits.turn
     before = await read_block(node, PRESENT, row.size, row.decode)
     await disable_torque(node)
-    block, wire = Block(0, b"", Effect.PERSISTENT), protocol.clear_turns(node.node)
-    doubt = await catch(acknowledged(node, wire, block, priority=Priority.CONFIGURATION, timeout=STORE))
-    if isinstance(doubt, MotorbusError) and not isinstance(doubt, DOUBTS):
-        raise doubt
+    doubt = await instruct(node, protocol.clear_turns(node.node))
     here = await read_block(node, PRESENT, row.size, row.decode, timeout=STORE)
-    if isinstance(doubt, MotorbusError) and not (0 <= here < turn and not 0 <= before < turn):
-        raise DeviceError(
-            f"node {node.node} answers, but not to the order to forget its turns (0x0A)",
-            cause="its firmware lacks it, as that of an STS3215 does",
-            advice="a power cycle forgets the turns; it is limp now",
-            node=node.node,
-        ) from doubt
-    if not 0 <= here < turn:
-        what = f"node {node.node} still tells the raw position {here}; it is limp now"
-        fix = "a power cycle forgets the turns"
+    cleared = 0 <= here < turn
+    fix = "a power cycle forgets the turns; it is limp now"
+    if doubt is not None and (not cleared or 0 <= before < turn):
+        what = f"node {node.node} answers, but not to the order to forget its turns (0x0A)"
+        cause = "its firmware lacks it, as that of an STS3215 does"
+        raise DeviceError(what, cause=cause, advice=fix, node=node.node) from doubt
+    if not cleared:
+        what = f"node {node.node} still tells the raw position {here}"
         raise VerificationFailed(what, expected=f"0 to {turn - 1}", advice=fix, node=node.node)
     return float(node.value(row, here))
 
@@ -144,19 +117,17 @@ class Recovery(NamedTuple):
     remaining: tuple[str, ...]
 
 
-async def recover_overload(node: Node, *, rest: float = 1.0) -> Recovery:
-    """Clear a tripped overload or over-current alarm: limp for `rest` s, then it holds where it stands.
+async def recover_overload(node: Node) -> Recovery:
+    """Clear a tripped overload or over-current alarm: limp for 1 s, then it holds where it stands.
 
     An arm sags meanwhile. Raises DeviceError, with the servo limp, if the alarm stays: then only a power cycle helps
     (open-edge-platform/physical-ai-studio#955). Source: STS3215 memory table V3.6, registers 34 to 36.
     """
-    if not (is_number(rest) and 0 <= rest <= LONGEST):
-        raise node.refusal(f"cannot rest for {shown(rest)}", expected=f"0 to {LONGEST:.0f} s")
     await writable(node)
     tripped = await _tripped(node)
     if tripped:
         await disable_torque(node)
-        await Sleep(rest)
+        await Sleep(REST)
         try:
             await enable_torque(node)
             if await _tripped(node):
@@ -175,5 +146,5 @@ async def recover_overload(node: Node, *, rest: float = 1.0) -> Recovery:
 
 
 async def _tripped(node: Node) -> tuple[str, ...]:
-    state: State = await feedback.telemetry(node)
+    state = await feedback.telemetry(node)
     return tuple(name for name in state.alarm if name in TRIPS)

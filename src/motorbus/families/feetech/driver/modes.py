@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 from math import remainder
 
 from motorbus.core.family import State
-from motorbus.core.register import RegisterMap, is_number, shown
+from motorbus.core.move import PERIOD
+from motorbus.core.register import Register, RegisterMap, is_number, shown
 from motorbus.core.request import Effect
 from motorbus.core.setpoint import Setpoint
 from motorbus.core.steps import Sleep, with_cleanup
@@ -48,47 +49,44 @@ async def set_mode(node: Node, mode: Mode | str, *, limits: tuple[float, float] 
     that leaves current mode gets its protection current as bound. Raises RequestError for a mode or limits that its map
     lacks, and errors of `store`.
     """
-    wanted = _checked_mode(mode)
+    try:
+        wanted = Mode(mode)
+    except ValueError:
+        modes = ", ".join(one.value for one in Mode)
+        raise RequestError(f"{mode!r} is no mode", expected=modes) from None
     table = await read_settings(node)
-    if wanted not in node.traits.has:
-        has = " or ".join(one.value for one in node.traits.has)
+    traits, settings = node.traits, node.settings
+    if wanted not in traits.has:
+        has = " or ".join(one.value for one in traits.has)
         raise node.refusal(f"has no {wanted.value} mode", expected=has)
-    by_code = "operating_mode" in table
-    blocks = [_by_code(node, table, wanted, limits) if by_code else _by_limits(node, table, wanted, limits)]
-    if node.traits.current and wanted is not Mode.CURRENT and node.known_mode in (Mode.CURRENT, None):
-        row, protection = table[node.traits.current], node.settings.protection_current if node.settings else 0
-        blocks.append(
-            Block(row.address, row.encode(protection))
-        )  # else its last current bounds the next mode
+    code = traits.code(wanted)
+    if code is None:
+        blocks = [_by_limits(node, table, wanted, limits)]
+    elif limits is not None:
+        raise node.refusal("has an operating mode, which limits do not change", "leave limits out")
+    else:
+        blocks = [_block(table["operating_mode"], code)]
+    if traits.current and wanted is not Mode.CURRENT and node.known_mode in (Mode.CURRENT, None):
+        protection = settings.protection_current if settings else 0
+        blocks.append(_block(table[traits.current], protection))  # else its last current bounds the next mode
     if not await store(node, table, blocks):
         await disable_torque(node)
     await read_settings(node)
-    if wanted in (Mode.VELOCITY, Mode.PWM, Mode.CURRENT):
-        await ordered(node, goals.rest_block(node, wanted))
+    if wanted in goals.QUANTITY:
+        await ordered(node, goals.rest_block(node))
 
 
-def _checked_mode(mode: Mode | str) -> Mode:
-    try:
-        return Mode(mode)
-    except ValueError:
-        raise RequestError(f"{mode!r} is no mode", expected=", ".join(one.value for one in Mode)) from None
-
-
-def _by_code(node: Node, table: RegisterMap, wanted: Mode, limits: tuple[float, float] | None) -> Block:
-    if limits is not None:
-        raise node.refusal("has an operating mode, which limits do not change", "leave limits out")
-    code = node.traits.code(wanted)
-    assert code is not None
-    row = table["operating_mode"]
-    return Block(row.address, row.encode(code))
+def _block(row: Register, raw: int, goal: Setpoint | None = None) -> Block:
+    return Block(row.address, row.encode(raw), row.effect, (goal,) if goal else ())
 
 
 def _by_limits(node: Node, table: RegisterMap, wanted: Mode, limits: tuple[float, float] | None) -> Block:
-    """Both limits 0 for a motor; else limits, which only the caller or this object knows."""
+    """Both limits 0 for a motor; else limits, which only the caller or this bus object knows."""
+    known = node.known
     if wanted is Mode.PWM:
-        node.former_limits = node.limits or node.former_limits
+        known.former_limits = node.limits or known.former_limits
         return limits_block(table, (0, 0))
-    wished = limits or node.limits or node.former_limits
+    wished = limits or node.limits or known.former_limits
     if wished is None:
         raise node.refusal("needs limits for position mode", "give limits=(low, high) in rad")
     return limits_block(table, raw_limits(node, table, wished))
@@ -114,27 +112,22 @@ def limits_block(table: RegisterMap, raws: Sequence[int]) -> Block:
 # -- orders ----------------------------------------------------------------------------------------------------
 
 
-async def set_velocity(
-    node: Node, velocity: float, *, acceleration: float | None = None, current: float | None = None
-) -> None:
+async def set_velocity(node: Node, velocity: float, *, acceleration: float | None = None) -> None:
     """Turn at `velocity` rad/s, whose sign is the direction; 0 stands still. In velocity mode.
 
-    `acceleration` (rad/s²) and, on HLS, the bound of the current (A) stay as they are when left out. Raises
-    RequestError in another mode and for what no register takes (SMCL: no negative velocity).
+    `acceleration` (rad/s²) stays as it is when left out. Raises RequestError in another mode and for what no register
+    takes (SMCL: no negative velocity).
     """
     _check_number(node, velocity, "velocity in rad/s")
     await writable(node)
     goals.check_mode(node, Mode.VELOCITY)
-    if current is not None:
-        goals.bound_bytes(node, current)  # raises before anything is read
-    await read_bound(node, current)
+    await read_bound(node)
     row = node.row("goal_velocity")
     raw = node.raw(row, velocity)
-    low, high = (float(node.value(row, bound)) for bound in (row.low, row.high))
-    goal = Setpoint(node.node, "velocity", float(node.value(row, raw)), low, high)
-    block = Block(row.address, row.encode(raw), row.effect, (goal,))
-    if current is not None or not node.bound:
-        block = goals.with_bound(node, block, current)
+    block = _block(row, raw, goals.speed_setpoint(node, raw))
+    if node.traits.current and not node.known.bound:
+        bound = goals.bound_bytes(node)  # the register before it
+        block = block._replace(address=block.address - len(bound), data=bound + block.data)
     if acceleration is not None:
         ramp = goals.ramp_bytes(node, acceleration)
         await confirmed(node, Block(node.row("goal_position").address - len(ramp), ramp))
@@ -154,10 +147,9 @@ async def set_duty(node: Node, duty: float) -> None:
     if not node.traits.duty:
         raise goals.no_duty(node)
     goals.check_mode(node, Mode.PWM)
-    row = node.row(node.traits.duty)
     raw = round(duty / goals.DUTY)
     goal = Setpoint(node.node, "load", raw * goals.DUTY, -1.0, 1.0)
-    await ordered(node, Block(row.address, row.encode(raw), row.effect, (goal,)))
+    await ordered(node, _block(node.row(node.traits.duty), raw, goal))
 
 
 async def set_current(node: Node, current: float) -> None:
@@ -174,8 +166,7 @@ async def set_current(node: Node, current: float) -> None:
     if not row.low <= raw <= row.high:
         what = f"node {node.node} cannot push with {current} A"
         raise LimitExceeded(what, expected=f"{low:.4g} to {high:.4g} A", node=node.node)
-    goal = Setpoint(node.node, "current", float(row.to_value(raw)), low, high)
-    await ordered(node, Block(row.address, row.encode(raw), row.effect, (goal,)))
+    await ordered(node, _block(row, raw, Setpoint(node.node, "current", float(row.to_value(raw)), low, high)))
 
 
 async def jog(node: Node, velocity: float, seconds: float) -> None:
@@ -192,21 +183,23 @@ async def jog(node: Node, velocity: float, seconds: float) -> None:
 
 @dataclass
 class _Step(Motion):
-    """A move by an angle, followed over the end of a turn."""
+    """A move of one servo by an angle, followed over the end of a turn."""
 
     by: float = 0.0
-    here: dict[int, float] = field(default_factory=dict)
+    here: float = field(default=0.0, init=False)
 
     async def check(self, device: Node, to: float) -> Setpoint:
-        block = goals.step_block(device, to, self.velocity, self.acceleration)
-        start = await feedback.position(device)
-        self.here[device.node] = start
-        self.by = to
-        return Setpoint(device.node, "position", start + block.goals[0].value)
+        goal = goals.step_block(device, self.by, self.velocity, self.acceleration).goals[0]
+        self.here = await feedback.position(device)
+        return Setpoint(device.node, "position", self.here + goal.value)
 
     async def send(self, device: Node, goal: Setpoint) -> None:
-        await send_step(device, goals.step_block(device, self.by, self.velocity, self.acceleration))
-        await Sleep(0.02)  # a goal whole turns away looks like this place until it moves
+        """Send the step; before it torque on, which moves nothing here, where a goal does not switch it on."""
+        block = goals.step_block(device, self.by, self.velocity, self.acceleration)
+        if not device.traits.goal_switches_on:
+            await confirmed(device, Block(TORQUE_ENABLE, ON, Effect.TORQUE))
+        await confirmed(device, block)
+        await Sleep(PERIOD)  # a goal whole turns away looks like this place until it moves
 
     async def stop(self, device: Node) -> Promise:
         await disable_torque(device)
@@ -214,12 +207,11 @@ class _Step(Motion):
 
     async def sample(self, device: Node) -> State:
         state = await feedback.telemetry(device)
-        settings, last = device.settings, self.here[device.node]
-        assert state.position is not None
-        here = state.position
+        settings, here = device.settings, state.position
+        assert here is not None
         if settings is not None and not settings.tells_turns:
-            here = last + remainder(here - last, settings.turn * count_of(device))
-        self.here[device.node] = here
+            here = self.here + remainder(here - self.here, settings.turn * count_of(device))
+        self.here = here
         return state._replace(position=here)
 
 
@@ -242,22 +234,12 @@ async def step(
         raise LimitExceeded(f"node {node.node}: {shown(by)} is no angle", node=node.node)
     await writable(node)
     goals.check_mode(node, Mode.STEP)
-    if wait:
-        logic = _Step(velocity, acceleration)
-        try:
-            await move_all(logic, {node: by}, tolerance=tolerance, timeout=timeout)
-        except MotionError as error:
-            error.advice = error.advice.replace("stop()", "disable_torque()")
-            raise
-    else:
-        await send_step(node, goals.step_block(node, by, velocity, acceleration))
-
-
-async def send_step(node: Node, block: Block) -> None:
-    """Send a step; before it torque on, which moves nothing in step mode, where a goal does not switch it on."""
-    if not node.traits.goal_switches_on:
-        await confirmed(node, Block(TORQUE_ENABLE, ON, Effect.TORQUE))
-    await confirmed(node, block)
+    logic = _Step(velocity, acceleration, by=by)
+    try:
+        await move_all(logic, {node: by}, wait=wait, tolerance=tolerance, timeout=timeout)
+    except MotionError as error:
+        error.advice = error.advice.replace("stop()", "disable_torque()")
+        raise
 
 
 def _check_number(node: Node, value: float, what: str) -> None:

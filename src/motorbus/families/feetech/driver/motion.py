@@ -9,9 +9,8 @@ servolab, measured on hardware.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
-from math import remainder
 from typing import Any, Final
 
 from motorbus.core import move as core_move
@@ -19,18 +18,11 @@ from motorbus.core.family import State
 from motorbus.core.register import Register, RegisterMap, is_number, shown
 from motorbus.core.request import Effect, Precondition, Priority
 from motorbus.core.setpoint import Setpoint, torque_off, torque_on
-from motorbus.core.steps import Procedure, Sleep, catch
-from motorbus.errors import (
-    LimitExceeded,
-    MotionError,
-    MotorbusError,
-    RequestError,
-    Stalled,
-    VerificationFailed,
-)
+from motorbus.core.steps import Procedure, Runnable, catch
+from motorbus.errors import LimitExceeded, MotionError, MotorbusError, Stalled
 from motorbus.families.feetech.driver import diagnosis, feedback, goals
 from motorbus.families.feetech.driver.identity import known, read_settings, writable
-from motorbus.families.feetech.driver.node import MANY_TURNS, Node, Settings
+from motorbus.families.feetech.driver.node import MANY_TURNS, Node
 from motorbus.families.feetech.driver.requests import (
     DOUBTS,
     ON,
@@ -50,7 +42,6 @@ TOLERANCE: Final = 0.05
 """rad. Under a load of 1.5 kg at 10 cm an STS3215 stays 20 to 30 counts off its goal (user reports)."""
 COUNTS: Final = 10  # counts of a coarse servo within which it is in position
 UNHURRIED: Final = 2.0  # rad/s that every servo reaches; the default timeout is computed with it # assumption
-COMMANDS: Final = 8  # bytes of registers 40 to 47: torque switch to goal velocity
 LIMP: Final = Block(TORQUE_ENABLE, b"\0", Effect.TORQUE)
 TRIES: Final = 3
 
@@ -89,107 +80,48 @@ async def disable_torque(node: Node) -> None:
 
     Raises OutcomeUnknown if nothing is answered, VerificationFailed if the torque is still on.
     """
-    node.facts.epochs[node.node] += 1
+    node.known.epoch += 1
     doubt: MotorbusError | None = None
     for _ in range(TRIES):
-        request = write_block(node, limp(node), priority=Priority.STOP)
         try:
-            await request
-            if not request.expected:
-                await verified(node, LIMP)
+            await write_block(node, limp(node), priority=Priority.STOP)
             return
-        except (*DOUBTS, VerificationFailed) as error:
+        except DOUBTS as error:
             doubt = error
-    if isinstance(doubt, VerificationFailed):
-        raise doubt
     await verified(node, LIMP, doubt)
 
 
-async def enable_torque(node: Node, *, jump: float = 0.0) -> None:
+async def enable_torque(node: Node) -> None:
     """Torque on without a jump: the goal becomes the present position; velocity, duty or current 0 in their modes.
 
-    A servo that was turned beyond its limits by hand would move to the nearer one: LimitExceeded unless that is at most
-    `jump` rad away. Raises RequestError where no order is known that would not move it (PWM mode of HLS, an unknown
-    mode, SMCL without limits, many turns with a position within one); MotionError if its torque is off again at once or
-    it has forgotten its turns.
+    A servo that was turned beyond its limits by hand would move to the nearer one: LimitExceeded. Raises RequestError
+    where no order is known that would not move it (PWM mode of HLS, an unknown mode, SMCL without limits, many turns
+    with a position within one); MotionError if its torque is off again at once or it has forgotten its turns.
     """
-    await torque_on_unless(node, None, jump=jump)
+    await enable_torque_unless(node, None)
 
 
-async def torque_on_unless(node: Node, unless: Precondition | None, *, jump: float = 0.0) -> None:
+async def enable_torque_unless(node: Node, unless: Precondition | None) -> None:
     """`enable_torque`, with a reason not to send the packet that switches torque on."""
-    if not (is_number(jump) and jump >= 0):
-        raise node.refusal(f"cannot jump by {shown(jump)}", expected="a number of rad from 0 on")
     await read_settings(node)
-    mode = goals.checked_mode(node)
+    mode, settings = goals.checked_mode(node), node.settings
     if mode is Mode.STEP:  # torque alone moves nothing there
         block = Block(TORQUE_ENABLE, ON, Effect.TORQUE, (torque_on(node.node),))
-    elif mode is Mode.POSITION:
-        block = await _hold_with_torque(node, jump)
     else:
-        block = goals.rest_block(node)
-        if mode is Mode.VELOCITY:
-            settings = node.settings
-            await read_bound(node)
-            _check_same(node, settings)
-            block = goals.with_bound(node, block)
-        block = goals.with_torque(block, await _read_commands(node))
+        found = await read_block(node, TORQUE_ENABLE, goals.COMMANDS, bytes)
+        block = await _hold_here(node) if mode is Mode.POSITION else goals.rest_block(node)
+        if mode is Mode.POSITION:
+            check_inside(node, block)
+        if node.settings is not settings:
+            raise outdated(node.node)
+        block = goals.with_torque(node, block, found)
     await ordered(node, block._replace(unless=unless))
     if mode is Mode.POSITION:
-        await _check_turn(node, block, jump)
+        await _check_turn(node, block)
     await check_torque(node)
 
 
-async def _hold_with_torque(node: Node, jump: float) -> Block:
-    """Torque on and goal := the present position, or the near limit; with the bound of the current.
-
-    A goal velocity of 0 that means standstill becomes the maximum, or goals alone would move nothing.
-    """
-    limits, settings = goals.checked_limits(node), node.settings
-    await read_bound(node)
-    found = await _read_commands(node)
-    raw = await _read_position(node, settings)
-    _check_turn_is_known(node, raw, jump)
-    there = _within_limits(node, raw, jump)
-    block = goals.hold_block(node, there)
-    if there != raw:  # it moves, so the gate judges it as any other goal
-        block = block._replace(goals=(block.goals[0]._replace(low=limits[0], high=limits[1], stays=None),))
-    speed = node.row("goal_velocity")
-    at = speed.address - TORQUE_ENABLE
-    stands = node.settings is not None and not node.settings.zero_is_maximum
-    if stands and speed.decode(found[at : at + speed.size]) == 0:
-        return goals.with_torque(
-            block._replace(data=block.data + goals.behind_goal(node, goals.raw_speed(node, None))), found
-        )
-    return goals.with_torque(goals.with_bound(node, block), found)
-
-
-def _within_limits(node: Node, raw: int, jump: float) -> int:
-    row = node.row("goal_position")
-    here = node.value(row, raw)
-    low, high = goals.checked_limits(node)
-    there = min(max(here, low), high)
-    if abs(here - there) <= jump + row.scale / 2:
-        return node.raw(row, there)
-    what = f"node {node.node} stands at {here:.4g} rad, outside its limits {low:.4g} to {high:.4g} rad"
-    fix = f"turn it inside by hand, or enable_torque(jump={abs(here - there) + 0.001:.3f})"
-    raise LimitExceeded(f"{what}: it would jump to {there:.4g} rad", advice=fix, node=node.node)
-
-
-def _check_turn_is_known(node: Node, raw: int, jump: float = 0.0) -> None:
-    """Raise RequestError if goals count over many turns and this position within one: "here" may be turns away."""
-    settings = node.settings
-    assert settings is not None
-    if settings.tells_turns or not settings.many_turns or not 0 <= raw < settings.turn:
-        return
-    if jump < goals.checked_limits(node)[1]:
-        raise node.refusal(
-            "counts its goals over many turns and its position within one, so 'here' may be turns away",
-            "set_multi_turn(True), or move() to a goal you know, or disable_torque()",
-        )
-
-
-async def _check_turn(node: Node, block: Block, jump: float = 0.0) -> None:
+async def _check_turn(node: Node, block: Block) -> None:
     """See that a servo that counts turns is still on the turn where this order holds it.
 
     It forgets its turns with its supply, and is then on its way over many. Torque goes off, and MotionError is raised.
@@ -197,9 +129,9 @@ async def _check_turn(node: Node, block: Block, jump: float = 0.0) -> None:
     settings = node.settings
     if settings is None or not settings.tells_turns:
         return
-    far = abs(float(node.value(node.row("goal_position"), settings.turn // 2))) + jump
+    half_turn = abs(float(node.value(node.row("goal_position"), settings.turn // 2)))
     goal = block.goals[0].value
-    if abs(await feedback.position(node) - goal) > far:
+    if abs(await feedback.position(node) - goal) > half_turn:
         await disable_torque(node)
         raise MotionError(
             f"node {node.node} has forgotten its turns while it was to stay at {goal:.4g} rad",
@@ -229,40 +161,25 @@ async def check_torque(node: Node) -> None:
 
 async def ordered(node: Node, block: Block) -> None:
     """Write an order and be sure of it; a bound of the current in it is known from then on."""
-    row = node.row(node.traits.current) if node.traits.current else None
-    at = -1 if row is None else row.address - block.address
-    has_bound = 0 <= at < len(block.data)
-    if has_bound:
-        node.bound = None
+    node.known.bound, bound = None, node.known.bound
     await confirmed(node, block)
-    if row is not None and has_bound:
-        node.bound = row.decode(block.data[at : at + row.size])
-        node.has_force = node.bound != 0
+    node.known.bound = bound_in(node, block, bound)
+
+
+def bound_in(node: Node, block: Block, other: int | None) -> int | None:
+    """The goal torque of an HLS in this block; `other` if there is none."""
+    if not node.traits.current:
+        return None
+    row = node.row(node.traits.current)
+    at = row.address - block.address
+    return row.decode(block.data[at : at + row.size]) if 0 <= at < len(block.data) else other
 
 
 async def read_bound(node: Node, current: float | None = None) -> None:
     """Read the goal torque of an HLS unless it is known or `current` sets it."""
-    if node.traits.current and node.bound is None and current is None:
+    if node.traits.current and node.known.bound is None and current is None:
         row = node.row(node.traits.current)
-        node.bound = await read_block(node, row.address, row.size, row.decode)
-        node.has_force = node.bound != 0
-
-
-async def _read_commands(node: Node) -> bytes:
-    return await read_block(node, TORQUE_ENABLE, COMMANDS, bytes)
-
-
-async def _read_position(node: Node, settings: Settings | None) -> int:
-    """Raw present position. Raises RequestError if another task has changed these settings."""
-    row = node.row("present_position")
-    raw = await read_block(node, PRESENT, row.size, row.decode)
-    _check_same(node, settings)
-    return raw
-
-
-def _check_same(node: Node, settings: Settings | None) -> None:
-    if node.settings is not settings:
-        raise outdated(node)
+        node.known.bound = await read_block(node, row.address, row.size, row.decode)
 
 
 # -- stop ------------------------------------------------------------------------------------------------------
@@ -275,46 +192,46 @@ async def stop(node: Node) -> Promise:
     (`LIMP`); one with torque there is on its way to the nearer limit (`OUTSIDE_ACCEPTED`). Raises RequestError where
     only torque off ends a movement: step mode, PWM mode of HLS, an unknown mode, and where `enable_torque` raises it.
     """
-    node.facts.epochs[node.node] += 1
+    node.known.epoch += 1
     await read_settings(node)
-    for attempt in range(TRIES):
-        try:
-            return await _stop(node)
-        except VerificationFailed:  # a lost packet at status return level 0
-            if attempt == TRIES - 1:
-                raise
-    raise AssertionError
-
-
-async def _stop(node: Node) -> Promise:
     mode = goals.checked_mode(node)
     if mode is Mode.STEP:
         raise node.refusal("is in step mode, where no goal means 'stay'", "use disable_torque()")
     if mode is not Mode.POSITION:
         await ordered(node, goals.rest_block(node))
         return _AT_REST[mode]
-    here = await catch(_hold_here(node))
-    inside = isinstance(here, Block) and not _is_outside(node, here)
-    if not inside and isinstance(here, Block | RequestError) and await is_limp(node):
+    block = await _hold_here(node)
+    outside = _is_outside(node, block)
+    if outside and await is_limp(node):
         return Promise.LIMP
-    if isinstance(here, MotorbusError):
-        raise here
-    await ordered(node, here)
-    await _check_turn(node, here)
-    return Promise.HOLD_ACCEPTED if inside else Promise.OUTSIDE_ACCEPTED
+    await ordered(node, block)
+    await _check_turn(node, block)
+    return Promise.OUTSIDE_ACCEPTED if outside else Promise.HOLD_ACCEPTED
 
 
 async def _hold_here(node: Node) -> Block:
     goals.checked_limits(node)
-    raw = await _read_position(node, node.settings)
-    _check_turn_is_known(node, raw)
+    settings, row = node.settings, node.row("present_position")
+    raw = await read_block(node, PRESENT, row.size, row.decode)
+    if node.settings is not settings:
+        raise outdated(node.node)
     return goals.hold_block(node, raw)
 
 
 def _is_outside(node: Node, block: Block) -> bool:
     low, high = goals.checked_limits(node)
-    here, slack = block.goals[0].value, node.row("goal_position").scale / 2
-    return not low - slack <= here <= high + slack
+    slack = node.row("goal_position").scale / 2
+    return not low - slack <= block.goals[0].value <= high + slack
+
+
+def check_inside(node: Node, block: Block) -> None:
+    """Raise LimitExceeded if this order holds a servo outside its limits: it would move to the nearer one."""
+    if _is_outside(node, block):
+        low, high = goals.checked_limits(node)
+        what = f"node {node.node} stands at {block.goals[0].value:.4g} rad, outside its limits"
+        fix = "disable_torque(), then turn it inside by hand"
+        what += f" {low:.4g} to {high:.4g} rad: it would jump to the nearer one"
+        raise LimitExceeded(what, advice=fix, node=node.node)
 
 
 async def _stop_move(node: Node) -> Promise | None:
@@ -329,36 +246,24 @@ async def _stop_move(node: Node) -> Promise | None:
 
 @dataclass
 class Motion(core_move.MoveLogic[Node]):
-    """How a servo moves: at most at `velocity` (rad/s) and `acceleration` (rad/s²), with at most `current` (A).
-
-    Where a position lies within one turn and goals do not, places are compared within a turn.
-    """
+    """How a servo moves: at most at `velocity` (rad/s) and `acceleration` (rad/s²), with at most `current` (A)."""
 
     velocity: float | None = None
     acceleration: float | None = None
     current: float | None = None
-    ends: dict[int, float] = field(default_factory=dict)
 
     async def check(self, device: Node, to: float) -> Setpoint:
         await writable(device)
         await read_bound(device, self.current)
-        goal = self._block(device, to).goals[0]
-        self.ends[device.node] = goal.value
-        return goal
+        return self._block(device, to).goals[0]
 
     async def send(self, device: Node, goal: Setpoint) -> None:
         await ordered(device, self._block(device, goal.value))
         if not device.traits.goal_switches_on:
             await check_torque(device)
-        if self._turn(device):
-            await Sleep(core_move.PERIOD)  # a goal whole turns away looks like this place until it moves
 
-    async def sample(self, device: Node) -> State:
-        state = await feedback.telemetry(device)
-        turn, goal = self._turn(device), self.ends[device.node]
-        if turn and state.position is not None:
-            return state._replace(position=goal + remainder(state.position - goal, turn))
-        return state
+    def sample(self, device: Node) -> Runnable[State]:
+        return feedback.telemetry(device)
 
     def tolerance_of(self, device: Node) -> float:
         return max(TOLERANCE, COUNTS * count_of(device))
@@ -378,13 +283,6 @@ class Motion(core_move.MoveLogic[Node]):
 
     def _block(self, node: Node, to: float) -> Block:
         return goals.motion_block(node, to, self.velocity, self.acceleration, self.current)
-
-    def _turn(self, node: Node) -> float:
-        """rad after which a position starts at 0 again, where goals do not; else 0."""
-        settings = node.settings
-        if settings is None or settings.tells_turns or not settings.many_turns:
-            return 0.0
-        return settings.turn * count_of(node)
 
 
 def count_of(node: Node) -> float:
@@ -468,9 +366,7 @@ async def calm_without_force(node: Node, bound: Register) -> None:
         await ordered(node, goals.rest_block(node))
         return
     block = await _hold_here(node)
-    if _is_outside(node, block):
-        what = f"node {node.node} stands outside its limits and would move to the nearer one"
-        raise LimitExceeded(what, advice="disable_torque(), then enable_torque(jump=…)", node=node.node)
+    check_inside(node, block)
     await ordered(node, block)
 
 
@@ -482,7 +378,7 @@ async def cap_current(node: Node, current: float) -> None:
     """
     await read_settings(node)
     data = goals.bound_bytes(node, current)
-    if node.known_mode not in (Mode.POSITION, Mode.VELOCITY):
+    if node.known_mode not in goals.BOUNDED:
         what = f"is in operating mode {goals.shown_mode(node)}, where its goal torque bounds nothing"
         raise node.refusal(what, "set_mode('position')")
     row = node.row(node.traits.current)

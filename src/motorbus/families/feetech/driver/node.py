@@ -1,8 +1,8 @@
-"""What the driver knows of one servo, and what its settings mean for its values. No I/O."""
+"""What is known of one servo, and what its settings mean for its values. No I/O."""
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from math import degrees, inf
 from typing import Any, Final, NamedTuple
@@ -20,13 +20,8 @@ IMAGE: Final = 40  # bytes of the EEPROM area, registers 0 to 39, which one READ
 MANY_TURNS: Final = 30719
 """Counts to either side when both limits are 0 (7.5 turns). Source: STS3215 memory table V3.6."""
 
-_POSITIONS: Final = (
-    "present_position",
-    "goal_position",
-    "goal_position_echo",
-    "min_position_limit",
-    "max_position_limit",
-)
+_LIMITS: Final = ("min_position_limit", "max_position_limit")
+_POSITIONS: Final = ("present_position", "goal_position", "goal_position_echo", *_LIMITS)
 _VELOCITIES: Final = ("present_velocity", "goal_velocity")
 _ARCS: Final = ("homing_offset", "dead_band_cw", "dead_band_ccw", "hysteresis")
 
@@ -36,13 +31,12 @@ class Settings(NamedTuple):
 
     `limits`      lowest and highest position (rad); None where unknown, or both 0 in a map without many turns
     `mode`        None for an unknown map or a number that no source explains; `mode_code` is that number
-    `offset`      homing offset (counts)
+    `turn`        counts of a single-turn position; `arc` are the degrees of these counts
     `many_turns`  goals count over many turns: both limits are 0
     `tells_turns` the present position counts over many turns; else it lies within one
     `shift`       counts to subtract from a present position: a servo applies its offset in position mode only
     `factors`     by row name, a factor of the unit of the row
     `protection_current`  raw; the goal torque of an HLS at power-up
-    `answers_writes`      status return level
     `zero_is_maximum`     a goal velocity of 0 means the maximum; else standstill
     `tells_current`       its bridge measures the current
     """
@@ -50,16 +44,14 @@ class Settings(NamedTuple):
     limits: tuple[float, float] | None = None
     mode: Mode | None = None
     mode_code: int | None = None
-    offset: int = 0
-    turn: int = 4096  # counts of a single-turn position
-    arc: float = 360.0  # degrees of these counts
+    turn: int = 4096
+    arc: float = 360.0
     many_turns: bool = False
     tells_turns: bool = False
     shift: int = 0
     raw_limits: tuple[int, int] = (0, 0)
     factors: Mapping[str, float] = {}
     protection_current: int = 0
-    answers_writes: bool = True
     zero_is_maximum: bool = True
     tells_current: bool = True
 
@@ -79,42 +71,91 @@ class Pending(NamedTuple):
     stops: int
 
 
-class BusFacts:
-    """What is known of the servos of one bus, by id.
+class Known:
+    """What is known of the servo with one id; all objects of this id on one bus share it.
 
-    `arcs` are settings (degrees), `maps` the maps that were met, `second_ids` those of HLS, `changes` counts own writes
-    of EEPROM settings, `epochs` stops and torque-offs, `pending` are the REG WRITEs that wait.
+    `settings`   None: not read, or maybe changed since; `last` are those that were read
+    `at`         arrival of the last reply (s, link clock); `alarm` its alarm bits
+    `bound`      raw goal torque of an HLS, as last read or written
+    `former_limits`  of an SCS that was made a motor
+    `reads_alone`    it answers READ and not SYNC READ; None: unknown
+    `pending`    a REG WRITE that waits
+    `epoch`      number of its stops and torque-offs
+    `kept`       requests made by the present settings
     """
+
+    def __init__(self) -> None:
+        self.identity: Identity | None = None
+        self.table: RegisterMap | None = None
+        self.settings: Settings | None = None
+        self.last: Settings | None = None
+        self.at = -inf
+        self.alarm: tuple[str, ...] = ()
+        self.bound: int | None = None
+        self.second_id: int | None = None
+        self.former_limits: tuple[float, float] | None = None
+        self.reads_alone: bool | None = None
+        self.pending: Pending | None = None
+        self.epoch = 0
+        self.kept: Final[dict[str, Request[Any]]] = {}
+
+    def learn(self, settings: Settings) -> None:
+        """Its settings were read. Equal ones stay the same object, so what was made by them still holds."""
+        if settings == self.last:
+            settings = self.last
+        if settings is not self.settings:
+            self.kept.clear()
+        self.settings = self.last = settings
+
+    def forget(self, *, written: bool = False) -> None:
+        """Its settings may have changed, or were `written`: they are read before they are used again."""
+        self.settings = self.bound = None
+        self.kept.clear()
+        if written and self.last is not None:
+            self.last = self.last._replace()  # another object: what was made before is refused
+
+
+class BusFacts:
+    """What is known of the servos of one bus, by id. `arcs` are settings (degrees by id)."""
 
     def __init__(self, arcs: Mapping[int, float] | None = None) -> None:
         self.arcs: Final = arcs or {}
-        self.maps: Final[dict[int, str]] = {}
-        self.second_ids: Final[dict[int, int]] = {}
-        self.changes: Final[Counter[int]] = Counter()
-        self.epochs: Final[Counter[int]] = Counter()
-        self.pending: Final[dict[int, Pending]] = {}
+        self.servos: Final[defaultdict[int, Known]] = defaultdict(Known)
+
+    @property
+    def maps(self) -> dict[int, str]:
+        """Names of the register maps; "" for an unknown one."""
+        return {id: one.identity.table for id, one in self.servos.items() if one.identity}
 
 
 class Node:
-    """One servo by its id, 0 to 253, and what is known of it; driver functions fill it."""
+    """One servo by its id, 0 to 253."""
 
     def __init__(self, node: int, facts: BusFacts | None = None) -> None:
         self.node: Final = checked_id(node)
         self.facts: Final = facts or BusFacts()
-        self.identity: Identity | None = None
-        self.table: RegisterMap | None = None
-        self.settings: Settings | None = None  # None: not read, or maybe changed since
-        self.alarm: tuple[str, ...] = ()  # alarm bits of the last reply
-        self.at = -inf  # arrival of the last reply (s, link clock)
+        self.known: Final = self.facts.servos[node]
         self.last_move: object = None
-        self.bound: int | None = None  # raw goal torque of an HLS, as last read or written
-        self.has_force = False  # an HLS whose goal torque was above 0 after its settings were read
-        self.former_limits: tuple[float, float] | None = None  # of an SCS that was made a motor
-        self.reads_alone: bool | None = None  # it answers READ and not SYNC READ; None: unknown
-        self.kept: Final[dict[str, tuple[Settings, Request[Any]]]] = {}  # requests, with their settings
-        self._last: Settings | None = None
-        self._is_written = False  # since `_last` was read
-        self._changes = self.facts.changes[node]  # when `_last` was read
+
+    @property
+    def identity(self) -> Identity | None:
+        """As last read."""
+        return self.known.identity
+
+    @property
+    def table(self) -> RegisterMap | None:
+        """Its register map; None before it is identified."""
+        return self.known.table
+
+    @property
+    def settings(self) -> Settings | None:
+        """None where they are not known."""
+        return self.known.settings
+
+    @property
+    def alarm(self) -> tuple[str, ...]:
+        """Alarm bits of the last reply."""
+        return self.known.alarm
 
     @property
     def limits(self) -> tuple[float, float] | None:
@@ -132,42 +173,15 @@ class Node:
         return TRAITS.get(self.identity.table, NO_TRAITS) if self.identity else NO_TRAITS
 
     @property
-    def answers_writes(self) -> bool:
-        """It acknowledges writes, as far as is known."""
-        known = self.settings or self._last
-        return known is None or known.answers_writes
-
-    @property
     def is_writable(self) -> bool:
         """Its register map is known."""
         return self.identity is not None and bool(self.identity.table)
 
     def note_reply(self, error: int, at: float) -> None:
         """A reply with this error byte arrived. An alarm never makes a reply a failure."""
-        self.alarm = alarms(error, self.table.name if self.table else "sts") if error else ()
-        self.at = at
-
-    def learn_settings(self, settings: Settings) -> None:
-        """Its settings were read. Equal ones stay the same object, so what was made by them still holds."""
-        if settings == self._last and not self._is_written:
-            settings = self._last
-        self.settings = self._last = settings
-        self._is_written = False
-        self._changes = self.facts.changes[self.node]
-
-    def forget_settings(self, *, written: bool = False) -> None:
-        """Its settings may have changed, or were `written`: they are read before they are used again."""
-        self.settings = None
-        self.bound = None
-        self.has_force = False
-        if written:
-            self._is_written = True
-            self.facts.changes[self.node] += 1
-
-    @property
-    def is_outdated(self) -> bool:
-        """Settings at its id were written through another object since its own were read."""
-        return self._changes != self.facts.changes[self.node]
+        known = self.known
+        known.alarm = alarms(error, known.table.name if known.table else "sts") if error else ()
+        known.at = at
 
     def row(self, name: str) -> Register:
         """A register of an identified servo, as its present mode codes it."""
@@ -176,17 +190,9 @@ class Node:
             return self.traits.duty_row(self.table)
         return self.table[name]
 
-    def refusal(self, what: str, fix: str = "", *, expected: str = "") -> RequestError:
-        """The error for an impossible request to this servo: `node 3 WHAT`."""
-        return RequestError(f"node {self.node} {what}", expected=expected, advice=fix, node=self.node)
-
-    def forget_answers(self) -> None:
-        """Its status return level was written: whether it acknowledges writes is unknown."""
-        self.settings = self._last = None
-
     def value(self, row: Register, raw: int) -> Value:
         """Raw value -> value in the unit of the row, by the last known settings of this servo."""
-        settings = self.settings or self._last
+        settings = self.known.last
         if settings is None or row.name not in settings.factors:
             return row.to_value(raw)
         if settings.shift and row.name == "present_position":
@@ -200,9 +206,13 @@ class Node:
         factor = self.settings.factors.get(row.name, 1) if self.settings else 1
         return row.to_raw(value / factor if factor != 1 and is_number(value) else value)
 
+    def refusal(self, what: str, fix: str = "", *, expected: str = "") -> RequestError:
+        """The error for an impossible request to this servo: `node 3 WHAT`."""
+        return RequestError(f"node {self.node} {what}", expected=expected, advice=fix, node=self.node)
+
 
 def settings_of(table: RegisterMap, image: bytes, arc: float | None = None) -> Settings:
-    """The settings in registers 0 to 39, by the map of the servo. `arc`: see `Node`."""
+    """The settings in registers 0 to 39, by the map of the servo. `arc`: degrees of all counts, None: by the map."""
 
     def raw(name: str, other: int = 0) -> int:
         if name not in table:
@@ -215,7 +225,7 @@ def settings_of(table: RegisterMap, image: bytes, arc: float | None = None) -> S
     many_turns = traits.many_turns and raw_limits == (0, 0)
     code = raw("operating_mode") if "operating_mode" in table else None
     mode = traits.mode_of(code, raw_limits)
-    offset, count = raw("homing_offset"), table["goal_position"].scale
+    count = table["goal_position"].scale
     of_rows = round(degrees(count * traits.turn), 6)
     stretch = 1.0 if arc is None or arc == of_rows else arc / of_rows
     angle = stretch * max(1, raw("angular_resolution", 1))
@@ -227,15 +237,13 @@ def settings_of(table: RegisterMap, image: bytes, arc: float | None = None) -> S
         limits=(low * count * angle, high * count * angle) if low or high else None,
         mode=mode,
         mode_code=code,
-        offset=offset,
         turn=traits.turn,
         arc=of_rows * stretch,
         many_turns=many_turns,
         tells_turns=traits.tells_turns(phase),
-        shift=0 if mode in (Mode.POSITION, None) else offset,
+        shift=0 if mode in (Mode.POSITION, None) else raw("homing_offset"),
         factors={**factors, **dict.fromkeys(_ARCS, stretch)},
         protection_current=raw("protection_current") if traits.current else 0,
-        answers_writes=raw("status_return_level") != 0,
         zero_is_maximum=traits.zero_is_maximum(phase),
         tells_current=traits.tells_current(phase),
     )
@@ -252,8 +260,9 @@ def checked_id(node: int) -> int:
 
 def as_nodes(ids: Iterable[int | Node]) -> list[Node]:
     """Each as a node. Raises RequestError for none, and for an id that is named twice."""
+    facts = BusFacts()
     try:
-        nodes = [one if isinstance(one, Node) else Node(one) for one in ids]
+        nodes = [one if isinstance(one, Node) else Node(one, facts) for one in ids]
     except TypeError:
         raise RequestError(f"{shown(ids)} is not a list of servos") from None
     if len({node.node for node in nodes}) == len(nodes) > 0:

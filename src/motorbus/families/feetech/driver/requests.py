@@ -1,14 +1,14 @@
 """Requests to one servo: read registers, write registers, and prove a write.
 
-A servo acknowledges the receipt of a write, or nothing at all (status return level 0), or its acknowledgement is lost;
-`confirmed` tells these apart by reading back. Source: FEETECH serial bus servo protocol manual V1.01; STS3215 memory
-table V3.6.
+An acknowledgement proves receipt of a write and may be lost; `confirmed` then reads back. A servo at status return
+level 0 acknowledges nothing: each write waits for its time-out and is read back, so `write(status_return_level=1)`
+first. Source: FEETECH serial bus servo protocol manual V1.01; STS3215 memory table V3.6.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from functools import partial
+from functools import cache, partial
 from typing import Final, NamedTuple, TypeVar
 
 from motorbus import errors
@@ -36,11 +36,12 @@ from motorbus.families.feetech.driver.node import Node
 
 T = TypeVar("T")
 
+ID: Final = 5  # in every map
 PRESENT: Final = 56  # where feedback begins in every map: the present position
 TORQUE_ENABLE: Final = 40  # in every map
 ON: Final = b"\1"  # of the torque switch; any other value is limp
+REPLY: Final = TimeoutClass.REPLY
 STORE: Final = TimeoutClass.STORE
-ACKNOWLEDGED: Final = protocol.OVERHEAD  # bytes of a reply without parameters
 SOUND: Final = 0xFD  # low byte of the sum of a whole valid packet, header and checksum included
 DATA: Final = 5  # offset of the parameters in a reply
 DOUBTS: Final = (NoReply, OutcomeUnknown, WireError)
@@ -68,8 +69,7 @@ def read_block(
     count: int,
     take: Callable[[bytes], T],
     *,
-    priority: Priority = Priority.POLL,
-    timeout: TimeoutClass = TimeoutClass.REPLY,
+    timeout: TimeoutClass = REPLY,
 ) -> Request[T]:
     """READ `count` bytes; `take` makes the value of them."""
 
@@ -82,10 +82,25 @@ def read_block(
         protocol.read(node.node, address, count),
         (Expected(node.node, node.node, protocol.OVERHEAD + count),),
         decode,
-        priority=priority,
         reply_within=timeout,
         repeatable=True,
         reports_position=reports_position({node.node: node}, address, count),
+    )
+
+
+@cache
+def read_id(node: int, count: int = 1, *, within: TimeoutClass = REPLY) -> Request[bool]:
+    """READ from the id register on; True if the id is that of the node."""
+
+    def decode(answer: Response) -> bool:
+        return bool(answer.replies) and answer.replies[0].data[DATA] == node
+
+    return Request(
+        protocol.read(node, ID, count),
+        (Expected(node, node, protocol.OVERHEAD + count),),
+        decode,
+        reply_within=within,
+        repeatable=True,
     )
 
 
@@ -108,11 +123,7 @@ def _positions(nodes: Mapping[int, Node], answer: Response) -> dict[int, float]:
 
 
 def write_block(
-    node: Node,
-    block: Block,
-    *,
-    priority: Priority = Priority.CONTROL,
-    timeout: TimeoutClass = TimeoutClass.REPLY,
+    node: Node, block: Block, *, priority: Priority = Priority.CONTROL, timeout: TimeoutClass = REPLY
 ) -> Request[None]:
     """WRITE adjoining registers. The acknowledgement proves receipt only."""
     wire = protocol.write(node.node, block.address, block.data)
@@ -125,23 +136,20 @@ def acknowledged(
     block: Block,
     *,
     priority: Priority = Priority.CONTROL,
-    timeout: TimeoutClass = TimeoutClass.REPLY,
+    timeout: TimeoutClass = REPLY,
     deferred: Deferred | None = None,
 ) -> Request[None]:
-    """A request with an acknowledgement, or no reply at status return level 0.
+    """A request with an acknowledgement.
 
     It is refused once the settings of the servo differ from those of the moment when it was made.
     """
 
     def decode(answer: Response) -> None:
-        for reply in answer.replies:
-            node.note_reply(reply.data[4], answer.at)
-        if deferred is not None:
-            deferred.done = True
+        node.note_reply(answer.replies[0].data[4], answer.at)
 
     return Request(
         wire,
-        (Expected(node.node, node.node, ACKNOWLEDGED),) if node.answers_writes else (),
+        (Expected(node.node, node.node, protocol.OVERHEAD),),
         decode,
         priority=priority,
         effect=block.effect,
@@ -163,15 +171,10 @@ def unanswered(
     deferred: Deferred | None = None,
 ) -> Request[None]:
     """A request without a reply, as every broadcast; it counts as carried out once it was sent."""
-
-    def decode(_: Response) -> None:
-        if deferred is not None:
-            deferred.done = True
-
     return Request(
         wire,
         (),
-        decode,
+        lambda _: None,
         priority=priority,
         effect=effect,
         setpoints=goals,
@@ -183,74 +186,69 @@ def unanswered(
 
 def unchanged(nodes: Iterable[Node], further: Precondition | None = None) -> Precondition:
     """Refuses a request once one of these servos has other settings than now: its goals would mean something else."""
-    made = [(node, node.settings, node.facts.changes[node.node]) for node in nodes]
+    made = [(node, node.settings) for node in nodes]
 
     def refusal(stops: Stops) -> MotorbusError | None:
-        for node, settings, changes in made:
-            if node.settings is not settings or node.facts.changes[node.node] != changes:
-                return outdated(node)
+        for node, settings in made:
+            if node.known.settings is not settings:
+                return outdated(node.node)
         return further(stops) if further is not None else None
 
     return refusal
 
 
-def outdated(node: Node) -> RequestError:
+def outdated(node: int) -> RequestError:
     """The error for an order that was made by other settings than the servo has now."""
-    what = "has other settings than when this order was made, which may mean something else now"
-    return node.refusal(what, "give the order again; in a loop, begin another")
+    return RequestError(
+        f"node {node} has other settings than when this order was made, which may mean something else now",
+        advice="give the order again; in a loop, begin another",
+        node=node,
+    )
 
 
-async def confirmed(
-    node: Node,
-    block: Block,
-    *,
-    priority: Priority = Priority.CONTROL,
-    timeout: TimeoutClass = TimeoutClass.REPLY,
-) -> None:
+async def confirmed(node: Node, block: Block, *, timeout: TimeoutClass = REPLY) -> None:
     """WRITE; without an acknowledgement read back.
 
     Raises OutcomeUnknown if nothing can be read, VerificationFailed if it reads different.
     """
-    doubt: MotorbusError | None = None
-    request = write_block(node, block, priority=priority, timeout=timeout)
     try:
-        await request
+        await write_block(node, block, timeout=timeout)
     except DOUBTS as error:
-        doubt = error
-    if doubt is None and request.expected:
-        return
-    if doubt is not None and not block.repeatable:
-        raise doubt
-    await verified(node, block, doubt, timeout=timeout)
+        if not block.repeatable:
+            raise
+        await verified(node, block, error, timeout=timeout)
+
+
+async def instruct(node: Node, wire: bytes, *, repeatable: bool = True) -> MotorbusError | None:
+    """Send an instruction that changes what the servo keeps; gives the doubt whether it was received."""
+    block = Block(0, b"", Effect.PERSISTENT, repeatable=repeatable)
+    try:
+        await acknowledged(node, wire, block, priority=Priority.CONFIGURATION, timeout=STORE)
+    except DOUBTS as error:
+        return error
+    return None
 
 
 async def verified(
-    node: Node,
-    block: Block,
-    doubt: MotorbusError | None = None,
-    *,
-    timeout: TimeoutClass = TimeoutClass.REPLY,
+    node: Node, block: Block, doubt: MotorbusError | None = None, *, timeout: TimeoutClass = REPLY
 ) -> None:
     """Read back what was written; `doubt` is how the write failed. Raises as `confirmed`."""
     try:
         found = await read_block(node, block.address, len(block.data), bytes, timeout=timeout)
     except DOUBTS as error:
-        node.forget_settings()  # it may be another servo when it answers again
+        node.known.forget()  # it may be another servo when it answers again
         if isinstance(doubt, OutcomeUnknown):
             raise doubt from error
         raise errors.unread(doubt or error, node=node.node) from error
-    if found != block.data:
-        raise _differs(node, block, found) from doubt
-
-
-def _differs(node: Node, block: Block, found: bytes) -> VerificationFailed:
+    if found == block.data:
+        return
     last = block.address + len(block.data) - 1
     where = f"register {block.address}" + (f" to {last}" if last > block.address else "")
-    return VerificationFailed(
+    raise VerificationFailed(
         f"node {node.node}: {where} reads back different",
         sent=block.data,
         received=found,
         cause="the write was lost, the servo does not take this value, or another program writes it too",
         advice="close other programs on this bus, then write it again",
         node=node.node,
-    )
+    ) from doubt

@@ -20,6 +20,7 @@ from motorbus.families.feetech.driver.access import blocks_of
 from motorbus.families.feetech.driver.goals import position_goal, speed_at_least
 from motorbus.families.feetech.driver.group import (
     GoalWriter,
+    can_sync_read,
     collect,
     divided,
     known_row,
@@ -45,10 +46,10 @@ async def open_stream(servos: Sequence[Node], *, rate: int) -> ServoStream:
     for node in nodes:
         known_row(node, "goal_position")
         position_goal(node, 0.0)
-    if any(node.reads_alone is None for node in nodes if node.traits.sync_read):
+    if any(node.known.reads_alone is None for node in nodes if node.traits.sync_read):
         await collect(nodes, PRESENT, 2, errors)
         raise_first(list(errors.values()))
-    able = [node for node in nodes if node.traits.sync_read and not node.reads_alone]
+    able = [node for node in nodes if can_sync_read(node)]
     able = able if len(able) > 1 else []
     positions = [positions_request(part) for part in await divided(able, 2)]
     for node in nodes:
@@ -87,21 +88,18 @@ class ServoStream:
         with a note for each other. Errors as `enable_torque`; RequestError for an impossible speed, with nothing sent.
         """
         for id, speed in speeds.items():
-            node = self._servo(id)
+            self._servo(id)
             if not (is_number(speed) and speed > 0):
-                raise RequestError(
-                    f"node {id}: {shown(speed)} is no speed", expected="above 0, in rad/s", node=node.node
-                )
+                what = f"node {id}: {shown(speed)} is no speed"
+                raise RequestError(what, expected="above 0, in rad/s", node=id)
         results = [await catch(_start(node, speeds.get(id))) for id, node in self._servos.items()]
         raise_first([result for result in results if isinstance(result, MotorbusError)])
 
     def _servo(self, id: int) -> Node:
-        if id not in self._servos:
-            raise RequestError(
-                f"node {shown(id)} is not in this stream",
-                expected=f"one of {', '.join(map(str, self.nodes))}",
-            )
-        return self._servos[id]
+        if id in self._servos:
+            return self._servos[id]
+        known = ", ".join(map(str, self.nodes))
+        raise RequestError(f"node {shown(id)} is not in this stream", expected=f"one of {known}")
 
 
 async def _start(node: Node, speed: float | None) -> None:

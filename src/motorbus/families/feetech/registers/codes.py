@@ -9,60 +9,39 @@ SCS servos. The phase bits of SMS servos are not published: SMBL, laid out as ST
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Final
 
-BAUD_CODES: Final[Mapping[int, int]] = MappingProxyType(
-    dict(
-        enumerate(
-            (
-                *(1_000_000, 500_000, 250_000, 128_000, 115_200, 76_800),
-                *(57_600, 38_400, 19_200, 14_400, 9_600, 4_800),
-            )
-        )
-    )
+_RATES: Final = (
+    *(1_000_000, 500_000, 250_000, 128_000, 115_200, 76_800),
+    *(57_600, 38_400, 19_200, 14_400, 9_600, 4_800),
 )
+BAUD_CODES: Final[Mapping[int, int]] = dict(enumerate(_RATES))
 """Value of the baud rate register -> bit/s."""
-
-BAUD_CODES_OF: Final[Mapping[str, range]] = MappingProxyType(
-    {
-        "sts": range(8),
-        "smbl": range(12),
-        "smcl": range(8),
-        "scs": range(11),
-        "scs2": range(8),
-        "hls": range(8),
-    }
-)
+BAUD_CODES_OF: Final[Mapping[str, range]] = {
+    "sts": range(8),
+    "smbl": range(12),
+    "smcl": range(8),
+    "scs": range(11),
+    "scs2": range(8),
+    "hls": range(8),
+}
 """Map -> the codes its servos take, as FD allows them; for SMCL, where FD allows 0 to 254, as the SDK names them."""
-
-
-def rates(register_map: str) -> dict[int, str]:
-    """The choices of the baud rate register in this map."""
-    return {code: f"{BAUD_CODES[code]} bit/s" for code in BAUD_CODES_OF[register_map]}
-
-
-_ALARMS: Final = (
-    *("voltage", "sensor", "temperature", "current", "angle", "overload"),
-    *("undefined bit 6", "undefined bit 7"),
-)
 
 
 def _alarms(defined: int) -> Mapping[int, str]:
     """Names of the alarm bits, of which these are defined."""
-    return {bit: name if defined >> bit & 1 else f"undefined bit {bit}" for bit, name in enumerate(_ALARMS)}
+    names = ("voltage", "sensor", "temperature", "current", "angle", "overload", "", "")
+    return {bit: name if defined >> bit & 1 else f"undefined bit {bit}" for bit, name in enumerate(names)}
 
 
-ALARM_BITS: Final[Mapping[str, Mapping[int, str]]] = MappingProxyType(
-    {
-        "sts": _alarms(0b0011_1111),
-        "smbl": _alarms(0b0011_1111),
-        "smcl": _alarms(0b0011_1111),
-        "scs": _alarms(0b0010_0101),
-        "scs2": _alarms(0b0010_1101),  # assumption: the over-current of its registers 31 and 32 is bit 3
-        "hls": _alarms(0b0010_1111),
-    }
-)
+ALARM_BITS: Final[Mapping[str, Mapping[int, str]]] = {
+    "sts": _alarms(0b0011_1111),
+    "smbl": _alarms(0b0011_1111),
+    "smcl": _alarms(0b0011_1111),
+    "scs": _alarms(0b0010_0101),
+    "scs2": _alarms(0b0010_1101),  # assumption: the over-current of its registers 31 and 32 is bit 3
+    "hls": _alarms(0b0010_1111),
+}
 """Map -> bits of the error byte, of hardware_error and of both masks.
 
 SCS servos have voltage, temperature and overload only. HLS pages and newer STS pages leave bit 4 unused; table V3.6 of
@@ -76,7 +55,7 @@ def alarms(error: int, register_map: str = "sts") -> tuple[str, ...]:
     return tuple(name for bit, name in bits.items() if error >> bit & 1)
 
 
-_STS_PHASE: Final[Mapping[int, str]] = {
+_STS_PHASE: Final[dict[int, str]] = {
     0: "drive direction reversed",
     1: "brushed motor (takes effect after a restart)",
     2: "velocity in units of 1 count/s (else 50)",
@@ -86,15 +65,12 @@ _STS_PHASE: Final[Mapping[int, str]] = {
     6: "PWM at 16 kHz (else 24 kHz)",
     7: "position feedback reversed",
 }
-_HLS_PHASE: Final[Mapping[int, str]] = {
+_HLS_PHASE: Final = _STS_PHASE | {
     0: "current drive phase reversed (ignored from firmware 3.42 on)",
     1: "current feedback phase reversed",
     2: "bridge phase",
     3: "velocity feedback phase reversed",
-    4: "position feedback over many turns (else one)",
     5: "bridge type",
-    6: "PWM at 16 kHz (else 24 kHz)",
-    7: "position feedback reversed",
 }
 _SCS_PHASE: Final[Mapping[int, str]] = {
     0: "drive direction reversed",
@@ -102,14 +78,12 @@ _SCS_PHASE: Final[Mapping[int, str]] = {
     5: "PWM phase",
     6: "voltage sampling for high voltage (else low)",
 }
-PHASE_BITS: Final[Mapping[str, Mapping[int, str]]] = MappingProxyType(
-    {
-        "sts": _STS_PHASE,
-        "smbl": _STS_PHASE,
-        "smcl": {},
-        "scs": _SCS_PHASE,
-        "scs2": _SCS_PHASE,
-        "hls": _HLS_PHASE,
-    }
-)
+PHASE_BITS: Final[Mapping[str, Mapping[int, str]]] = {
+    "sts": _STS_PHASE,
+    "smbl": _STS_PHASE,
+    "smcl": {},
+    "scs": _SCS_PHASE,
+    "scs2": _SCS_PHASE,
+    "hls": _HLS_PHASE,
+}
 """Map -> bit of the phase byte -> its meaning when it is set."""

@@ -7,12 +7,14 @@ was chosen.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from math import radians, tau
 from typing import Any, Final, TypeAlias
 
-from motorbus.core.register import Access, Coding, Register, RegisterMap, Storage, changed
+from motorbus.core.register import Access, ByteOrder, Coding, Register, RegisterMap, Storage
 from motorbus.core.request import Effect
+from motorbus.families.feetech.registers.codes import ALARM_BITS, BAUD_CODES, BAUD_CODES_OF, PHASE_BITS
 
 _MANUAL = "FEETECH serial bus servo protocol manual V1.01"
 SOURCES: Final[Mapping[str, str]] = {
@@ -37,21 +39,25 @@ SOURCES: Final[Mapping[str, str]] = {
     "SERVOLAB": "measured by servolab on an STS3215, firmware 3.10",
 }
 """Key -> source."""
-
-Quantity: TypeAlias = tuple[str, float]
 COUNT: Final = tau / 4096  # rad
 SCS_COUNT: Final = radians(300) / 1024  # rad, of an SCS0009; other models differ, see `models`
 AMPERE: Final = 0.0065  # A, of one count
-
-NUMBER: Final[Quantity] = ("", 1.0)
-ANGLE: Final[Quantity] = ("rad", COUNT)
-VELOCITY: Final[Quantity] = ("rad/s", COUNT)
-FRACTION: Final[Quantity] = ("fraction", 0.001)
-PERCENT: Final[Quantity] = ("fraction", 0.01)
-CURRENT: Final[Quantity] = ("A", AMPERE)
-VOLTAGE: Final[Quantity] = ("V", 0.1)
-CELSIUS: Final[Quantity] = ("°C", 1.0)
-SECONDS: Final[Quantity] = ("s", 0.01)
+_UNITS: Final = {
+    "number": ("", 1.0),
+    "angle": ("rad", COUNT),
+    "velocity": ("rad/s", COUNT),
+    "acceleration": ("rad/s²", 100 * COUNT),
+    "SCS angle": ("rad", SCS_COUNT),
+    "fraction": ("fraction", 0.001),
+    "percent": ("fraction", 0.01),
+    "current": ("A", AMPERE),
+    "voltage": ("V", 0.1),
+    "temperature": ("°C", 1.0),
+    "2 µs": ("s", 2e-6),
+    "10 ms": ("s", 0.01),
+    "40 ms": ("s", 0.04),
+}
+"""Quantity of a row -> unit and scale."""
 
 
 def _register(
@@ -60,37 +66,29 @@ def _register(
     name: str,
     address: int,
     size: int,
-    quantity: Quantity,
+    quantity: str,
     span: int | tuple[int, int],
     source: str,
     default: int | None = None,
-    *,
-    sign_bit: int | None = None,
     **facts: Any,
 ) -> Register:
     """A row. `span` is its raw range, or the high end of one from 0; a sign bit makes it sign-magnitude."""
     low, high = span if isinstance(span, tuple) else (0, span)
-    return Register(
+    unit, scale = _UNITS[quantity]
+    row = Register(
         name=name,
         address=address,
         size=size,
         access=access,
         storage=storage,
-        source=cited(source),
-        coding=Coding.UNSIGNED if sign_bit is None else Coding.SIGN_MAGNITUDE,
-        sign_bit=sign_bit,
-        unit=quantity[0],
-        scale=quantity[1],
+        source="",
+        unit=unit,
+        scale=scale,
         low=low,
         high=high,
         default=default,
-        **facts,
     )
-
-
-def cited(keys: str) -> str:
-    """Keys of sources, separated by blanks -> the sources."""
-    return "; ".join(SOURCES[key] for key in keys.split())
+    return _changed(row, {"source": source, **facts})
 
 
 identity = partial(_register, Access.READ, Storage.EEPROM, protected=True)
@@ -99,53 +97,81 @@ command = partial(_register, Access.READ_WRITE, Storage.RAM)
 feedback = partial(_register, Access.READ, Storage.RAM)
 factory = partial(_register, Access.READ, Storage.FACTORY, protected=True)
 
-SHIPPED_EVERYWHERE: Final[Mapping[str, int]] = {
-    "byte_order": 0,
-    "id": 1,
-    "status_return_level": 1,
-    "angular_resolution": 1,
-    "homing_offset": 0,
-    "operating_mode": 0,
-    "torque_enable": 0,
-    "acceleration": 0,
-    "goal_time": 0,
-    "goal_velocity": 0,
-    "lock": 1,
-    "reg_write_pending": 0,
-    "hardware_error": 0,
-}
+Difference: TypeAlias = tuple[str, dict[str, Any]]
+
+
+def row(names: str, **facts: Any) -> Difference:
+    """What these rows, named with blanks between, have otherwise than the base of the map."""
+    return names, facts
+
+
+def _changed(row: Register, facts: dict[str, Any]) -> Register:
+    """The row with these facts; a source is given by its keys."""
+    facts = dict(facts)
+    if "source" in facts:
+        facts["source"] = "; ".join(SOURCES[key] for key in facts["source"].split())
+    if "sign_bit" in facts:
+        facts["coding"] = Coding.UNSIGNED if facts["sign_bit"] is None else Coding.SIGN_MAGNITUDE
+    return replace(row, **facts)
+
+
+_SHIPPED: Final[Mapping[str, int]] = dict.fromkeys(
+    (
+        *("byte_order", "homing_offset", "operating_mode", "torque_enable", "acceleration", "goal_time"),
+        *("goal_velocity", "reg_write_pending", "hardware_error"),
+    ),
+    0,
+) | dict.fromkeys(("id", "status_return_level", "angular_resolution", "lock"), 1)
 """Defaults that FD has in every map with the row, and no other source contradicts.
 
 Two are not FD's: servos ship with the id 1, where FD has 0; and FD has no row for the byte order.
 """
 _GENERAL_NOTES: Final = (
-    *("id", "status_return_level", "max_torque", "phase", "unload_mask", "position_d", "protective_torque"),
-    *("overload_torque", "present_load", "reg_write_pending", "moving"),
+    *("byte_order", "id", "baud_rate", "return_delay", "status_return_level", "min_position_limit"),
+    *("max_position_limit", "max_torque", "phase", "unload_mask", "position_d", "integral_limit"),
+    *("dead_band_cw", "dead_band_ccw", "angular_resolution", "protective_torque", "overload_time"),
+    *("overload_torque", "torque_enable", "acceleration", "goal_position", "goal_velocity", "lock"),
+    *("present_position", "present_velocity", "present_load", "reg_write_pending", "moving"),
 )
-_GENERAL_CONFLICTS: Final = ("id", "protective_torque", "overload_torque")
+_GENERAL_CONFLICTS: Final = (
+    *("byte_order", "id", "return_delay", "min_position_limit", "max_position_limit"),
+    *("protective_torque", "overload_torque"),
+)
 
 
-def borrowed(
-    table: RegisterMap, source: str, shipped: Mapping[str, int] | None = None, **fields: object
+def derived(
+    base: RegisterMap,
+    name: str,
+    title: str,
+    source: str,
+    *rows: Register | Difference,
+    shipped: Mapping[str, int],
+    without: str = "",
+    order: ByteOrder = "little",
 ) -> RegisterMap:
-    """The rows of this map as the base of another one, which `source` describes.
+    """The map that `source` describes, as the differences of its rows to those of another map, applied in order.
 
-    A row loses what was only known of the first map: its source, default, note and conflict, unless they are general.
-    `shipped` are defaults (raw) of the other map, `fields` what all of its rows have, as order="big".
+    A row loses what was only known of the other map: its source, default, note and conflict, unless they are general;
+    rows that the maker sets keep all. `shipped` are defaults (raw).
     """
-    defaults = {**SHIPPED_EVERYWHERE, **(shipped or {})}
-
-    def borrow(row: Register) -> Register:
-        facts: dict[str, object] = {"source": cited(source), "default": defaults.get(row.name), **fields}
-        facts["note"] = row.note if row.name in _GENERAL_NOTES else ""
-        facts["conflict"] = row.conflict if row.name in _GENERAL_CONFLICTS else ""
-        return changed(row, **facts)
-
-    return table.derive(table.name, *(borrow(row) for row in table.values()))
-
-
-def differing(table: RegisterMap, names: str, **differences: object) -> tuple[Register, ...]:
-    """Rows of this map, named with blanks between, with some fields replaced; a source is given by its keys."""
-    if isinstance(keys := differences.get("source"), str):
-        differences["source"] = cited(keys)
-    return tuple(changed(table[name], **differences) for name in names.split())
+    found = {row.name: row for row in base.values() if row.name not in without.split()}
+    shipped = {**_SHIPPED, **shipped}
+    for row in found.values():
+        if row.storage is not Storage.FACTORY:
+            facts: dict[str, Any] = {"source": source, "default": shipped.get(row.name)}
+            facts["note"] = row.note if row.name in _GENERAL_NOTES else ""
+            facts["conflict"] = row.conflict if row.name in _GENERAL_CONFLICTS else ""
+            found[row.name] = _changed(row, facts)
+    rates = {code: f"{BAUD_CODES[code]} bit/s" for code in BAUD_CODES_OF[name]}
+    found["baud_rate"] = replace(found["baud_rate"], high=max(rates), choices=rates)
+    found["phase"] = replace(found["phase"], bits=PHASE_BITS[name])
+    for alarm in ("unload_mask", "led_mask", "hardware_error"):
+        found[alarm] = replace(found[alarm], bits=ALARM_BITS[name])
+    for one in rows:
+        if isinstance(one, Register):
+            found[one.name] = one
+        else:
+            names, facts = one
+            found |= {name: _changed(found[name], facts) for name in names.split()}
+    ordered = sorted(found.values(), key=lambda row: row.address)
+    return RegisterMap(name, [replace(row, order=order) for row in ordered], title=title)

@@ -12,8 +12,8 @@ from motorbus.core import units
 from motorbus.core.switches import options as options_of
 from motorbus.core.switches import switched
 from motorbus.errors import RequestError
-from motorbus.families.feetech.simulator.bus import USUAL_RATE, FeetechBus
-from motorbus.families.feetech.simulator.models import MODELS, Model, models, with_rate
+from motorbus.families.feetech.simulator.bus import FeetechBus
+from motorbus.families.feetech.simulator.models import MODELS, Model, models
 from motorbus.families.feetech.simulator.quirks import Quirks
 from motorbus.families.feetech.simulator.servo import Servo
 
@@ -32,19 +32,13 @@ def simulate(ids: Iterable[int], model: str = "", /, **options: object) -> Feete
     """
     quirks = switched(Quirks, "feetech", options)
     nodes = list(ids)
-    found = models(model, quirks.firmware, len(nodes))
-    rate = quirks.servo_baud
-    if not rate and len({one.rate for one in found}) > 1:
-        rate = USUAL_RATE
-    bus = FeetechBus(nodes, with_rate(found, rate) if rate else found, quirks)
+    bus = FeetechBus(nodes, models(model, quirks.firmware, len(nodes)), quirks)
     for word in quirks.duplicate.replace(",", "+").split("+"):
         if word:
-            bus.duplicate(_id(word))
+            try:
+                bus.duplicate(units.whole(word))
+            except ValueError:
+                raise RequestError(
+                    f"option duplicate: {word!r} is no id", expected="ids as 3 or 3+5"
+                ) from None
     return bus
-
-
-def _id(word: str) -> int:
-    try:
-        return units.whole(word)
-    except ValueError:
-        raise RequestError(f"option duplicate: {word!r} is no id", expected="ids as 3 or 3+5") from None

@@ -8,7 +8,7 @@ idles high and each 0 bit pulls it low, so replies that overlap are ANDed. Simpl
 from __future__ import annotations
 
 from bisect import insort
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from itertools import count
 from math import ceil, inf
 from operator import attrgetter
@@ -19,7 +19,7 @@ from motorbus.core.request import Data
 from motorbus.errors import RequestError
 from motorbus.families.feetech import protocol
 from motorbus.families.feetech.protocol import BROADCAST, MAX_ID, MAX_PARAMETERS, OVERHEAD, Instruction
-from motorbus.families.feetech.simulator.instructions import carry_out
+from motorbus.families.feetech.registers.codes import BAUD_CODES, BAUD_CODES_OF
 from motorbus.families.feetech.simulator.models import Model
 from motorbus.families.feetech.simulator.quirks import Quirks
 from motorbus.families.feetech.simulator.servo import Servo
@@ -31,7 +31,8 @@ FRAME_GAP: Final = 0.005  # s; after a longer pause an incomplete packet is drop
 USUAL_RATE: Final = 1_000_000  # bit/s, of a host that has not set one
 WRITES: Final = (Instruction.WRITE, Instruction.REG_WRITE, Instruction.SYNC_WRITE)
 ALWAYS: Final = (Instruction.PING, Instruction.READ)  # answered at every status return level
-_NEXT: Final = attrgetter("overload.next")
+_WHEN: Final = attrgetter("when")
+_TRIPS_AT: Final = attrgetter("trips_at")
 
 
 class Reply(NamedTuple):
@@ -39,7 +40,7 @@ class Reply(NamedTuple):
 
     when: float
     order: int
-    data: bytes
+    data: bytearray
     servo: Servo | None
     life: int
 
@@ -48,7 +49,7 @@ class FeetechBus:
     """A `core.family.Simulator` of FEETECH servos; `now` is the latest time (s).
 
     `servos` are those of the ids as given, then second ones; `usual_rate` is the rate of the first one when
-    it was made (bit/s).
+    it was made (bit/s). Servos that ship with different rates have 1 Mbit/s, unless `quirks` name one.
     """
 
     def __init__(self, ids: Iterable[int], models: Iterable[Model], quirks: Quirks) -> None:
@@ -61,16 +62,25 @@ class FeetechBus:
         self._replies: list[Reply] = []
         self._order = count()
         self._random = Random(0)
+        models = list(models)
+        rate = quirks.servo_baud
+        if not rate and len({model.rate for model in models}) > 1:
+            rate = USUAL_RATE
         for id, model in zip(ids, models, strict=True):
-            self._add(id, model)
+            codes = [code for code in BAUD_CODES_OF[model.table.name] if BAUD_CODES[code] == rate]
+            if rate and not codes:
+                raise RequestError(
+                    f"a {model.name} has no rate of {rate} bit/s", expected="a rate of its map"
+                )
+            self._add(id, model, codes[0] if rate else None)
         if not self.servos:
             raise RequestError("a simulated bus needs at least one servo", advice="give ids, such as 1-6")
         self.usual_rate: int = self.servos[0].baud_rate or 0
 
-    def _add(self, id: int, model: Model) -> Servo:
+    def _add(self, id: int, model: Model, baud_code: int | None) -> Servo:
         if not 0 <= id <= MAX_ID:
             raise RequestError(f"id {id} is not possible", expected=f"0 to {MAX_ID}")
-        servo = Servo(id, model, self.quirks, lambda: self.now)
+        servo = Servo(id, model, self.quirks, lambda: self.now, baud_code)
         self.servos = (*self.servos, servo)
         return servo
 
@@ -87,13 +97,10 @@ class FeetechBus:
 
         Raises RequestError when there is none.
         """
-        if id not in self.nodes:
+        first = self.nodes.get(id)
+        if first is None:
             raise RequestError(f"no servo has the id {id}", expected=f"one of {sorted(self.nodes)}")
-        first = self.nodes[id]
-        second = self._add(id, first.model)
-        second.jitter = JITTER
-        address = second.model.table["baud_rate"].address
-        second.memory.live[address] = second.memory.stored[address] = first.memory["baud_rate"]
+        self._add(id, first.model, first.memory["baud_rate"]).jitter = JITTER
 
     def tune(self, rate: int) -> None:
         """Set the rate of the host (bit/s); servos set to another one neither receive nor are received."""
@@ -107,10 +114,10 @@ class FeetechBus:
         """The replies that start up to this moment (s), in order."""
         sent: list[tuple[float, Data]] = []
         while self._replies and self._replies[0].when <= to:
-            when, _, data, servo, life = self._replies.pop(0)
-            self._pass(when)
-            if servo is None or servo.lives == life:
-                sent.append((when, data))
+            reply = self._replies.pop(0)
+            self._pass(reply.when)
+            if reply.servo is None or reply.servo.lives == reply.life:
+                sent.append((reply.when, bytes(reply.data)))
         self._pass(to)
         return sent
 
@@ -120,7 +127,7 @@ class FeetechBus:
             return
         self._pass(at)
         if self.quirks.echo:
-            self._speak([Reply(at, 0, data, None, 0)])
+            self._send([Reply(at, next(self._order), bytearray(data), None, 0)])
         if self._parser.held and at - len(data) * self._byte_time(None) - self._received_at > FRAME_GAP:
             self._parser = protocol.parser()
         self._received_at = at
@@ -129,9 +136,9 @@ class FeetechBus:
                 self._carry_out(protocol.decode(frame), at)
 
     def _pass(self, to: float) -> None:
-        """Let time pass; servos do meanwhile what they do by themselves."""
-        while (servo := min(self.servos, key=_NEXT)).overload.next <= to:
-            self.now = max(self.now, servo.overload.next)
+        """Time passes; servos trip meanwhile by themselves."""
+        while (servo := min(self.servos, key=_TRIPS_AT)).trips_at <= to:
+            self.now = max(self.now, servo.trips_at)
             servo.trip()
         self.now = max(self.now, to)
 
@@ -142,32 +149,35 @@ class FeetechBus:
         if code == Instruction.SYNC_READ and protocol.suits(code, parameters):
             self._sync_read(packet, at)
         elif code == Instruction.SYNC_WRITE:
-            items = protocol.decode_sync_write(parameters)
-            for item_id, data in items.items if items and id == BROADCAST else ():
+            items = protocol.decode_sync_write(parameters) if id == BROADCAST else None
+            for item_id, data in items.items if items else ():
                 for servo in self._receivers(item_id, code, at):
-                    carry_out(servo, Instruction.WRITE, bytes((parameters[0],)) + data, at)
+                    servo.carry_out(Instruction.WRITE, parameters[:1] + data, at)
         else:
             found = [self._answer(servo, packet, at) for servo in self._receivers(id, code, at)]
             answers = [answer for answer in found if answer is not None]
             if id == BROADCAST and self.quirks.broadcast_ping == "in_turn":
                 for answer in sorted(answers, key=lambda answer: answer.data[2]):
-                    at = self._speak([answer._replace(when=at)])
+                    at = self._send([answer._replace(when=at)])
             else:
-                self._speak(answers)
+                self._send(answers)
 
     def _receivers(self, id: int, code: int, at: float) -> list[Servo]:
         """The servos that take this instruction to this id."""
-        servos: Iterable[Servo] = self.servos
-        if id != BROADCAST and code in WRITES:
-            servos = [servo for servo in servos if servo.obeys(id)]
-        elif id != BROADCAST:
-            servos = [servo for servo in servos if servo.id == id]
-        return [servo for servo in servos if servo.receives(self.rate, at)]
+        return [
+            servo
+            for servo in self.servos
+            # An HLS carries out writes to its second id as well (HLS memory table).
+            if (
+                id in (servo.id, BROADCAST) or (code in WRITES and id == servo.memory.values.get("second_id"))
+            )
+            and servo.receives(self.rate, at)
+        ]
 
     def _answer(self, servo: Servo, packet: protocol.Packet, at: float) -> Reply | None:
-        """Let a servo carry out an instruction; returns its reply."""
+        """The reply of a servo that carries out an instruction."""
         id, rate = servo.id, servo.baud_rate
-        parameters = carry_out(servo, packet.code, packet.parameters, at)
+        parameters = servo.carry_out(packet.code, packet.parameters, at)
         if packet.id == BROADCAST:
             replies = packet.code == Instruction.PING and servo.model.traits.broadcast_ping
         else:  # a write to a second id is not answered # assumption
@@ -181,31 +191,30 @@ class FeetechBus:
 
     def _reply(self, servo: Servo, id: int, parameters: bytes, at: float, code: int) -> Reply:
         """A status packet, sent when the EEPROM has stored; that to RESET is sent before."""
-        start = at  # a reply to any request waits for the EEPROM # assumption
         if self.quirks.eeprom_commit == "before_ack" and code != Instruction.RESET:
-            start = max(at, servo.memory.busy_until)
-        start += servo.reply_delay
+            at = max(at, servo.memory.busy_until)  # a reply to any request waits for it # assumption
+        at += servo.reply_delay
         if servo.jitter:
-            start += servo.jitter * self._byte_time(servo) / BITS * self._random.random()
-        data = protocol.frame(id, servo.error, parameters)
-        return Reply(start, 0, data, servo, servo.lives)
+            at += servo.jitter * self._byte_time(servo) / BITS * self._random.random()
+        data = bytearray(protocol.frame(id, servo.error, parameters))
+        return Reply(at, next(self._order), data, servo, servo.lives)
 
     def _sync_read(self, packet: protocol.Packet, at: float) -> None:
         """One reply for each id, back to back in the order of the list (FTServo_Linux, FTServo_Python).
 
         It is answered at every status return level. # assumption
         """
-        code, (_, length, *ids) = packet.code, packet.parameters
+        code, (address, length, *ids) = packet.code, packet.parameters
         if length > MAX_PARAMETERS or packet.id != BROADCAST:
             return
         for id in ids:
             answers = [
-                self._reply(servo, id, servo.read(*packet.parameters[:2]), at, code)
+                self._reply(servo, id, servo.read(address, length), at, code)
                 for servo in self._receivers(id, code, self.now)
                 if servo.model.traits.sync_read and code not in servo.lacks
             ]
             if answers:
-                at = self._speak(answers)
+                at = self._send(answers)
             elif self.quirks.sync_read_missing == "silent":
                 return
             elif self.quirks.sync_read_missing == "wait":
@@ -213,30 +222,21 @@ class FeetechBus:
 
     # -- the wire ----------------------------------------------------------------------------------
 
-    def _speak(self, replies: Iterable[Reply]) -> float:
+    def _send(self, replies: Iterable[Reply]) -> float:
         """Send replies of one moment, those that overlap as one; returns the end (s) of the last one."""
-        end, together = -inf, list[Reply]()
-        for reply in sorted(replies, key=lambda reply: reply.when):
+        end = -inf
+        for reply in sorted(replies, key=_WHEN):
             byte = self._byte_time(reply.servo)
             if reply.when > end - SLACK * byte:
-                self._send(together)
-                together = []
-            together.append(reply)
+                first = reply
+                insort(self._replies, reply)
+            else:
+                start, wire = ceil((reply.when - first.when) / byte - SLACK), first.data
+                wire += b"\xff" * (start + len(reply.data) - len(wire))
+                for place, value in enumerate(reply.data, start):
+                    wire[place] &= value
             end = max(end, reply.when + len(reply.data) * byte)
-        self._send(together)
         return end
-
-    def _send(self, together: Sequence[Reply]) -> None:
-        """Send replies that overlap."""
-        wire = bytearray()
-        for reply in together:
-            late = (reply.when - together[0].when) / self._byte_time(reply.servo)
-            start = ceil(late - SLACK)
-            wire += b"\xff" * (start + len(reply.data) - len(wire))
-            for place, byte in enumerate(reply.data, start):
-                wire[place] &= byte
-        if together:
-            insort(self._replies, together[0]._replace(order=next(self._order), data=bytes(wire)))
 
     def _byte_time(self, servo: Servo | None) -> float:
         """Seconds of a byte on the wire."""

@@ -12,78 +12,70 @@ from collections.abc import Callable, Iterable, Mapping
 from math import inf
 from typing import Final, NamedTuple
 
-from motorbus.core.register import ByteOrder, Register, RegisterMap, Storage
+from motorbus.core.register import Register, RegisterMap, Storage
 
 SIZE: Final = 256
 ERASED: Final = 0xFF
-_KEPT: Final = (
-    "max_acceleration"  # lerobot writes it, though it is factory data: kept until power-off # assumption
-)
+_KEPT: Final = "max_acceleration"  # lerobot writes this factory row: kept until power-off # assumption
 
 
 class Cell(NamedTuple):
-    """An EEPROM cell that will hold this value from this moment (s) on, if the supply lasts."""
+    """An EEPROM cell that is stored from `begin` to `end` (s), if the supply lasts."""
 
-    moment: float
+    begin: float
+    end: float
     address: int
     value: int
 
 
-class Layout:
-    """The rows of a map by address, and the values as shipped; servos of one model share it."""
-
-    def __init__(self, table: RegisterMap, defaults: Mapping[str, int]) -> None:
-        self.table = table
-        self.shipped = bytearray(SIZE)
-        self.codes: dict[str, tuple[slice, ByteOrder, int]] = {}
-        """Row -> its bytes, their order, and the code of the sign bit."""
-        self._touched: dict[tuple[int, int], list[Register]] = {}
-        self.rows: list[Register | None] = [None] * SIZE
-        for row in table.values():
-            self.rows[span(row)] = [row] * row.size
-            sign_bit = 8 * row.size if row.sign_bit is None else row.sign_bit
-            self.codes[row.name] = span(row), row.order, 1 << sign_bit
-            self.shipped[span(row)] = code(row, defaults.get(row.name, row.default or 0))
-
-    def touched(self, address: int, count: int) -> list[Register]:
-        """The rows with at least one of these bytes, in order."""
-        found = self._touched.get((address, count))
-        if found is None:
-            found = list({row.name: row for row in self.rows[address : address + count] if row}.values())
-            self._touched[address, count] = found
-        return found
-
-
 class Memory:
-    """The registers of one servo by name, as raw values; `live` are the bytes."""
+    """The registers of one servo: `live` are the bytes, `values` the raw values by name, which follow them."""
 
     def __init__(
-        self, layout: Layout, now: Callable[[], float], time: float = 0.0, torn: str = "erased"
+        self,
+        table: RegisterMap,
+        shipped: Mapping[str, int],
+        now: Callable[[], float],
+        time: float = 0.0,
+        torn: str = "erased",
     ) -> None:
-        """`time` is the s of a write to the EEPROM, `torn` as in `Quirks`."""
-        self.layout = layout
-        self.live = bytearray(layout.shipped)
+        """`shipped` are raw values of rows; `time` is the s of a write to the EEPROM, `torn` as in `Quirks`."""
+        self.table = table
+        self.shipped = bytearray(SIZE)
+        self._rows: list[Register | None] = [None] * SIZE
+        for row in table.values():
+            self._rows[span(row)] = [row] * row.size
+            self.shipped[span(row)] = code(row, shipped.get(row.name, row.default or 0))
+        self.live = bytearray(self.shipped)
+        self.values: dict[str, int] = {}
+        self.decode(table.values())
         self._now = now
         self._time = time
         self._torn = torn
-        self._cells = bytearray(layout.shipped)
+        self._stored = bytearray(self.shipped)
         self._wear: Counter[int] = Counter()
         self._waiting: list[Cell] = []
-        self._begun = -inf
+
+    def touched(self, address: int, count: int) -> Iterable[Register]:
+        """The rows with at least one of these bytes, in order."""
+        rows = self._rows[address : address + count]
+        return {row.name: row for row in rows if row is not None}.values()
+
+    def decode(self, rows: Iterable[Register]) -> None:
+        """Set the values of these rows by the live bytes."""
+        for row in rows:
+            raw = int.from_bytes(self.live[row.address : row.address + row.size], row.order)
+            sign = 1 << (8 * row.size if row.sign_bit is None else row.sign_bit)
+            self.values[row.name] = raw if raw < sign else sign - raw
 
     def __getitem__(self, name: str) -> int:
-        place, order, sign = self.layout.codes[name]
-        raw = int.from_bytes(self.live[place], order)
-        return raw if raw < sign else sign - raw
-
-    def decode(self, row: Register) -> int:
-        """The live value of a row."""
-        return row.decode(bytes(self.live[span(row)]))
+        return self.values[name]
 
     def __setitem__(self, name: str, raw: int) -> None:
         """Set a live value as the servo itself does, cut to what its row can express; no lock, no rights."""
-        row = self.layout.table[name]
-        self.live[span(row)] = code(row, raw)
+        row = self.table[name]
+        self.live[row.address : row.address + row.size] = code(row, raw)
+        self.decode((row,))
 
     def read(self, address: int, count: int) -> bytes:
         """Live bytes; zeros where no row is."""
@@ -96,20 +88,22 @@ class Memory:
         """
         names: set[str] = set()
         cells: list[int] = []
-        for row in self.layout.touched(address, len(data)):
+        for row in self.touched(address, len(data)):
             if not row.writable and row.name != _KEPT:
                 continue
-            old = self.live[span(row)]
-            places = range(max(row.address, address), min(row.address + row.size, address + len(data)))
-            for place in places:
-                self.live[place] = data[place - address]
-            if strict and not row.low <= self[row.name] <= row.high:
-                self.live[span(row)] = old
+            begin, end = max(row.address, address), min(row.address + row.size, address + len(data))
+            old = self.live[begin:end]
+            self.live[begin:end] = data[begin - address : end - address]
+            self.decode((row,))
+            if strict and not row.low <= self.values[row.name] <= row.high:
+                self.live[begin:end] = old
+                self.decode((row,))
                 continue
             names.add(row.name)
             if row.storage is Storage.EEPROM and not locked:
-                cells += places
-        self.store(cells, self._time)
+                cells += range(begin, end)
+        if cells:
+            self.store(cells, self._time)
         return names
 
     # -- EEPROM ------------------------------------------------------------------------------------
@@ -118,28 +112,11 @@ class Memory:
         """Store the live values of these cells after those that wait, in `time` s altogether."""
         # All cells take equally long, and closing the lock cuts none. # assumption
         cells = list(addresses)
-        begin = max(self._now(), self.busy_until)
-        if cells and not self._waiting:
-            self._begun = begin
+        start = begin = max(self._now(), self.busy_until)
         for number, address in enumerate(cells, start=1):
-            self._waiting.append(Cell(begin + number * time / len(cells), address, self.live[address]))
-
-    def store_row(self, name: str) -> None:
-        """Store the live value of a row."""
-        row = self.layout.table[name]
-        self.store(range(row.address, row.address + row.size), self._time)
-
-    @property
-    def stored(self) -> bytearray:
-        """The EEPROM cells."""
-        self._settle()
-        return self._cells
-
-    @property
-    def wear(self) -> Counter[int]:
-        """How often each cell was stored."""
-        self._settle()
-        return self._wear
+            end = start + number * time / len(cells)
+            self._waiting.append(Cell(begin, end, address, self.live[address]))
+            begin = end
 
     @property
     def waiting(self) -> list[Cell]:
@@ -148,29 +125,37 @@ class Memory:
         return self._waiting
 
     @property
-    def busy_until(self) -> float:
-        """The moment (s) of the last store; -inf when none waits."""
-        return self.waiting[-1].moment if self.waiting else -inf
+    def stored(self) -> bytearray:
+        """The EEPROM cells."""
+        self._settle()
+        return self._stored
 
-    def midway(self) -> float:
-        """The moment (s) at which the cell in work is half stored; inf without one."""
-        return (self._begun + self.waiting[0].moment) / 2 if self.waiting else inf
+    @property
+    def wear(self) -> Counter[int]:
+        """How often each cell was stored."""
+        self._settle()
+        return self._wear
 
     def _settle(self) -> None:
-        while self._waiting and self._waiting[0].moment <= self._now():
-            self._begun, address, value = self._waiting.pop(0)
-            self._cells[address] = value
-            self._wear[address] += 1
+        while self._waiting and self._waiting[0].end <= self._now():
+            cell = self._waiting.pop(0)
+            self._stored[cell.address] = cell.value
+            self._wear[cell.address] += 1
+
+    @property
+    def busy_until(self) -> float:
+        """The moment (s) of the last store; -inf when none waits."""
+        return self.waiting[-1].end if self.waiting else -inf
 
     # -- supply ------------------------------------------------------------------------------------
 
     def power_off(self) -> None:
         """The supply goes: the cell in work is torn, those behind it are lost."""
-        if self.waiting and self._begun < self._now():
-            _, address, value = self._waiting[0]
-            self._wear[address] += 1
+        if self.waiting and self._waiting[0].begin < self._now():
+            cell = self._waiting[0]
+            self._wear[cell.address] += 1
             if self._torn != "old":
-                self._cells[address] = ERASED if self._torn == "erased" else value
+                self._stored[cell.address] = ERASED if self._torn == "erased" else cell.value
         self._waiting.clear()
 
     def restart(self) -> None:
@@ -178,19 +163,21 @@ class Memory:
         cells = bytearray(self.stored)
         for cell in self._waiting:
             cells[cell.address] = cell.value
-        self.live = bytearray(self.layout.shipped)
-        for row in self.layout.table.values():
+        self.live = bytearray(self.shipped)
+        for row in self.table.values():
             if row.storage is not Storage.RAM:
                 self.live[span(row)] = cells[span(row)]
+        self.decode(self.table.values())
 
     def restore_factory(self, keep: Iterable[str], time: float) -> None:
         """All rows but these as shipped; the EEPROM needs `time` s for it."""
         cells: list[int] = []
-        for row in self.layout.table.values():
+        for row in self.table.values():
             if row.name not in keep and row.storage is not Storage.FACTORY:
-                self.live[span(row)] = self.layout.shipped[span(row)]
+                self.live[span(row)] = self.shipped[span(row)]
                 if row.storage is Storage.EEPROM and row.writable:
                     cells += range(row.address, row.address + row.size)
+        self.decode(self.table.values())
         self.store(cells, time)
 
 
@@ -204,4 +191,4 @@ def code(row: Register, raw: int) -> bytes:
     largest = (1 << (row.sign_bit or 8 * row.size)) - 1
     raw = max(-largest if row.sign_bit else 0, min(raw, largest))
     number = raw if raw >= 0 else -raw | 1 << (row.sign_bit or 0)
-    return number.to_bytes(row.size, "little" if row.order == "little" else "big")
+    return number.to_bytes(row.size, row.order)

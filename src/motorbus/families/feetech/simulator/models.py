@@ -1,83 +1,62 @@
 """The models that can be simulated: every known number in each of its maps.
 
 STS motor: memory table V3.6 of the STS3215 (50 rpm without load, 150 mA); its current register ends at about
-3.25 A.
+3.25 A. Voltages, shipped values and the motors of SMS, SCS and HLS have no source. # assumption
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from functools import cached_property
 from math import radians
-from types import MappingProxyType
-from typing import Final, NamedTuple
+from typing import Final
 
 from motorbus.core.plant import Drive
 from motorbus.core.register import RegisterMap
 from motorbus.errors import RequestError
 from motorbus.families.feetech.models import MODELS as NUMBERS
 from motorbus.families.feetech.models import NO_LOAD, map_for
-from motorbus.families.feetech.registers.codes import BAUD_CODES, BAUD_CODES_OF
-from motorbus.families.feetech.registers.hls import HLS
-from motorbus.families.feetech.registers.scs import SCS, SCS2
-from motorbus.families.feetech.registers.sms import SMBL, SMCL
-from motorbus.families.feetech.registers.sts import STS
-from motorbus.families.feetech.simulator.memory import Layout
+from motorbus.families.feetech.registers import TABLES
+from motorbus.families.feetech.registers.codes import BAUD_CODES
 from motorbus.families.feetech.traits import TRAITS, Traits
 
 DEFAULT: Final = "sts3215"
+_STS_DRIVE: Final = Drive(top_speed=3400.0, idle_current=0.15, stall_current=3.25)
+_SCS_DRIVE: Final = Drive(top_speed=2048.0, idle_current=0.1, stall_current=1.0)
 
 
-class Kind(NamedTuple):
-    """What all servos of one map have in common: firmware that they report, supply (V), motor (counts/s, A).
+@dataclass(frozen=True)
+class Model:
+    """A model in one of its maps, with the firmware that it reports, its supply (V) and motor (counts/s, A).
 
-    `shipped` are raw values of rows without a published default.
+    `shipped` are raw values of rows without a published default, `angle` is rad per count, `name` in lower case.
     """
 
-    # Voltages, shipped values and the motors of SMS, SCS and HLS have no source. # assumption
-
     table: RegisterMap
     firmware: tuple[int, int]
     voltage: float
     drive: Drive
     shipped: dict[str, int]
+    name: str = ""
+    number: tuple[int, int] = 0, 0
+    angle: float = 1.0
 
-
-@dataclass(frozen=True, kw_only=True)
-class Model:
-    """A model in one of its maps; `angle` is rad per count, `stored` raw values stored since."""
-
-    name: str  # in lower case
-    number: tuple[int, int]
-    angle: float
-    table: RegisterMap
-    firmware: tuple[int, int]
-    voltage: float
-    drive: Drive
-    shipped: dict[str, int]
-    stored: Mapping[str, int] = field(default_factory=dict)
-
-    @cached_property
+    @property
     def traits(self) -> Traits:
         return TRAITS[self.table.name]
 
-    @cached_property
-    def layout(self) -> Layout:
-        """Its registers as shipped."""
+    @property
+    def identity(self) -> dict[str, int]:
+        """Raw values of the rows that identify it."""
         names = ("firmware_major", "firmware_minor", "model_major", "model_minor")
-        identity = dict(zip(names, (*self.firmware, *self.number), strict=True))
-        return Layout(self.table, self.shipped | identity)
+        return dict(zip(names, (*self.firmware, *self.number), strict=True))
 
     @property
     def rate(self) -> int:
         """The rate as shipped, bit/s."""
         return BAUD_CODES[self.shipped.get("baud_rate", self.table["baud_rate"].default or 0)]
 
-
-_STS_DRIVE: Final = Drive(top_speed=3400.0, idle_current=0.15, stall_current=3.25)
-_SCS_DRIVE: Final = Drive(top_speed=2048.0, idle_current=0.1, stall_current=1.0)
 
 # fmt: off
 _LIKE_STS: Final = {
@@ -87,11 +66,9 @@ _LIKE_STS: Final = {
     "protection_current": 500, "overcurrent_time": 200, "max_voltage": 140,
 }
 _LOOPS: Final = {"integral_limit": 0, "velocity_p": 10, "velocity_i": 10}
-_HLS: Final = (
-    _LIKE_STS
-    | _LOOPS
-    | {"second_id": 1, "min_voltage": 40, "phase": 0, "current_p": 50, "current_i": 50}
-)
+_HLS: Final = _LIKE_STS | _LOOPS | {
+    "second_id": 1, "min_voltage": 40, "phase": 0, "current_p": 50, "current_i": 50,
+}
 _SMCL: Final = _LIKE_STS | {
     "protective_torque": 20, "overload_time": 200, "overload_torque": 80,
     "max_torque": 1000, "min_voltage": 90, "phase": 0,
@@ -107,41 +84,36 @@ _SCS2: Final = {
 _LEROBOT: Final = {"max_acceleration": 254}  # what lerobot (configure_motors) writes
 _SMBL: Final = _SMCL | _LOOPS | _LEROBOT | {"phase": 12, "torque_limit": 1000}
 # fmt: on
-
-_KINDS: Final = (
-    Kind(STS, (3, 10), 7.4, _STS_DRIVE, _LEROBOT),
-    Kind(SMBL, (2, 45), 12.0, _STS_DRIVE, _SMBL),
-    Kind(SMCL, (1, 10), 12.0, _STS_DRIVE, _SMCL),
-    Kind(SCS, (0, 10), 6.0, _SCS_DRIVE, {"baud_rate": 0}),  # 1000000 or 500000 by model
-    Kind(SCS2, (3, 25), 6.0, _SCS_DRIVE, _SCS2),
-    Kind(HLS, (3, 43), 12.0, _STS_DRIVE, _HLS),  # firmware met on HLS3955 and HLS3915
-)
-_STALL_CURRENTS: Final = {"scs15": 1.5}  # A; data sheet
-_HIGH_VOLTAGE: Final = 24.0  # V, of models with HV in their name
-_HIGH_LIMITS: Final = {"max_voltage": 250, "min_voltage": 180}
+_OF_MAP: Final = {
+    "sts": Model(TABLES["sts"], (3, 10), 7.4, _STS_DRIVE, _LEROBOT),
+    "smbl": Model(TABLES["smbl"], (2, 45), 12.0, _STS_DRIVE, _SMBL),
+    "smcl": Model(TABLES["smcl"], (1, 10), 12.0, _STS_DRIVE, _SMCL),
+    "scs": Model(TABLES["scs"], (0, 10), 6.0, _SCS_DRIVE, {"baud_rate": 0}),  # 1000000 or 500000 by model
+    "scs2": Model(TABLES["scs2"], (3, 25), 6.0, _SCS_DRIVE, _SCS2),
+    "hls": Model(TABLES["hls"], (3, 43), 12.0, _STS_DRIVE, _HLS),  # firmware met on HLS3955 and HLS3915
+}
+_STALL_CURRENTS: Final = {"SCS15": 1.5}  # A; data sheet
+_HIGH_LIMITS: Final = {"max_voltage": 250, "min_voltage": 180}  # of models for 24 V, with HV in their name
 
 
 def _all() -> Mapping[str, Sequence[Model]]:
-    kinds = {kind.table.name: kind for kind in _KINDS}
     found: dict[str, list[Model]] = {}
     for number, known in NUMBERS.items():
         name, angle = known.name.lower(), radians(known.arc) / known.resolution
         for table in known.maps:
-            one = Model(name=name, number=number, angle=angle, **kinds[table]._asdict())
+            one = replace(_OF_MAP[table], name=name, number=number, angle=angle)
             if known.name in NO_LOAD:
-                stall = _STALL_CURRENTS.get(name, one.drive.stall_current)
-                drive = replace(
-                    one.drive, top_speed=round(NO_LOAD[known.name] / angle, 6), stall_current=stall
-                )
-                one = replace(one, drive=drive)
+                speed = round(NO_LOAD[known.name] / angle, 6)
+                stall = _STALL_CURRENTS.get(known.name, one.drive.stall_current)
+                one = replace(one, drive=replace(one.drive, top_speed=speed, stall_current=stall))
             if "hv" in name:
-                one = replace(one, voltage=_HIGH_VOLTAGE, shipped=one.shipped | _HIGH_LIMITS)
+                one = replace(one, voltage=24.0, shipped=one.shipped | _HIGH_LIMITS)
             found.setdefault(name, []).append(one)
     return found
 
 
 _BY_NAME: Final = _all()
-MODELS: Final[Mapping[str, Model]] = MappingProxyType({name: known[0] for name, known in _BY_NAME.items()})
+MODELS: Final[Mapping[str, Model]] = {name: known[0] for name, known in _BY_NAME.items()}
 """All models by name in lower case; of several numbers with one name the first."""
 
 
@@ -161,7 +133,10 @@ def model(name: str, firmware: str = "") -> Model:
         )
     if not firmware:
         return known[0]
-    major, minor = _version(firmware)
+    words = firmware.split(".")
+    if len(words) != 2 or not all(word.isdecimal() and int(word) < 256 for word in words):
+        raise RequestError(f"option firmware: {firmware!r} is not a version", expected="as 3.9")
+    major, minor = map(int, words)
     table = map_for(major, minor, known[0].table["goal_position"].order)
     chosen = next((one for one in known if one.table.name == table), known[0])
     return replace(chosen, firmware=(major, minor))
@@ -177,17 +152,6 @@ def models(names: str, firmwares: str, count: int) -> list[Model]:
     return [known.setdefault(pair, model(*pair)) for pair in pairs]
 
 
-def with_rate(models: Sequence[Model], rate: int) -> list[Model]:
-    """The models with this stored rate (bit/s). Raises RequestError where the map has no code for it."""
-    code = next(code for code, known in BAUD_CODES.items() if known == rate)
-    made: dict[int, Model] = {}
-    for one in models:
-        if code not in BAUD_CODES_OF[one.table.name]:
-            raise RequestError(f"a {one.name} has no rate of {rate} bit/s", expected="a rate of its map")
-        made.setdefault(id(one), replace(one, stored={"baud_rate": code}))
-    return [made[id(one)] for one in models]
-
-
 def _spread(what: str, joined: str, count: int) -> list[str]:
     words = joined.replace(",", "+").split("+")
     if len(words) not in (1, count):
@@ -196,10 +160,3 @@ def _spread(what: str, joined: str, count: int) -> list[str]:
             expected=f"one {what} for all, or one for each id, joined by +",
         )
     return words * (count // len(words))
-
-
-def _version(text: str) -> tuple[int, int]:
-    major, _, minor = text.partition(".")
-    if not (major.isdecimal() and minor.isdecimal() and int(major) < 256 and int(minor) < 256):
-        raise RequestError(f"option firmware: {text!r} is not a version", expected="as 3.9")
-    return int(major), int(minor)

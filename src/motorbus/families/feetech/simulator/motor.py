@@ -23,7 +23,6 @@ TO_A_PLACE: Final = (Mode.POSITION, Mode.STEP)
 class Order(NamedTuple):
     """What registers and world ask of a motor.
 
-    `mode`          None for a code that no source explains
     `goal`          a place; in velocity mode counts/s; in PWM and current mode a share, signed
     `speed`         counts/s of the way to a place; 0: standstill, inf: as fast as possible
     `time`          s of the way to a place if `speed` is 0; 0: not used
@@ -33,7 +32,7 @@ class Order(NamedTuple):
     `blocked`       range of places that the shaft cannot leave; None: it is free
     """
 
-    mode: Mode | None
+    mode: Mode
     goal: float
     speed: float
     time: float
@@ -44,7 +43,10 @@ class Order(NamedTuple):
 
 
 class Course(NamedTuple):
-    """A movement, the load that it bears, and the torque that presses in vain at its end (None: none)."""
+    """A movement, the load that it bears, and the torque that presses in vain at its end (None: none).
+
+    Without torque the load is 0: the gear holds the shaft against every load. # assumption
+    """
 
     motion: Motion
     load: float = 0.0
@@ -55,15 +57,8 @@ class Course(NamedTuple):
         return self.load if self.push is None or self.motion.moving(at) else self.push
 
 
-def limp(motion: Motion, at: float) -> Course:
-    """Without torque the gear holds the shaft against every load. # assumption"""
-    return Course(rest(at, motion.position(at)))
-
-
 def follow(order: Order, motion: Motion, at: float, drive: Drive) -> Course:
     """The course that an order starts from the present state of this movement."""
-    if order.torque < FEEBLE or order.mode is None:  # an unknown mode rests # assumption
-        return limp(motion, at)
     load = max(-order.torque, min(order.torque, order.load))
     strength, goal = order.torque, order.goal
     if order.mode in TO_A_PLACE:
@@ -87,8 +82,9 @@ def _plan(order: Order, motion: Motion, at: float, drive: Drive, way: float, spa
     fastest, acceleration = min(1.0, spare) * drive.top_speed, order.acceleration
     if order.mode in TO_A_PLACE:
         speed = min(order.speed, fastest)
-        if not speed and order.time:
-            speed = min(fastest, _speed_for(abs(order.goal - position), order.time, acceleration))
+        if not speed and order.time:  # of a trapezoid from rest to rest in this time
+            square = order.time**2 - 4 * abs(order.goal - position) / acceleration
+            speed = min(fastest, acceleration * (order.time - sqrt(square)) / 2 if square > 0 else inf)
         return move(at, position, order.goal, velocity=velocity, speed=speed, acceleration=acceleration)
     speed = min(abs(order.goal), fastest)
     if order.mode is Mode.PWM:  # a torque limit does not limit the duty # assumption
@@ -97,12 +93,6 @@ def _plan(order: Order, motion: Motion, at: float, drive: Drive, way: float, spa
         speed, acceleration = drive.top_speed, FULL_ACCELERATION * (spare or 1.0)
     goal = way * min(speed, drive.top_speed)
     return run(at, position, goal, velocity=velocity, acceleration=acceleration)
-
-
-def _speed_for(way: float, time: float, acceleration: float) -> float:
-    """The speed of a trapezoid from rest to rest in this time; inf if none is fast enough."""
-    spare = time * time - 4 * way / acceleration
-    return acceleration * (time - sqrt(spare)) / 2 if spare > 0 else inf
 
 
 def _stopped(motion: Motion, low: float, high: float) -> tuple[Motion, float]:

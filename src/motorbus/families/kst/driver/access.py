@@ -2,7 +2,7 @@
 
 A save has no reply, requests during the write to flash are lost or answered with transitional values, and some writes
 fail or are undone. So a setting is written, read back, saved, and read back again; that it is saved shows after a
-restart only. Source: KST CAN protocol manual, command 3; a public flight-controller driver for the wait and the reading
+restart only. Source: KST CAN protocol manual, command 3; a public autopilot driver for the wait and the reading
 back. The manual has no mid point and no reverse bit: a profile without them raises RequestError and names others.
 """
 
@@ -12,12 +12,11 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any, Final
 
-from motorbus.core import verify
-from motorbus.core.access import readable_rows, writable_values
+from motorbus.core.access import check_written, readable_rows, writable_values, write_verified
 from motorbus.core.register import Register, Storage, Value
 from motorbus.core.request import Effect, Priority
 from motorbus.core.steps import Exclusive, Sleep
-from motorbus.errors import DeviceError, UnexpectedReply, VerificationFailed
+from motorbus.errors import DeviceError, UnexpectedReply
 from motorbus.families.kst.driver.feedback import position
 from motorbus.families.kst.driver.motion import MOVE, target
 from motorbus.families.kst.driver.node import Node, feature_row
@@ -34,6 +33,11 @@ METHODS: Final[Mapping[str, str]] = {
     "function_enable": "set_reversed(), which changes its one known bit and leaves the others",
 }
 """The device methods that write protected rows."""
+CAUSE: Final = (
+    "the servo does not take this value; a write failed, which is known of these servos; or the sense of rotation is "
+    "reversed, and a change of one travel limit changes the other"
+)
+ADVICE: Final = "for limits: set_reversed(False) first, or give symmetric ones"
 
 
 async def read(node: Node, /, *names: str) -> dict[str, Value]:
@@ -86,35 +90,25 @@ async def store(node: Node, values: Sequence[tuple[Register, int]]) -> None:
     VerificationFailed when a row reads back different after three tries, or after the save.
     """
 
-    def reading(row: Register, raw: int) -> dict[str, Any]:
-        read, differs = partial(read_row, node, row, int), partial(_differs, node, row, raw)
-        return {"read": read, "expected": raw, "node": node.node, "what": row.name, "differs": differs}
+    def about(row: Register) -> dict[str, Any]:
+        return {"node": node.node, "what": row.name, "cause": CAUSE, "advice": ADVICE}
 
     async def check_all() -> None:
         for row, raw in values:
-            await verify.check(**reading(row, raw))
+            await check_written(partial(read_row, node, row, int), raw, **about(row))
 
     async def write_and_save() -> None:
         node.limits = None
         for row, raw in values:
-            if await read_row(node, row, int) != raw:
+            read = partial(read_row, node, row, int)
+            if await read() != raw:
                 write = partial(write_row, node, row, raw, priority=Priority.CONFIGURATION)
-                await verify.write_verified(write, **reading(row, raw))
+                await write_verified(write, read, raw, **about(row))
         await check_all()  # one may have changed another
         await save(node)
         await check_all()
 
     await Exclusive(write_and_save())
-
-
-def _differs(node: Node, row: Register, raw: int, found: int) -> VerificationFailed:
-    return VerificationFailed(
-        f"node {node.node}: {row.name} reads back {found}, not {raw}",
-        cause="the servo does not take this value; a write failed, which is known of these servos; or the sense of "
-        "rotation is reversed, and a change of one travel limit changes the other",
-        advice="for limits: set_reversed(False) first, or give symmetric ones",
-        node=node.node,
-    )
 
 
 async def set_mid_point(node: Node) -> float:

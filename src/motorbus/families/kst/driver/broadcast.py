@@ -14,32 +14,12 @@ from motorbus.core.register import Value
 from motorbus.core.request import ANY, EVERY_LANE, Effect, Priority, Request, Response, TimeoutClass
 from motorbus.core.setpoint import Setpoint
 from motorbus.core.steps import Emit, Exclusive
-from motorbus.errors import RequestError, UnexpectedReply
+from motorbus.errors import RequestError
 from motorbus.families.kst import sdo
 from motorbus.families.kst.driver.motion import target
 from motorbus.families.kst.driver.node import BusSettings, Node, checked_id
-from motorbus.families.kst.driver.requests import decoded, effect_of, value_bytes
+from motorbus.families.kst.driver.requests import decoded, effect_of
 from motorbus.families.kst.notifications import encode_start
-
-
-async def broadcast_read(name: str, settings: BusSettings) -> dict[int, Value]:
-    """An object of all servos, in API units, by node. Raises RequestError for an unknown or write-only object.
-
-    A servo is missing that refuses it, is silent, sends another size, or sends two values (two servos with one id).
-    """
-    row = settings.profile.table[name]
-    if not row.readable:
-        raise RequestError(f"{name} can only be written")
-    # Reserve the bus: a reply to a broadcast looks like a reply to a request to that node.
-    answer = await Exclusive(Request[Response](settings.upload(sdo.BROADCAST, row), ANY, lane=EVERY_LANE))
-    values: dict[int, set[bytes]] = {}
-    for reply, one in zip(answer.replies, decoded(answer), strict=True):
-        if one.kind == "upload" and (one.index, one.subindex) == (row.address, row.subindex):
-            try:
-                values.setdefault(reply.lane, set()).add(value_bytes(Node(reply.lane, settings), row, one))
-            except UnexpectedReply:
-                continue
-    return {node: row.to_value(row.decode(min(found))) for node, found in values.items() if len(found) == 1}
 
 
 def broadcast_ping(settings: BusSettings) -> Request[tuple[int, ...]]:
@@ -85,7 +65,7 @@ async def broadcast_write(
 
     async def start_and_write() -> Response:
         if setpoints and settings.must_start:
-            start = settings.format(encode_start(settings.nmt, sdo.BROADCAST, True))
+            start = settings.format(encode_start(sdo.BROADCAST))
             await Request(start, **common)
         if name == "node_id":
             await Emit(IdChanged(None, raw))

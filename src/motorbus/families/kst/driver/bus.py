@@ -6,7 +6,6 @@ All times come with their source; none was measured on hardware.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, Final
 
 from motorbus.core.can_bits import least
@@ -26,14 +25,14 @@ STUFFING: Final = 1.1
 """Bits on the wire per bit of a frame: over all nodes and positions, frames of this protocol have 118 to 126 bits where
 111 are without stuffing."""
 REPLY_DELAY: Final = 0.030
-"""s; a public flight-controller driver gives up after 3 ms. Ten times that costs time only where a reply is missing."""
+"""s; a public autopilot driver gives up after 3 ms. Ten times that costs time only where a reply is missing."""
 SCAN_DELAY: Final = 0.005
 """s for an id that probably has no servo; with the margin of the bus twice the 3 ms of that driver."""
 BROADCAST_TIME: Final = 0.100
 """s in which all servos have answered a broadcast: a public demo driver collects until 100 ms pass without a reply."""
 SAVE_TIME: Final = 0.170
 """s: 20 ms in which an acknowledgement or abort of a save is accepted (the manual says that neither comes), then 150 ms
-of the write to flash, in which a public flight-controller driver leaves a servo alone."""
+of the write to flash, in which a public autopilot driver leaves a servo alone."""
 QUIET: Final = 0.020
 """s beside the frames that may still be on their way; as long as the bus waits for a late reply."""
 FRAMES_IN_ADAPTER: Final = 5  # frames of one node that an adapter may hold # assumption
@@ -46,7 +45,6 @@ _AXIS: Final = AxisDriver(
     move=motion.move,
     stop=motion.stop,
     limits=motion.limits,
-    travel=motion.travel,
     stream=motion.open_stream,
 )
 
@@ -58,7 +56,6 @@ class KstDriver:
     """Four to ten nodes in flight fill any CAN bus."""
     full_duplex = False
     probe_after = 128
-    code_meaning = decode.CODE_MEANING
 
     def __init__(
         self,
@@ -75,7 +72,7 @@ class KstDriver:
             profile=made,
             extended=choice("id_format", id_format, ID_FORMATS) == "ext",
             sized=choice("sized", sized, SIZED) == "yes",
-            nmt=made.nmt if form == "profile" else form,
+            must_start=(made.nmt if form == "profile" else form) == "standard",
         )
 
     def air_time(self, request: Request[Any], rate: int) -> float:
@@ -142,12 +139,7 @@ class KstDriver:
         return scan.scan(self.settings, ids, rates)
 
     def axis(self, identity: Identity) -> AxisDriver:
-        profile = PROFILES.get(identity.table)
-        if profile is None:
-            return AxisDriver()
-        if "status" not in profile.table:
-            return _AXIS
-        return replace(_AXIS, current=feedback.current, temperature=feedback.temperature)
+        return _AXIS if identity.table in PROFILES else AxisDriver()
 
     def decode(self, data: bytes) -> list[Explanation]:
         return decode.decode(data, self.settings.profile)

@@ -48,11 +48,11 @@ def status(node: Node) -> Request[RawStatus | Status]:
 
 def _status(node: Node) -> Request[Status]:
     row = feature_row(node, "status", "current and temperature")
-    return read_row(node, row, lambda raw: _decode_status(node, raw))
 
+    def decode(raw: int) -> Status:
+        return Status(profiles.current(node.profile, raw), float(profiles.temperature(raw)))
 
-def _decode_status(node: Node, raw: int) -> Status:
-    return Status(profiles.current(node.profile, raw), float(profiles.temperature(raw)))
+    return read_row(node, row, decode)
 
 
 async def current(node: Node) -> float:
@@ -91,7 +91,5 @@ def health(node: Node) -> Request[Health]:
         return Health(state, restarts=node.settings.state.boots[node.node])
 
     if "status" in node.table:
-        row = node.table["status"]
-        return read_row(node, row, lambda raw: take(**_decode_status(node, raw)._asdict()))
-    row = node.table["present_position"]
-    return read_position(node, lambda raw: take(position=float(row.to_value(raw))))
+        return _status(node).convert(lambda found: take(**found._asdict()))
+    return position(node).convert(lambda here: take(position=here))

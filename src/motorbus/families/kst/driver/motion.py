@@ -21,7 +21,7 @@ from motorbus.core.steps import gather
 from motorbus.core.stream import PositionStream, read_positions
 from motorbus.errors import DeviceError, LimitExceeded, MotorbusError, RequestError, Stalled
 from motorbus.families.kst.driver import feedback
-from motorbus.families.kst.driver.node import Node, feature_row
+from motorbus.families.kst.driver.node import Node
 from motorbus.families.kst.driver.requests import (
     ask_presence,
     is_absent,
@@ -57,7 +57,7 @@ async def move(
 
     In position: two readings in a row within `tolerance` rad. Raises LimitExceeded outside the range of the profile
     or the travel limits of the servo; Stalled; MotionError after `timeout` s (None: from the distance). Where the
-    profile has a start rule, a start is sent first (`Started`). An interrupt of the wait stops the servo.
+    profile has a start rule, a start is sent first. An interrupt of the wait stops the servo.
     """
     await core.move(MOVE, {node: to}, wait=wait, tolerance=tolerance, timeout=timeout)
 
@@ -169,26 +169,9 @@ def hold(node: Node, here: int, priority: Priority = Priority.CONTROL) -> list[R
 
 def start(node: Node, goal: Setpoint | None = None) -> Request[Response]:
     """Start this servo; it has no reply. With a `goal` the gate checks the start like that goal."""
-    frame = node.settings.format(encode_start(node.settings.nmt, node.node, True))
+    frame = node.settings.format(encode_start(node.node))
     effect, setpoint = (Effect.MOTION, goal) if goal else (Effect.TORQUE, torque_on(node.node))
     return Request(frame, lane=node.node, priority=Priority.CONTROL, effect=effect, setpoints=(setpoint,))
-
-
-async def set_reports(node: Node, on: bool) -> None:
-    """Let the servo report its position at its own interval, or not; it does not acknowledge that.
-
-    Where the profile has a start rule, this also lets it move, or ignore positions until the next start.
-    """
-    feature_row(node, "report_interval", "reports")
-    form = node.settings.nmt
-    if form == "none":
-        raise RequestError(
-            f"node {node.node}: this bus has no form of start and stop",
-            expected="nmt=profile, nmt=vendor or nmt=standard",
-            node=node.node,
-        )
-    frame = node.settings.format(encode_start(form, node.node, on))
-    await (start(node) if on and node.settings.must_start else Request[Response](frame, lane=node.node))
 
 
 # -- control loop ----------------------------------------------------------------------------------------------

@@ -17,7 +17,7 @@ from motorbus.families.kst.profiles import PROFILES, Profile, to_raw
 
 ID_FORMATS: Final = ("std", "ext")
 SIZED: Final = ("no", "yes")
-NMT: Final = ("profile", "none", "vendor", "standard")
+NMT: Final = ("profile", "none", "standard")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -27,20 +27,15 @@ class BusSettings:
     `profile`   scale, range, objects and start rule of the maker
     `extended`  29-bit identifiers (id_format=ext); else 11-bit
     `sized`     writes state their length (CiA 301); else specifier 0x22, as in the manual
-    `nmt`       form of start and stop: "none", "vendor" or "standard"
+    `must_start`  servos accept positions only after a start
     `state`     what the open bus has received
     """
 
     profile: Profile = PROFILES["kst"]
     extended: bool = False
     sized: bool = False
-    nmt: str = "none"
+    must_start: bool = False
     state: BusState = field(default_factory=BusState)
-
-    @property
-    def must_start(self) -> bool:
-        """Servos accept positions only after a start."""
-        return self.nmt == "standard"
 
     def upload(self, node: int, row: Register) -> CanFrame:
         """The request that reads this object of one servo or of all (0)."""

@@ -13,25 +13,20 @@ from typing import Final, NamedTuple
 
 from motorbus.core.family import IdChanged
 from motorbus.core.register import is_number, shown
-from motorbus.core.request import Priority, Request
+from motorbus.core.request import ANY, Priority, Request, Response
 from motorbus.core.scan import BitrateRestored
 from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate, Sleep
 from motorbus.errors import NoReply, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.kst.driver.broadcast import broadcast_ping
-from motorbus.families.kst.driver.identity import (
-    answers_alone,
-    count_replies,
-    identify,
-    read_id,
-    second_servo,
-)
+from motorbus.families.kst.driver.identity import identify, read_id
 from motorbus.families.kst.driver.node import Node, checked_id, hexadecimal
-from motorbus.families.kst.driver.requests import ask_presence, save, write_row
+from motorbus.families.kst.driver.requests import ask_presence, decoded, save, write_row
 from motorbus.families.kst.profiles import bit_rate_code
 
 TIMEOUT: Final = 120.0  # s to wait for the power cycle
 PERIOD: Final = 0.1  # s between two reads while waiting
 STEPS: Final = 4
+ROUNDS: Final = 3  # of reads that look for a second servo
 
 
 class PowerCycleNeeded(NamedTuple):
@@ -100,7 +95,7 @@ async def provision(
     rate = await SetBitrate(0)  # 0 reads it
     goal = Place(new, new_rate or rate)
     await Emit(Progress(0, STEPS, "looking for the servo"))
-    found = await Exclusive(_find((node, new), (rate, goal.rate)))
+    found = await Exclusive(_find(dict.fromkeys((node, new)), dict.fromkeys((rate, goal.rate))))
     if found != goal:
         await Exclusive(_write(found, goal))
         await Emit(PowerCycleNeeded(node.node, new.node, goal.rate))
@@ -111,43 +106,37 @@ async def provision(
     return Provisioned(new.node, goal.rate, firmware, resumed=found == goal)
 
 
-class _AtRate(BitrateRestored):
-    """The bus has this rate (bit/s) in the block. Reserve the bus."""
-
-    def __init__(self, rate: int) -> None:
-        self._rate = rate
-
-    async def enter(self) -> None:
-        await super().enter()
-        await SetBitrate(self._rate)
-
-
 async def _find(nodes: Iterable[Node], rates: Iterable[int]) -> Place:
     """The id and rate, of the old and the new ones, at which the servo answers now."""
-    nodes, rates = dict.fromkeys(nodes), dict.fromkeys(rates)
     for rate in rates:
-        async with _AtRate(rate):
+        async with BitrateRestored(rate):
             found = [node for node in nodes if await answers_alone(node)]
         if len(found) == 2:
             raise id_taken(*found)
         if found:
             return Place(found[0], rate)
-    old, *_ = nodes
     raise NoReply(
         f"no servo answers as {' or '.join(hexadecimal(node.node) for node in nodes)}",
         expected=f"one servo at {' or '.join(map(str, rates))} bit/s",
         cause="no power, a loose cable, another id, or another bit rate",
         advice="`motorbus scan BUS` lists the servos",
-        node=old.node,
+        node=next(iter(nodes)).node,
     )
 
 
 async def _write(found: Place, goal: Place) -> None:
-    """Write what is missing, read it back, save."""
+    """Write what is missing, read it back, save. A servo at another rate breaks the frames of the others."""
     node, new = found.node, goal.node.node
-    async with _AtRate(found.rate):
+    async with BitrateRestored(found.rate):
         if found.rate != goal.rate:
-            await _check_no_other(found, goal)
+            answering = await broadcast_ping(node.settings)
+            if others := sorted(set(answering) - {node.node, new}):
+                raise RequestError(
+                    f"the servo is not alone: {', '.join(map(hexadecimal, others))} would stay at {found.rate} bit/s",
+                    cause="servos at two rates on one bus break each other's frames",
+                    advice="connect it alone; broadcast_write() of bit_rate_code and store changes all at once",
+                    node=node.node,
+                )
         await Emit(Progress(1, STEPS, f"writing to {hexadecimal(node.node)}"))
         if node.node != new or await read_id(node) not in (None, new):
             await write_node_id(node, new)
@@ -157,26 +146,18 @@ async def _write(found: Place, goal: Place) -> None:
         await save(node)
 
 
-async def _check_no_other(found: Place, goal: Place) -> None:
-    """A servo at another rate breaks the frames of the others."""
-    answering = await broadcast_ping(found.node.settings)
-    others = sorted(set(answering) - {found.node.node, goal.node.node})
-    if others:
-        raise RequestError(
-            f"the servo is not alone: {', '.join(map(hexadecimal, others))} would stay at {found.rate} bit/s",
-            cause="servos at two rates on one bus break each other's frames",
-            advice="connect it alone; broadcast_write() of bit_rate_code and store changes all at once",
-            node=found.node.node,
-        )
-
-
 async def _wait(old: Place, goal: Place, timeout: float) -> None:
     """Read until the servo answers at the new place and not at the old one. Raises OutcomeUnknown after `timeout` s.
 
     The new rate is tried only while the servo is silent at the old one.
     """
+
+    async def answers(place: Place) -> bool:
+        async with BitrateRestored(place.rate):
+            return await count_replies(place.node) > 0
+
     begun = await Sleep(0)  # the time
-    while await Exclusive(_answers(old)) or not await Exclusive(_answers(goal)):
+    while await Exclusive(answers(old)) or not await Exclusive(answers(goal)):
         if await Sleep(PERIOD) - begun > timeout:
             raise OutcomeUnknown(
                 f"{hexadecimal(old.node.node)} was set to {hexadecimal(goal.node.node)} at {goal.rate} bit/s and "
@@ -188,15 +169,10 @@ async def _wait(old: Place, goal: Place, timeout: float) -> None:
             )
 
 
-async def _answers(place: Place) -> bool:
-    async with _AtRate(place.rate):
-        return await count_replies(place.node) > 0
-
-
 async def _verify(goal: Place) -> str:
     """Check that one servo answers with the new id, and reads it back. Returns its firmware version."""
     node, new = goal.node, goal.node.node
-    async with _AtRate(goal.rate):
+    async with BitrateRestored(goal.rate):
         second, identity = await second_servo(node), await identify(node)
     if second:
         raise VerificationFailed(
@@ -214,6 +190,48 @@ async def _verify(goal: Place) -> str:
             node=new,
         )
     return identity.firmware
+
+
+# -- one servo or two ------------------------------------------------------------------------------------------
+
+
+def count_replies(node: Node, name: str = "node_id") -> Request[int]:
+    """Read an object once; the number of replies, 0 for silence."""
+    row = node.table[name]
+
+    def decode(answer: Response) -> int:
+        return sum(reply.index in (row.address, 0) for reply in decoded(answer))  # 0: some aborts
+
+    return Request(node.settings.upload(node.node, row), ANY, decode, lane=node.node)
+
+
+async def second_servo(node: Node) -> str | None:
+    """The evidence that two servos answer to this id, "" for one, None for none.
+
+    Two servos with one id send two replies. If both begin at the same time, equal replies merge into one and unequal
+    ones destroy each other. So the id, which is equal, and the position, which seldom is, are read several times.
+    """
+    counts: list[int] = []
+    for _ in range(ROUNDS):
+        counts += [await count_replies(node, name) for name in ("node_id", "present_position")]
+        if not any(counts):
+            return None
+    if max(counts) > 1:
+        return f"{max(counts)} answers to one request"
+    return "" if any(counts[1::2]) else "every read of its id is answered, no read of its position"
+
+
+async def answers_alone(node: Node) -> bool:
+    """Whether a servo answers to this id. Raises RequestError when two do. Run it with the bus reserved."""
+    second = await second_servo(node)
+    if second:
+        raise RequestError(
+            f"two servos answer as {hexadecimal(node.node)}: {second}",
+            cause="servos are shipped with one id, and both obey what is sent to it; or the bus is disturbed",
+            advice="connect one servo at a time, provision it, then the next",
+            node=node.node,
+        )
+    return second is not None
 
 
 # -- single commands of the manual -----------------------------------------------------------------------------

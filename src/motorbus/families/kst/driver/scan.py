@@ -19,8 +19,9 @@ from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate, catch, ga
 from motorbus.errors import NoReply, WireError
 from motorbus.families.kst import sdo
 from motorbus.families.kst.driver.broadcast import broadcast_ping
-from motorbus.families.kst.driver.identity import identify, second_servo
+from motorbus.families.kst.driver.identity import identify
 from motorbus.families.kst.driver.node import BusSettings, Node, checked_id
+from motorbus.families.kst.driver.provisioning import second_servo
 from motorbus.families.kst.driver.requests import upload
 from motorbus.families.kst.profiles import bit_rate_code
 

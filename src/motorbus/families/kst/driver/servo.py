@@ -41,7 +41,6 @@ class ServoMethods(Node):
     temperature = device_method(feedback.temperature)
     move = device_method(motion.move)
     stop = device_method(motion.stop)
-    set_reports = device_method(motion.set_reports)
     set_mid_point = device_method(access.set_mid_point)
     reversed = device_method(access.reversed_)
     set_reversed = device_method(access.set_reversed)

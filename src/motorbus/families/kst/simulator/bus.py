@@ -10,7 +10,6 @@ from collections.abc import Iterable, Mapping
 from math import inf
 from typing import Final
 
-from motorbus.core.can_bits import precedence
 from motorbus.core.can_frame import ERROR_FLAG, REMOTE_FLAG, Audience, CanFrame
 from motorbus.core.request import Data
 from motorbus.errors import RequestError
@@ -124,10 +123,15 @@ class KstBus:
 
         With one identifier, the n-th frame of a servo competes with the n-th of the others.
         """
-        competing: dict[tuple[tuple[int, ...], int], set[CanFrame]] = {}
+        competing: dict[tuple[tuple[int, bool, int], int], set[CanFrame]] = {}
         for servo in self.servos:
             for turn, frame in enumerate(servo.take(moment)):
                 if self._reaches(servo):
-                    competing.setdefault((precedence(frame), turn), set()).add(frame)
+                    competing.setdefault((_precedence(frame), turn), set()).add(frame)
         frames = [competing[key] for key in sorted(competing)]
         return [min(equal) if len(equal) == 1 else ERROR for equal in frames]
+
+
+def _precedence(frame: CanFrame) -> tuple[int, bool, int]:
+    """Sort key of arbitration: the first eleven bits, then an 11-bit identifier before one of 29 bits."""
+    return frame.id >> 18 if frame.extended else frame.id, frame.extended, frame.id

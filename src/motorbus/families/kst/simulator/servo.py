@@ -32,8 +32,7 @@ TOO_HIGH: Final = 0x0609_0031
 TOO_LOW: Final = 0x0609_0032
 NOT_STORED: Final = 0x0800_0020  # CiA 301, object 1010h: the reply to a wrong signature
 TURNAROUND: Final = 0.0001  # s from the end of a request to the start of its reply # assumption
-MAILBOX: Final = 16  # requests that may wait for a servo # assumption
-FLASH_TIME: Final = 0.15  # s that a save takes; a public flight-controller driver leaves 150 ms
+FLASH_TIME: Final = 0.15  # s that a save takes; a public autopilot driver leaves 150 ms
 VERSION: Final = int.from_bytes(b"V1.2", "little")  # of firmware and software # assumption
 INTERVAL: Final = 20
 """ms between reports as shipped; the public drivers expect 50 a second. # assumption"""
@@ -138,12 +137,10 @@ class Servo(PoweredDevice):
     # -- requests ------------------------------------------------------------------------------------------------
 
     def receive(self, frame: CanFrame, request: sdo.Sdo | None, at: float) -> None:
-        """Carry out a request (None: not known) and reply, one after the other; more than `MAILBOX` are lost."""
-        if self._busy_until - at > MAILBOX * TURNAROUND:
-            return
+        """Carry out a request (None: not known) and reply, one after the other."""
         self.extended = frame.extended
         if self.saving(at):
-            return  # lost (flight-controller driver)
+            return  # lost (autopilot driver)
         index, subindex = int.from_bytes(frame.data[1:3], "little"), frame.data[3]
         reply = UNKNOWN_COMMAND if request is None else self._answer(request, at)
         if isinstance(reply, int):  # an abort repeats index (manual, command 9) and sub-index # assumption
@@ -211,7 +208,7 @@ class Servo(PoweredDevice):
                     self._move(clamped, at)
                     return 0
                 values[name] = clamped
-                if self._reversed:  # a change of one limit changes the other (flight-controller driver)
+                if self._reversed:  # a change of one limit changes the other (autopilot driver)
                     other = "positive_limit" if name == "negative_limit" else "negative_limit"
                     values[other] = -clamped  # a reversed servo mirrors a changed limit # assumption
             case "report_interval":  # XQPOWER raises a short interval; 0 means none # assumption

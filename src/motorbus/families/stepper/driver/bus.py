@@ -17,6 +17,7 @@ from motorbus.families.stepper.driver import manual, plan, run, stop
 from motorbus.families.stepper.driver.node import BusState, Node
 from motorbus.families.stepper.driver.projects import dump_once
 from motorbus.families.stepper.driver.requests import STOPS, command, ignore
+from motorbus.families.stepper.execution.ramp import TICK_MS
 from motorbus.families.stepper.parameters import PROJECTS, checked_order
 
 MODEL: Final = "stepper controller"
@@ -25,7 +26,6 @@ DUMP_END: Final = 0.6  # s from a request to the end of its dump, at 9600 baud #
 GAP: Final = 0.05  # s within an old reply # assumption
 
 _AXIS: Final = AxisDriver(
-    move_by=manual.move_by,
     jog=manual.jog,
     home=manual.home,
     plan_move=plan.plan_move,
@@ -48,26 +48,37 @@ class StepperDriver(HalfDuplexSerial):
     longest_reply: ClassVar[int] = protocol.DUMP_LENGTH
     longest_gap: ClassVar[float] = GAP
 
-    def __init__(self, family: Family, motor: object = protocol.MOTOR, dump_order: object = "little") -> None:
+    def __init__(
+        self,
+        family: Family,
+        motor: object = protocol.MOTOR,
+        dump_order: object = "little",
+        ramp_tick_ms: object = TICK_MS,
+    ) -> None:
         super().__init__(family)
-        self.motor: Final = protocol.checked_motor(_number(motor))
+        try:
+            number, self.tick_ms = units.whole(str(motor)), units.real(str(ramp_tick_ms))
+        except ValueError:
+            raise RequestError(f"motor={motor},ramp_tick_ms={ramp_tick_ms}: a number is needed") from None
+        self.motor: Final = protocol.checked_motor(number)
+        if not 1e-3 <= self.tick_ms <= 1e4:
+            raise RequestError(f"ramp_tick_ms={ramp_tick_ms} is not possible", expected="0.001 to 10000")
         self.order: Final = checked_order(dump_order)
         self.state = BusState()
 
     def __copy__(self) -> StepperDriver:
         """A copy with a state of its own: what a dry run sends is not remembered."""
-        copied = StepperDriver(self.family, self.motor, self.order)
+        copied = StepperDriver(self.family, self.motor, self.order, self.tick_ms)
         copied.state = deepcopy(self.state)
         return copied
 
     def node(self, node: int = protocol.ONLY) -> Node:
         """The controller of this bus. Raises RequestError for another id than 1."""
-        return Node(node, self.motor, self.order, self.state)
+        return Node(node, self.motor, self.order, self.tick_ms, self.state)
 
     def turnaround(self, request: Request[Any]) -> float:
-        if isinstance(request.expected, tuple) and protocol.DUMP_LENGTH in [
-            one.length for one in request.expected
-        ]:
+        expected = request.expected
+        if isinstance(expected, tuple) and any(one.length == protocol.DUMP_LENGTH for one in expected):
             return DUMP_END - protocol.DUMP_LENGTH * BITS / protocol.RATE
         return super().turnaround(request)
 
@@ -75,11 +86,12 @@ class StepperDriver(HalfDuplexSerial):
         return protocol.Receiver()
 
     def probe(self, node: int, attempt: int) -> Request[bool]:
-        """Read a project, in turn: the bus doubts the last replies, so what was read before is forgotten.
+        """Read a project, in turn: the bus doubts the last replies, so what is known is forgotten.
 
         A frame that begins with a motor number or with 00 would write registers of an inertial sensor with this header.
         """
         self.state.projects.clear()
+        self.state.selected = None
         number = attempt % PROJECTS + 1
         return dump_once(self.node(node), number).convert(
             lambda data: data[protocol.REPLY_LENGTH] in (0, number)
@@ -88,17 +100,11 @@ class StepperDriver(HalfDuplexSerial):
     def stop(self, nodes: Mapping[int, Response | None]) -> Stop:
         """Both stop commands; without waiting for a reply if the controller has not replied yet."""
         requests = [command(self.node(), name, ignore) for name in STOPS]
-        frames = [
-            Request[Response](
-                one.wire,
-                one.expected if nodes else (),
-                priority=one.priority,
-                effect=one.effect,
-                repeatable=True,
-            )
+        blind = [
+            Request[Response](one.wire, (), priority=one.priority, effect=one.effect, repeatable=True)
             for one in requests
         ]
-        return Stop(tuple(frames), stop.Promise.STOP_ACCEPTED.value)
+        return Stop(tuple(requests if nodes else blind), stop.Promise.STOP_ACCEPTED.value)
 
     def identify(self, node: int) -> Runnable[Identity]:
         return identify(self.node(node))
@@ -125,12 +131,3 @@ async def identify(node: Node) -> Identity:
     """A controller that replies with a dump; it reports no model, version or number."""
     await dump_once(node, 1)
     return Identity(node.node, MODEL, UNKNOWN, node.table.name, {"motor": node.motor, "projects": PROJECTS})
-
-
-def _number(motor: object) -> int:
-    try:
-        return units.whole(str(motor))
-    except ValueError:
-        raise RequestError(
-            f"motor={motor} is not a whole number", expected="1 to 255; the manual knows 3"
-        ) from None

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from motorbus.core.device import AsyncDevice, AsyncRunner, BlockingDevice, BlockingRunner, device_method
-from motorbus.families.stepper.driver import bus, io, loan, manual, projects, run, stop
-from motorbus.families.stepper.driver.node import BusState, Node
+from motorbus.families.stepper.driver import bus as bus_driver
+from motorbus.families.stepper.driver import io, manual, project1, projects, run, stop
+from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.requests import manual as command_method
-from motorbus.families.stepper.parameters import Order
-from motorbus.families.stepper.protocol import MOTOR, ONLY
+from motorbus.families.stepper.protocol import ONLY
 
 
 class ControllerMethods(Node):
     """Methods of a controller. Angles in rad, velocities in rad/s, times in s, distances in units of the project."""
 
     _family = "stepper"
-    ping = device_method(bus.ping)
-    identify = device_method(bus.identify)
+    ping = device_method(bus_driver.ping)
+    identify = device_method(bus_driver.identify)
     read = device_method(projects.read)
     read_raw = device_method(projects.read_raw)
     read_project = device_method(projects.read_project)
@@ -23,7 +25,6 @@ class ControllerMethods(Node):
     difference = device_method(projects.difference)
     write_project = device_method(projects.write_project)
     write = device_method(projects.write)
-    save = device_method(projects.save)
     clear = device_method(projects.clear)
     backup = device_method(projects.backup)
     restore = device_method(projects.restore)
@@ -40,7 +41,7 @@ class ControllerMethods(Node):
     jog_reverse = device_method(manual.jog_reverse)
     run_once = device_method(manual.run_once)
     home = device_method(manual.home)
-    recover = device_method(loan.recover)
+    recover = device_method(project1.recover)
 
     # Commands of the manual, one request each. The others of its 27 items are above, verified.
     select_project = device_method(command_method("select_project"))
@@ -66,7 +67,7 @@ class ControllerMethods(Node):
     @property
     def last_commanded(self) -> dict[int, bool | None]:
         """The level last sent on this bus, by output 1 to 3 and 5 for the LEDs; None: unknown. It is not a reading."""
-        return io.last_commanded(self)
+        return dict(self.state.outputs)
 
 
 class Controller(ControllerMethods, BlockingDevice):
@@ -85,8 +86,9 @@ class AsyncController(ControllerMethods, AsyncDevice):
         AsyncDevice.__init__(self, bus)
 
 
-def _settings(bus: object) -> tuple[int, Order, BusState | None]:
-    """Motor number, byte order and state of this bus; those of the manual for anything else."""
+def _settings(bus: object) -> tuple[Any, ...]:
+    """Motor number, byte order, ramp tick and state of this bus; those of a new node for anything else."""
     driver = getattr(bus, "driver", None)
-    order: Order = getattr(driver, "order", "little")
-    return getattr(driver, "motor", MOTOR), order, getattr(driver, "state", None)
+    if not isinstance(driver, bus_driver.StepperDriver):
+        return ()
+    return driver.motor, driver.order, driver.tick_ms, driver.state

@@ -29,20 +29,6 @@ class InputChanged(NamedTuple):
     at: float
 
 
-class Watched(NamedTuple):
-    """The last level of each input, the changes in order, and how often each input was read in how many s."""
-
-    levels: Mapping[int, bool]
-    changes: tuple[InputChanged, ...]
-    rounds: int
-    seconds: float
-
-    @property
-    def rate(self) -> float:
-        """Rounds per second: at 9600 baud at most 56 for one input, 11 for all five."""
-        return self.rounds / self.seconds if self.seconds > 0 else 0.0
-
-
 class Levels:
     """Inputs by readings: a change counts when it was read twice in a row."""
 
@@ -90,16 +76,18 @@ async def _level(node: Node, port: int) -> bool:
     )
 
 
-async def watch_inputs(node: Node, ports: Iterable[int] = PORTS, seconds: float = 10.0) -> Watched:
-    """Read these inputs in turn for `seconds`; report `InputChanged` at the second reading of a change.
+async def watch_inputs(
+    node: Node, ports: Iterable[int] = PORTS, seconds: float = 10.0
+) -> tuple[InputChanged, ...]:
+    """Read these inputs in turn for `seconds`; return and report each change at its second reading.
 
-    A change shorter than two rounds is missed. Raises RequestError for another port, or a time not above 0.
+    A round takes 18 ms for each input; a change shorter than two rounds is missed. Raises RequestError for another
+    port, or a time not above 0.
     """
     chosen = checked_ports(ports)
     check_seconds("seconds", seconds)
     levels = Levels(await inputs(node, chosen))
     changes = []
-    rounds = 0
     now = begun = await Sleep(0)
     while now - begun < seconds:
         for port in chosen:
@@ -108,8 +96,7 @@ async def watch_inputs(node: Node, ports: Iterable[int] = PORTS, seconds: float 
             if change := levels.take(port, active, now):
                 changes.append(change)
                 await Emit(change)
-        rounds += 1
-    return Watched(levels.settled, tuple(changes), rounds, now - begun)
+    return tuple(changes)
 
 
 async def set_output(node: Node, port: int, active: bool) -> None:
@@ -124,11 +111,6 @@ async def set_output(node: Node, port: int, active: bool) -> None:
     node.state.outputs.update(dict.fromkeys(ports))
     await request
     node.state.outputs.update(dict.fromkeys(ports, bool(active)))
-
-
-def last_commanded(node: Node) -> dict[int, bool | None]:
-    """The level last sent on this bus, by output 1 to 3 and 5 for the LEDs; None: unknown. It is not a reading."""
-    return dict(node.state.outputs)
 
 
 def checked_ports(ports: Iterable[int]) -> tuple[int, ...]:

@@ -1,12 +1,13 @@
 """Manual motion: by an angle, for a time, to the home switch.
 
 A jog with a velocity is a single move of velocity times time, so a host that dies leaves a motor that stops by itself.
-Neither a position nor a notice comes back: angle and time of such a motion are estimates.
+Neither a position nor a notice comes back: angle and time of such a motion are estimates. A move is stopped when its
+estimated time and a margin of 2 % and 0.05 s have passed; a controller with a slower ramp than `ramp_tick_ms` says
+falls short then.
 """
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from fractions import Fraction
 from functools import partial
@@ -19,11 +20,11 @@ from motorbus.core.setpoint import Setpoint
 from motorbus.core.steps import Emit, Progress, Sleep
 from motorbus.errors import NotHomed, RequestError
 from motorbus.families.stepper.driver.io import check_seconds, read_input
-from motorbus.families.stepper.driver.loan import lend
 from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.driver.project1 import with_project1
 from motorbus.families.stepper.driver.requests import command, ignore
-from motorbus.families.stepper.driver.stop import Promise, Watch
-from motorbus.families.stepper.execution.ramp import Motion, motion, pulses_of, ramp_of, slowest
+from motorbus.families.stepper.driver.stop import Watch
+from motorbus.families.stepper.execution import ramp
 from motorbus.families.stepper.parameters import HOME_INPUT, REVERSE, Project
 
 LONGEST_JOG: Final = 60.0  # s
@@ -33,12 +34,11 @@ READINGS: Final = 2  # of input 5 in a row
 PAUSE: Final = 0.02  # s between two readings, in which another thread can use the bus
 REPORT: Final = 0.1  # s between two reports of progress, and two looks for a stop
 CLOCK: Final = 1.02  # its clock may be slower by so much # assumption
-SPARE: Final = 0.05  # s # assumption
+MARGIN: Final = 0.05  # s that a move may take longer than estimated # assumption
 ROUNDING: Final = 0.1  # share by which a velocity may differ from a whole RPM
 EXACT: Final = 1 + 1e-9  # an RPM that was converted to rad/s and back
 START: Final = 50  # Hz, where step 1 has none: the example of item 5
 ACCELERATION: Final = 30  # Hz, likewise, of item 6
-HUNDREDTHS: Final = 36000  # of a degree in a turn: the unit where a pulse as unit does not fit
 MAX_DISTANCE: Final = 0xFFFFFF
 MAX_RPM: Final = 0xFFFF
 
@@ -46,14 +46,13 @@ MAX_RPM: Final = 0xFFFF
 class Moved(NamedTuple):
     """A motion that was requested and had its time; all of it is estimated.
 
-    `angle` in rad and `velocity` in rad/s, forward positive; `seconds` that it takes at most; `promise` of the stop.
+    `angle` in rad and `velocity` in rad/s, forward positive; `seconds` that it takes at most.
     """
 
     node: int
     angle: float
     velocity: float
     seconds: float
-    promise: Promise
 
     def __str__(self) -> str:
         rpm = abs(self.velocity) * 60 / tau
@@ -66,23 +65,19 @@ class Homed(NamedTuple):
     node: int
     seconds: float
     velocity: float
-    promise: Promise
-
-    def __str__(self) -> str:
-        rpm = self.velocity * 60 / tau
-        return f"input {HOME_INPUT} was active after {self.seconds:.1f} s in reverse at {rpm:.0f} RPM"
 
 
 # -- by an angle, for a time -------------------------------------------------------------------------------------------
 
 
 async def move_by(node: Node, angle: float, *, velocity: float | None = None, wait: bool = True) -> Moved:
-    """Turn by `angle` (rad, forward positive, in whole pulses) with a loan of project 1, wait for its time, then stop.
+    """Turn by `angle` (rad, forward positive, in whole pulses) with temporary use of project 1, wait for its time,
+    then stop.
 
-    `velocity` in rad/s, above 0, in whole RPM; None: that of step 1. `wait=False` is refused: project 1 has to be given
-    back. Raises RequestError, with nothing written, for a velocity more than 10 % off a whole RPM, less than a pulse,
-    and as `lend`; Interrupted if it is stopped; OutcomeUnknown without an acknowledgement. The position is unknown
-    after each error that is not `unmoved`.
+    `velocity` in rad/s, above 0, in whole RPM; None: that of step 1. `wait=False` is refused: project 1 has to be
+    restored. Raises RequestError, with nothing written, for a velocity more than 10 % off a whole RPM, less than a
+    pulse, and as `with_project1`; Interrupted if it is stopped; OutcomeUnknown without an acknowledgement. The position
+    is unknown after an error of a motion that was requested.
     """
     if not wait:
         raise RequestError("a move of the stepper controller is always waited for")
@@ -106,7 +101,7 @@ async def run_once(node: Node) -> Moved:
 
     Nothing is edited. Raises RequestError if it has none, and as `move_by`.
     """
-    return await lend(node, "run_once", checked, _move_once)
+    return await with_project1(node, "run_once", checked, _move_once)
 
 
 async def jog_forward(node: Node, seconds: float) -> Moved:
@@ -115,77 +110,71 @@ async def jog_forward(node: Node, seconds: float) -> Moved:
     The command itself has no end: if the host dies, the motor turns on. `jog` ends by itself. Raises RequestError
     without a speed, and as `move_by`.
     """
-    check_seconds("seconds", seconds, LONGEST_JOG)
-    return await lend(node, "jog_forward", checked, _jog("jog_forward", 1, seconds), ends=False)
+    return await _jog(node, "jog_forward", 1, seconds)
 
 
 async def jog_reverse(node: Node, seconds: float) -> Moved:
     """Turn in reverse for `seconds` (item 17b); see `jog_forward`."""
-    check_seconds("seconds", seconds, LONGEST_JOG)
-    return await lend(node, "jog_reverse", checked, _jog("jog_reverse", -1, seconds), ends=False)
+    return await _jog(node, "jog_reverse", -1, seconds)
 
 
 async def _move(node: Node, verb: str, angle: float, rpm: int | None) -> Moved:
     def change(project: Project) -> Project:
         project = shaped(project, angle, rpm)
-        checked_pulses(project)
+        check_pulses(project)
         return project
 
-    return await lend(node, verb, change, _move_once)
+    return await with_project1(node, verb, change, _move_once)
 
 
 async def _move_once(watch: Watch, project: Project) -> Moved:
-    pulses, sign = checked_pulses(project), project.step(1).sign
-    angle = sign * pulses * pulse_angle(project)
-    seconds = longest(project, pulses)
+    check_pulses(project)
+    move = ramp.move_of(project, project.step(1), watch.node.tick_ms)
+    angle, seconds = angle_of(project), move.duration * CLOCK + MARGIN
     await motion_request(watch, "run_once", "relative", angle, project)
     await wait(watch, seconds, "moving")
-    return Moved(watch.node.node, angle, sign * velocity_of(project), seconds, Promise.STOP_ACCEPTED)
+    return Moved(watch.node.node, angle, move.sign * velocity_of(project), seconds)
 
 
-def _jog(name: str, sign: int, seconds: float) -> Callable[[Watch, Project], Awaitable[Moved]]:
+async def _jog(node: Node, name: str, sign: int, seconds: float) -> Moved:
+    check_seconds("seconds", seconds, LONGEST_JOG)
+
     async def turn(watch: Watch, project: Project) -> Moved:
         velocity = sign * velocity_of(project)
         await motion_request(watch, name, "velocity", velocity, project)
         await wait(watch, seconds, name)
-        angle = sign * motion_of(project, None).done(seconds) * pulse_angle(project)
-        return Moved(watch.node.node, angle, velocity, seconds, Promise.STOP_ACCEPTED)
+        speed = ramp.ramp_of(project, project.step(1), node.tick_ms)
+        angle = sign * ramp.motion(speed, None, sign).done(seconds) * pulse_angle(project)
+        return Moved(node.node, angle, velocity, seconds)
 
-    return turn
+    return await with_project1(node, name, checked, turn, ends=False)
 
 
 # -- to the home switch ------------------------------------------------------------------------------------------------
 
 
-async def home(
-    node: Node, *, deadline: float = DEADLINE, velocity: float | None = None, at_most: float | None = None
-) -> Homed:
+async def home(node: Node, *, deadline: float = DEADLINE, velocity: float | None = None) -> Homed:
     """Turn in reverse until input 5 is active (item 22), at most `deadline` s (up to 600), then stop in each case.
 
-    The speed is that of step 1 of project 1; `velocity` (rad/s, above 0, in whole RPM) takes a loan for another one,
-    `at_most` (rad/s) only if step 1 is faster. Reports `Progress` in ms. That the motor stops at the switch at once is
-    an assumption.
+    The speed is that of step 1 of project 1; `velocity` (rad/s, above 0, in whole RPM) is another one, with temporary
+    use of project 1. Reports `Progress` in ms. That the motor stops at the switch at once is an assumption.
 
     Raises NotHomed if input 5 is active before (nothing is moved), or not by the deadline; RequestError without a
-    speed, and as `lend`; Interrupted; OutcomeUnknown if command or stop is not acknowledged.
+    speed, and as `move_by`; Interrupted; OutcomeUnknown if command or stop is not acknowledged.
     """
     check_seconds("deadline", deadline, LONGEST_HOMING)
     rpm = _rpm(velocity)
-
-    def change(project: Project) -> Project:
-        if rpm is not None:
-            return paced(project, rpm)
-        checked(project)
-        is_slow = at_most is None or velocity_of(project) <= at_most * EXACT
-        return project if is_slow else paced(project, rpm_below(at_most or 0.0))
 
     async def turn(watch: Watch, project: Project) -> Homed:
         begun = await Sleep(0)
         await motion_request(watch, "home", "velocity", -velocity_of(project), project)
         seconds = await _until_home(watch, begun, deadline)
-        return Homed(node.node, seconds, velocity_of(project), Promise.STOP_ACCEPTED)
+        return Homed(node.node, seconds, velocity_of(project))
 
-    return await lend(node, "home", change, turn, prepare=partial(_check_released, node))
+    def change(project: Project) -> Project:
+        return checked(project) if rpm is None else paced(project, rpm)
+
+    return await with_project1(node, "home", change, turn, prepare=partial(_check_released, node))
 
 
 async def _check_released(node: Node) -> None:
@@ -240,14 +229,7 @@ async def wait(watch: Watch, seconds: float, what: str) -> None:
         watch.check()
 
 
-def longest(project: Project, pulses: int) -> float:
-    """s that a move may take, by the slowest reading of its ramp and a slow clock."""
-    return slowest(project, project.step(1), pulses) * CLOCK + SPARE
-
-
-def motion_of(project: Project, pulses: int | None) -> Motion:
-    """The motion of step 1 over time; None: without end."""
-    return motion(ramp_of(project, project.step(1)), pulses, project.step(1).sign)
+# -- project 1 for a motion --------------------------------------------------------------------------------------------
 
 
 def velocity_of(project: Project) -> float:
@@ -260,7 +242,10 @@ def pulse_angle(project: Project) -> float:
     return tau / float(project.pulses_per_turn or 1)
 
 
-# -- project 1 for a motion --------------------------------------------------------------------------------------------
+def angle_of(project: Project) -> float:
+    """rad of the move of step 1, forward positive."""
+    step = project.step(1)
+    return step.sign * ramp.pulses_of(project, step) * pulse_angle(project)
 
 
 def checked(project: Project) -> Project:
@@ -270,11 +255,10 @@ def checked(project: Project) -> Project:
     raise RequestError("project 1 gives no speed in step 1, or no pulses per turn", advice="write project 1")
 
 
-def checked_pulses(project: Project) -> int:
-    """The pulses of the single move. Raises RequestError for none: that may be a move without end."""
-    if pulses := pulses_of(project, project.step(1)):
-        return pulses
-    raise RequestError(f"this move is less than one pulse of {pulse_angle(project):.4g} rad")
+def check_pulses(project: Project) -> None:
+    """Raise RequestError if the single move has no pulses: that may be a move without end."""
+    if not angle_of(checked(project)):
+        raise RequestError(f"this move is less than one pulse of {pulse_angle(project):.4g} rad")
 
 
 def _rpm(velocity: float | None) -> int | None:
@@ -292,20 +276,11 @@ def _rpm(velocity: float | None) -> int | None:
     )
 
 
-def rpm_below(velocity: float) -> int:
-    """The highest whole RPM that is not above this velocity (rad/s). Raises RequestError below 1 RPM."""
-    check_finite("velocity", velocity)
-    rpm = int(min(velocity * 60 / tau * EXACT, MAX_RPM))
-    if rpm >= 1:
-        return rpm
-    raise RequestError(f"velocity {velocity:.4g} rad/s is below {tau / 60:.4g} rad/s, which is 1 RPM")
-
-
 def paced(project: Project, rpm: int) -> Project:
     """Project 1 with this speed in step 1 and a start frequency below it. Raises RequestError without a geometry."""
     step = project.step(1)
     project = checked(project.with_step(1, speed=rpm))
-    running = ramp_of(project, project.step(1)).run
+    running = ramp.ramp_of(project, project.step(1)).run
     start = step.start_frequency or START
     return project.with_step(
         1,
@@ -317,16 +292,13 @@ def paced(project: Project, rpm: int) -> Project:
 def shaped(project: Project, angle: float, rpm: int | None) -> Project:
     """Project 1 as a move by this angle (rad), in whole pulses; `rpm` None: at its own speed.
 
-    The unit is a pulse, or a part of one where a turn has no whole number of pulses; a hundredth of a degree where that
-    does not fit. Raises RequestError for too much; `checked_pulses` does so for less than a pulse.
+    The unit is a pulse, or a part of one where a turn has no whole number of pulses. Raises RequestError for more than
+    16,777,215 units in the move or in a turn; `check_pulses` does so for less than a pulse.
     """
     project = paced(project, checked(project).step(1).speed if rpm is None else rpm)
     turn = project.pulses_per_turn or Fraction(0)
-    turns = Fraction(abs(angle) / tau)
-    unit, distance = turn.numerator, turn.denominator * round(turns * turn)
+    unit, distance = turn.numerator, turn.denominator * round(Fraction(abs(angle) / tau) * turn)
     if max(unit, distance) > MAX_DISTANCE:
-        unit, distance = HUNDREDTHS, round(turns * HUNDREDTHS)
-    if distance > MAX_DISTANCE:
         most = MAX_DISTANCE * tau / unit
         raise RequestError(f"{angle:.6g} rad is too far for one move", expected=f"at most {most:.6g} rad")
     direction = REVERSE if angle < 0 else 1 - REVERSE

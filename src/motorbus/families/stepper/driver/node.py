@@ -6,6 +6,7 @@ from typing import Final
 
 from motorbus.core.register import Register, RegisterMap, Value, shown
 from motorbus.errors import RequestError
+from motorbus.families.stepper.execution.ramp import TICK_MS
 from motorbus.families.stepper.parameters import LEDS, OUTPUTS, TABLE, Order, Project, checked_order
 from motorbus.families.stepper.protocol import MOTOR, ONLY, checked_motor
 
@@ -13,29 +14,29 @@ from motorbus.families.stepper.protocol import MOTOR, ONLY, checked_motor
 class BusState:
     """What was read from and sent to the controller of one open bus. Other hosts, buttons and power cycles change it.
 
-    `projects`        as they were read last; forgotten at an own write, a missing reply and a reconnect
-    `unsaved`         the project that was edited last and not saved; None: none
-    `stops_asked`     number of calls of `stop`
-    `stops_accepted`  number of stops that the controller acknowledged
-    `stopping`        number of stops that are being sent
-    `may_run`         a project was started; since then neither its notice came nor a stop was acknowledged
-    `outputs`         the level last sent, by output 1 to 3 and 5 for the LEDs; None: unknown
+    `projects`   as they were read last; forgotten at an own write, a missing reply and a reconnect
+    `selected`   the project that was selected last; None: not known
+    `is_edited`  parameters were sent since the last save; they may be those of `projects` all the same
+    `stops`      number of calls of `stop`; `stopped`: of acknowledged stops of a project
+    `may_run`    a project was started; since then neither its notice came nor a stop was acknowledged
+    `is_noted`   the journal has that start, and not its end
+    `outputs`    the level last sent, by output 1 to 3 and 5 for the LEDs; None: unknown
     """
 
     def __init__(self) -> None:
         self.projects: dict[int, Project] = {}
-        self.unsaved: Project | None = None
-        self.stops_asked = 0
-        self.stops_accepted = 0
-        self.stopping = 0
-        self.may_run = False
+        self.selected: int | None = None
+        self.is_edited = False
+        self.stops = self.stopped = 0
+        self.may_run = self.is_noted = False
         self.outputs: dict[int, bool | None] = dict.fromkeys((*range(1, OUTPUTS + 1), LEDS))
 
 
 class Node:
     """The one controller of a line, id 1; its frames carry no address. Raises RequestError for another id.
 
-    `motor` is the number in motor commands, `order` the byte order in dumps, `state` that of the open bus.
+    `motor` is the number in motor commands, `order` the byte order in dumps, `tick_ms` that of ramps, `state` that of
+    the open bus.
     """
 
     def __init__(
@@ -43,11 +44,19 @@ class Node:
         node: int = ONLY,
         motor: int = MOTOR,
         order: Order = "little",
+        tick_ms: float = TICK_MS,
         state: BusState | None = None,
     ) -> None:
-        self.node: Final = checked_id(node)
+        if not isinstance(node, int) or isinstance(node, bool) or node != ONLY:
+            raise RequestError(
+                f"{shown(node)} is not the id of a stepper controller",
+                expected=f"{ONLY}: a line has one controller, whose frames carry no address",
+                advice="open a line for each controller",
+            )
+        self.node: Final = node
         self.motor: Final = checked_motor(motor)
         self.order: Final[Order] = checked_order(order)
+        self.tick_ms: Final = tick_ms
         self.state: Final = BusState() if state is None else state
 
     @property
@@ -63,14 +72,3 @@ class Node:
     def raw(self, row: Register, value: Value) -> int:
         """Value in the unit of the row -> raw value. Raises RequestError if it is not a finite number."""
         return row.to_raw(value)
-
-
-def checked_id(node: int) -> int:
-    """The id of the only controller. Raises RequestError for another one."""
-    if isinstance(node, int) and not isinstance(node, bool) and node == ONLY:
-        return node
-    raise RequestError(
-        f"{shown(node)} is not the id of a stepper controller",
-        expected=f"{ONLY}: a line has one controller, whose frames carry no address",
-        advice="open a line for each controller",
-    )

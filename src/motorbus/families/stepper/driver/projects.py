@@ -1,4 +1,4 @@
-"""Projects: read, write, save, clear, back up and restore, each verified.
+"""Projects: read, write, clear, back up and restore, each verified.
 
 A dump has no checksum: two equal dumps count, and one if it is as wanted. An acknowledgement repeats no value, so every
 write is read back. Edits go to a copy that a save stores; the first edit selects the project, and whether that loads
@@ -7,10 +7,11 @@ what is stored is an assumption. So a project that does not read as wanted after
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
+from motorbus.core.access import writable_values
 from motorbus.core.register import Value
 from motorbus.core.request import Request
 from motorbus.core.steps import ASKED, READABLE, Emit, Exclusive, JournalEntry, Progress, catch
@@ -26,7 +27,7 @@ from motorbus.families.stepper import parameters
 from motorbus.families.stepper.driver.io import read_input
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.requests import command, ignore
-from motorbus.families.stepper.driver.stop import check_idle
+from motorbus.families.stepper.driver.stop import check_free
 from motorbus.families.stepper.edits import Edit, edits, edits_between
 from motorbus.families.stepper.parameters import PROJECTS, STEPS, Project, check_value, differences
 from motorbus.families.stepper.program.backup import Backup
@@ -35,7 +36,6 @@ from motorbus.families.stepper.protocol import REPLY_LENGTH
 
 READINGS: Final = 5  # dumps of which two must be equal
 TRIES: Final = 3  # of a save; flash wears
-SHOWN: Final = 6  # differences that an error lists
 MANUAL: Final = 1  # the project from whose step 1 manual motion takes distance and speed
 
 Changes = Mapping[str, tuple[int, int]]
@@ -53,9 +53,6 @@ class Written(NamedTuple):
     project: int
     changes: Changes
     proof: str
-
-    def __str__(self) -> str:
-        return f"project {self.project} {self.proof}, parameters changed: {len(self.changes)}"
 
 
 # -- read --------------------------------------------------------------------------------------------------------------
@@ -81,25 +78,19 @@ async def dump(node: Node, project: int = 1) -> bytes:
                 advice="check cable and ground",
                 node=node.node,
             )
-    found = _decode(node, data)
-    if found.number not in (0, project) or found.total_steps > STEPS:
+    found = parameters.decode_image(data[REPLY_LENGTH:], node.order)
+    if found.number != project and not found.is_cleared:
         raise UnexpectedReply(
-            f"the dump of project {project} is of project {found.number} with {found.total_steps} steps",
-            received=data,
-            node=node.node,
+            f"the dump of project {project} is of project {found.number}", received=data, node=node.node
         )
     node.state.projects[project] = replace(found, number=project)
     return data
 
 
-def _decode(node: Node, data: bytes) -> Project:
-    return parameters.decode_image(data[REPLY_LENGTH:], node.order)
-
-
 async def read_image(node: Node, number: int) -> Project:
     """A project by two equal dumps. Raises as `dump`."""
-    await dump(node, number)
-    return node.state.projects[number]
+    data = await dump(node, number)
+    return replace(parameters.decode_image(data[REPLY_LENGTH:], node.order), number=number)
 
 
 async def cached(node: Node, number: int) -> Project:
@@ -108,7 +99,7 @@ async def cached(node: Node, number: int) -> Project:
     An input is read first: after a missing reply or a reconnect the bus then probes, which forgets the projects. With
     edits that are not saved the dumps are read: a power-off between two commands loses them without a missing reply.
     """
-    if node.state.unsaved is not None:
+    if node.state.is_edited:
         node.state.projects.pop(number, None)
     elif number in node.state.projects:
         await read_input(node, 1)
@@ -116,7 +107,7 @@ async def cached(node: Node, number: int) -> Project:
 
 
 async def read_project(node: Node, project: int = 1) -> Program:
-    """Project 1 to 4 as a program (item 15). Raises as `dump`, RequestError for numbers that no program can hold."""
+    """Project 1 to 4 as a program (item 15); one that was cleared or erased has no steps. Raises as `dump`."""
     return Program.from_dump(await dump(node, project), name=f"project {project}", order=node.order)
 
 
@@ -138,28 +129,28 @@ async def read_raw(node: Node, /, *names: str, project: int = 1) -> dict[str, in
 
 async def read_back(node: Node, wanted: Project) -> Project:
     """The project of this number as it reads now: by one dump if it is as wanted, else by two equal ones."""
-    shown = _decode(node, await dump_once(node, wanted.number))
-    if replace(shown, number=wanted.number) != wanted:
+    data = await dump_once(node, wanted.number)
+    if replace(parameters.decode_image(data[REPLY_LENGTH:], node.order), number=wanted.number) != wanted:
         return await read_image(node, wanted.number)
     node.state.projects[wanted.number] = wanted
     return wanted
 
 
-async def bring(node: Node, shown: Project, wanted: Project) -> bool:
-    """Edit a project until it reads as wanted, without a save. False: it still reads as `shown`.
+async def bring(node: Node, before: Project, wanted: Project) -> bool:
+    """Edit a project until it reads as wanted, without a save. False: it still reads as `before`.
 
     What differs is edited, then everything, each followed by a read; everything at once if nothing differs. A
     controller that reads as before after both shows what is stored, so its edits cannot be read. Raises
     VerificationFailed if it reads as neither, OutcomeUnknown for a command without an acknowledgement. Call it inside
     `Exclusive`.
     """
-    for orders in (edits_between(shown, wanted), edits(wanted, rows=STEPS)):
+    for orders in (edits_between(before, wanted), edits(wanted)):
         if orders:
             await _send(node, wanted.number, orders)
             found = await read_back(node, wanted)
             if found == wanted:
                 return True
-    if found == shown:
+    if found == before:
         return False
     raise _different(node, wanted, found, "it was edited; power-off brings back what is stored")
 
@@ -176,20 +167,13 @@ async def _send(node: Node, project: int, orders: list[Edit]) -> None:
 
 def _different(node: Node, wanted: Project, found: Project, state: str) -> VerificationFailed:
     wrong = [f"{name}: {old} -> {new}" for name, (old, new) in differences(wanted, found).items()]
-    more = f" and {len(wrong) - SHOWN} more" if len(wrong) > SHOWN else ""
     return VerificationFailed(
         f"project {wanted.number} reads different from what was written: {state}",
-        expected=f"(wanted -> read) {'; '.join(wrong[:SHOWN])}{more}",
+        expected=f"(wanted -> read) {'; '.join(wrong)}",
         cause="it lost its supply, another program edits it, it refuses a value, or dump_order is wrong",
         advice="write it again",
         node=node.node,
     )
-
-
-async def check_free(node: Node, verb: str) -> None:
-    """Raise RequestError while a project may run, or a change of this bus is unfinished in the journal."""
-    check_idle(node, f"{verb}()")
-    await Emit(JournalEntry(verb, ASKED, {"node": node.node}))
 
 
 # -- write -------------------------------------------------------------------------------------------------------------
@@ -203,7 +187,7 @@ async def write_project(
     Only what differs is written; steps beyond the last are kept. A controller has one copy that is edited: edits of
     another project that were not saved are lost. `expert` allows errors of lint. Reports `Progress`. Raises
     RequestError, with nothing written; VerificationFailed if it reads different after three tries; OutcomeUnknown for a
-    command without an acknowledgement. A second call completes what an error has left.
+    command without an acknowledgement. A second call completes what an error has left, and saves what was not saved.
     """
     number, change = _merge(program, project, expert)
     return await Exclusive(_write(node, "write_project", number, change, save))
@@ -219,16 +203,22 @@ async def difference(node: Node, program: Program, project: int | None = None) -
 async def write(node: Node, /, *, project: int = 1, save: bool = True, **values: Value) -> Written:
     """Write parameters of a project by name, in API units: `write(project=2, step_3_delay=0.5)`; see `write_project`.
 
-    Raises RequestError for what is unknown, out of range or not written by name, and for a cleared project unless
+    Raises RequestError for what is unknown, out of range or not written by name, and for a project without steps unless
     `total_steps` is among them.
     """
     check_value("project", project)
-    raws = {name: _raw(node, name, value) for name, value in values.items()}
+    methods = {"mode4": "write_project()", "power_on_home": "write_project()"}
+    rows = writable_values(node.table, values, node.raw, node=node.node, methods=methods)
+    raws = {row.name: raw for row, raw in rows}
+    for name, raw in raws.items():
+        if name.endswith("_input"):
+            _, step, field = name.split("_", 2)
+            check_value(field, raw, step=int(step))
 
     def change(before: Project) -> Project:
         if before.is_cleared and "total_steps" not in raws:
             raise RequestError(f"project {project} has no steps", advice="write total_steps, 1 to 10, too")
-        return parameters.amended(before, raws)
+        return parameters.amended(_without_erased(before), raws)
 
     return await Exclusive(_write(node, "write", project, change, save))
 
@@ -245,16 +235,16 @@ def _merge(program: Program, project: int | None, expert: bool) -> tuple[int, Ca
         raise RequestError(
             f"the program has errors: {'; '.join(errors)}", advice="correct it, or say expert=True"
         )
-    return number, lambda before: replace(wanted, steps=wanted.used + before.steps[wanted.total_steps :])
+
+    def change(before: Project) -> Project:
+        return replace(wanted, steps=wanted.used + _without_erased(before).steps[wanted.total_steps :])
+
+    return number, change
 
 
-def _raw(node: Node, name: str, value: Value) -> int:
-    row = node.table[name]
-    if row.protected or not row.writable:
-        raise RequestError(f"{name} is not written by name", cause=row.note, advice="write a program")
-    raw = row.to_raw(value)
-    row.encode(raw, row.given(value))  # raises
-    return raw
+def _without_erased(project: Project) -> Project:
+    """The project; 0 in place of the values of erased memory, which no write may keep."""
+    return Project(number=project.number) if project.total_steps > STEPS else project
 
 
 async def _write(
@@ -264,14 +254,13 @@ async def _write(
     before = await read_image(node, number)
     wanted = change(before)
     changes = differences(before, wanted)
-    unsaved = node.state.unsaved is not None and node.state.unsaved.number == number
-    if not changes and not (save and unsaved):
+    is_unsaved = node.state.is_edited and node.state.selected == number
+    if not changes and not (save and is_unsaved):
         return Written(number, {}, "unchanged")
     if save:
         await _store(node, before, wanted)
         return Written(number, changes, "saved")
     await bring(node, before, wanted)
-    node.state.unsaved = wanted
     return Written(number, changes, "edited")
 
 
@@ -288,25 +277,11 @@ async def _store(node: Node, before: Project, wanted: Project) -> None:
             raise error
         before = await read_back(node, wanted)
         if before == wanted and (error is None or not shows_edits):
-            node.state.unsaved = None
             return
     raise _different(node, wanted, before, f"saved {TRIES} times")
 
 
-# -- save, clear -------------------------------------------------------------------------------------------------------
-
-
-async def save(node: Node, project: int) -> Written:
-    """Save the edits that this host has made of a project and not saved, as `write_project` does.
-
-    Everything is written again first: no request tells which project is selected, and a save stores that one. Raises
-    RequestError without such edits; `save_project` saves whatever is edited.
-    """
-    unsaved = node.state.unsaved
-    if unsaved is None or unsaved.number != project:
-        raise RequestError(f"project {project} has no edits of this host that are not saved")
-    wanted = unsaved
-    return await Exclusive(_write(node, "save", project, lambda before: wanted, True))
+# -- clear, back up, restore -------------------------------------------------------------------------------------------
 
 
 async def clear(node: Node, project: int, *, expert: bool = False) -> Written:
@@ -326,80 +301,68 @@ async def clear(node: Node, project: int, *, expert: bool = False) -> Written:
 async def _clear(node: Node, number: int) -> Written:
     await check_free(node, "clear")
     before, blank = await read_image(node, number), Project(number=number)
-    if is_blank(before):
+    if _is_blank(before):
         return Written(number, {}, "unchanged")
-    if node.state.unsaved is not None and node.state.unsaved.number == number:
-        node.state.unsaved = None
-    error = await catch(command(node, "clear_project", ignore, project=number))
-    if isinstance(error, OutcomeUnknown | WireError):
-        error = await catch(command(node, "clear_project", ignore, project=number))  # twice is as once
-    if error is not None:
-        raise error
+    try:
+        await command(node, "clear_project", ignore, project=number)
+    except (OutcomeUnknown, WireError):
+        await command(node, "clear_project", ignore, project=number)  # twice is as once
     found = await read_image(node, number)
-    if not is_blank(found):
+    if not _is_blank(found):
         raise _different(node, blank, found, "it was cleared")
     return Written(number, differences(before, blank), "saved")
 
 
-def is_blank(project: Project) -> bool:
+def _is_blank(project: Project) -> bool:
     """Nothing is left of it, except flags that may belong to the device."""
     return replace(project, number=0, stop_mode=0, mode4=0, power_on_home=0) == Project()
 
 
-# -- back up and restore -----------------------------------------------------------------------------------------------
-
-
-async def backup(node: Node, projects: Iterable[int] = range(1, PROJECTS + 1)) -> Backup:
-    """Read these projects, each by two equal dumps; only reads.
+async def backup(node: Node) -> Backup:
+    """Read all projects, each by two equal dumps; only reads.
 
     Edits that were not saved are read in place of what is stored, an assumption. Reports `Progress`. Raises
-    RequestError for another number, and while project 1 is lent to an unfinished motion; else as `dump`.
+    RequestError while project 1 is in use by an unfinished motion; else as `dump`.
     """
-    numbers = tuple(dict.fromkeys(projects))
-    for number in numbers:
-        check_value("project", number)
 
     async def read_all() -> Backup:
         await Emit(JournalEntry("backup", ASKED, {"node": node.node, READABLE: True}))
         dumps = {}
-        for done, number in enumerate(numbers, 1):
+        for number in range(1, PROJECTS + 1):
             dumps[number] = await dump(node, number)
-            await Emit(Progress(done, len(numbers), "reading projects"))
+            await Emit(Progress(number, PROJECTS, "reading projects"))
         return Backup(dumps=dumps, order=node.order)
 
     return await Exclusive(read_all())
 
 
-async def restore(node: Node, backup: Backup, projects: Iterable[int] | None = None) -> tuple[Written, ...]:
-    """Write projects of a backup (None: all), save them and read them back, one after the other.
+async def restore(node: Node, backup: Backup) -> tuple[Written, ...]:
+    """Write the projects of a backup, save them and read them back, one after the other.
 
-    Steps beyond the last are written too, a project that was cleared is cleared, and lint is not asked. Bytes that the
-    manual does not name cannot be written. Raises RequestError, with nothing sent, for numbers that no request can
-    carry; else as `write_project`, with a note that names the restored projects.
+    Steps beyond the last are written too, a project that was cleared or erased is cleared, and lint is not asked. Bytes
+    that the manual does not name cannot be written. Raises RequestError, with nothing sent, for numbers that no request
+    can carry; else as `write_project`, with a note that names the restored projects.
     """
-    numbers = dict.fromkeys(backup.projects if projects is None else projects)
-    wanted = [replace(backup.project(number), number=number) for number in numbers]
+    wanted = [replace(backup.project(number), number=number) for number in backup.projects]
     for project in wanted:
-        for error in [] if project.is_cleared else parameters.check_project(project, expert=True):
-            raise RequestError(
-                f"project {project.number} of this backup: {error.summary}", expected=error.expected
-            )
+        errors = parameters.check_project(replace(project, total_steps=STEPS), expert=True)
+        for error in [] if project.is_cleared else errors:
+            error.add_note(f"project {project.number} of the backup")
+            raise error
     done: list[Written] = []
 
-    async def write_all() -> tuple[Written, ...]:
+    async def restore_one(project: Project) -> Written:
+        if project.is_cleared:
+            return await _clear(node, project.number)
+        return await _write(node, "restore", project.number, lambda before: project, True)
+
+    async def restore_all() -> tuple[Written, ...]:
         for project in wanted:
-            number, change = project.number, _constant(project)
-            blank = project.is_cleared
-            work = _clear(node, number) if blank else _write(node, "restore", number, change, True)
-            done.append(await work)
+            done.append(await restore_one(project))  # noqa: PERF401 - kept for the note of an error
         return tuple(done)
 
     try:
-        return await Exclusive(write_all())
+        return await Exclusive(restore_all())
     except BaseException as error:
         error.add_note(f"restored: {', '.join(str(one.project) for one in done) or 'no project'}")
         raise
-
-
-def _constant(project: Project) -> Callable[[Project], Project]:
-    return lambda before: project

@@ -6,13 +6,14 @@ step or port is never accepted.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from inspect import Parameter, Signature
 from typing import Any, Final, TypeVar
 
 from motorbus.core.request import Effect, Expected, Precondition, Priority, Request, Response
 from motorbus.core.setpoint import Setpoint
-from motorbus.families.stepper.driver.node import Node
+from motorbus.errors import RequestError
+from motorbus.families.stepper.driver.node import BusState, Node
 from motorbus.families.stepper.parameters import allowed
 from motorbus.families.stepper.protocol import COMMANDS, Command, check, encode, expected_key
 
@@ -51,8 +52,7 @@ def command(
     wire = encode(name, motor=node.motor, **values)
 
     def take(answer: Response) -> T:
-        if row.effect is Effect.PERSISTENT:
-            node.state.projects.clear()
+        _remember(node.state, row, values)
         return decode(answer.replies[0].data)
 
     return Request(
@@ -68,6 +68,32 @@ def command(
     )
 
 
+def _remember(state: BusState, row: Command, values: Mapping[str, int]) -> None:
+    """Remember what an acknowledged command has changed."""
+    if row.name == "stop_project":
+        state.stopped += 1
+        state.may_run = False
+    if row.effect is not Effect.PERSISTENT:
+        return
+    state.projects.clear()
+    if row.name == "select_project":
+        state.selected = values["project"]
+    if row.is_edit or values["project"] == state.selected:
+        state.is_edited = row.is_edit
+
+
+def check_selected(node: Node, project: int) -> None:
+    """Raise RequestError unless this project was selected last: a save stores the selected one, whatever it names."""
+    selected = node.state.selected
+    if selected != project:
+        known = "no project was selected here" if selected is None else f"project {selected} is selected"
+        raise RequestError(
+            f"save_project({project}) would store another project: {known}",
+            advice=f"call select_project({project}, STEPS) and edit it, or use write()",
+            node=node.node,
+        )
+
+
 def manual(name: str) -> Callable[..., Request[None]]:
     """The driver function of one command of the manual: its signature and docstring come from the row."""
     row = COMMANDS[name]
@@ -79,7 +105,10 @@ def manual(name: str) -> Callable[..., Request[None]]:
     def function(node: Node, /, *args: int, **kwargs: int) -> Request[None]:
         values: dict[str, Any] = signature.bind(node, *args, **kwargs).arguments
         del values["node"]
-        return command(node, name, ignore, **values)
+        request = command(node, name, ignore, **values)
+        if name == "save_project":
+            check_selected(node, values["project"])
+        return request
 
     function.__name__ = function.__qualname__ = name
     function.__doc__ = _docstring(row, fields)

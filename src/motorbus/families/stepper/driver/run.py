@@ -1,7 +1,7 @@
 """Start a stored project, and wait for its end.
 
 The controller acknowledges a start and sends EE DD at the end, two bytes without checksum and number. So a notice
-counts only after the acknowledgement, not before the project can have ended in any reading, and if no stop was sent
+counts only after the acknowledgement, not before the project can have ended with any ramp, and if no stop was sent
 since. An end of the wait stops nothing.
 """
 
@@ -15,7 +15,6 @@ from typing import Final, NamedTuple
 from motorbus.core.request import Notification
 from motorbus.core.setpoint import Setpoint
 from motorbus.core.steps import (
-    ASKED,
     INTENT,
     READABLE,
     Emit,
@@ -26,7 +25,6 @@ from motorbus.core.steps import (
     WaitFor,
     catch,
     gather,
-    with_cleanup,
 )
 from motorbus.errors import (
     Interrupted,
@@ -41,19 +39,18 @@ from motorbus.families.stepper.driver.io import Levels, check_seconds, checked_p
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.projects import read_project
 from motorbus.families.stepper.driver.requests import command, ignore
-from motorbus.families.stepper.driver.stop import RUN, Watch, check_idle, close_run, mark_unmoved
-from motorbus.families.stepper.execution.sequence import earliest_end
+from motorbus.families.stepper.driver.stop import RUN, Watch, check_free, close_run
 from motorbus.families.stepper.parameters import OUTPUTS, STOP_INPUT, Project
-from motorbus.families.stepper.program.estimate import Estimate, estimate, reach
+from motorbus.families.stepper.program.estimate import Estimate, earliest_end, estimate, reach
 from motorbus.families.stepper.protocol import COMPLETED, RATE
 
-LONGER: Final = 1.2  # share of the slowest reading that a project may take # assumption
+LONGER: Final = 1.2  # share of the estimate that a project may take # assumption
 SPARE: Final = 2.0  # s that it may take besides # assumption
 CLOCK: Final = 0.98  # share of the shortest time before which a notice is false # assumption
 SETTLES: Final = 20 / RATE  # s by which the bus may take an acknowledgement later than the notice behind it
+STOPPING: Final = 3.0  # s in which a stop that was sent before a notice is acknowledged, if at all
 REPORT: Final = 0.25  # s between two reports
 LOOK: Final = 0.02  # s between two rounds of inputs
-UNHEARD: Final = (OutcomeUnknown, NoReply, WireError)  # errors of a start that may have been received
 
 
 class Outcome(Enum):
@@ -88,9 +85,9 @@ async def start_project(node: Node, project: int, *, endless: bool = False, expe
     async def check_and_start() -> Estimate:
         found = await _checked_project(node, project, endless, expert)
         await _start(watch, found)
-        return estimate(found)
+        return estimate(found, node.tick_ms)
 
-    return await mark_unmoved(watch, Exclusive(check_and_start()))
+    return await Exclusive(check_and_start())
 
 
 async def run(
@@ -104,9 +101,9 @@ async def run(
 ) -> Ran:
     """Start project 1 to 4 and wait for its end: `completed`, `stopped`, `timeout` or `unknown`, see `Outcome`.
 
-    It waits `timeout` s, else 1.2 times the slowest estimate and 2 s, and without limit for a project that waits for
-    inputs. `watch` are inputs, 1 to 5, that are read meanwhile. Reports `Progress` in ms, estimated, and
-    `InputChanged`. A project that may still run refuses the next motion until `stop`; the journal records it.
+    It waits `timeout` s, else 1.2 times the estimate and 2 s, and without limit for a project that waits for inputs.
+    `watch` are inputs, 1 to 5, that are read meanwhile. Reports `Progress` in ms, estimated, and `InputChanged`. A
+    project that may still run refuses the next motion until `stop`; the journal records it.
 
     `endless` needs a `timeout`. An interrupted wait leaves the project running. An emergency stop raises Interrupted.
     Raises as `start_project`.
@@ -116,49 +113,48 @@ async def run(
     elif endless:
         raise RequestError("a project without end needs a timeout", advice="or use start_project()")
     guard, ports = Watch(node), checked_ports(watch)
-    course = Course(guard, timeout)
+    notices: list[float] = []
+    is_over: list[bool] = []
 
-    async def begin() -> Levels:
-        found = await _checked_project(node, project, endless, expert)
-        levels = Levels(await inputs(node, ports))
-        course.expect(found, await Sleep(0))
-        start = await catch(_start(guard, found))
-        if isinstance(start, MotorbusError) and not isinstance(start, UNHEARD):
-            raise start
-        course.begin(start)
-        return levels
-
-    async def follow() -> None:
-        try:
-            await _follow(course, await Exclusive(begin()))
-        finally:
-            course.is_over = True
+    def take(notice: Notification) -> bool:
+        if notice.kind == COMPLETED:
+            notices.append(notice.at)
+        return notice.kind == COMPLETED
 
     async def listen() -> None:
-        while course.ran is None and not course.is_over:
-            await WaitFor(course.take, LOOK)
+        while not is_over:
+            await WaitFor(take, LOOK)
 
-    async def close() -> None:
-        if course.ran is not None and not node.state.may_run:
-            await close_run(node, course.ran.outcome.value)
+    async def begin() -> tuple[_Course, Levels]:
+        found = await _checked_project(node, project, endless, expert)
+        levels = Levels(await inputs(node, ports))
+        course = _Course(guard, found, await Sleep(0), timeout, notices)
+        course.begin(await catch(_start(guard, found)))
+        return course, levels
 
-    await mark_unmoved(guard, with_cleanup(gather(follow(), listen()), close))
-    assert course.ran is not None
-    return course.ran
+    async def follow() -> Ran:
+        try:
+            return await _follow(*await Exclusive(begin()))
+        finally:
+            is_over.append(True)
+
+    ran, _ = await gather(follow(), listen())
+    if not node.state.may_run:
+        await close_run(node, ran.outcome.value)
+    return ran
 
 
 # -- start -------------------------------------------------------------------------------------------------------------
 
 
 async def _checked_project(node: Node, number: int, endless: bool, expert: bool) -> Project:
-    check_idle(node, f"start of project {number}")
-    await Emit(JournalEntry(RUN, ASKED, {"node": node.node}))
+    await check_free(node, RUN)
     program = await read_project(node, number)
     errors = [] if expert else [str(one) for one in program.lint() if one.level == "error"]
     refusals = {
         "has no steps; write it first": program.project.is_cleared,
         f"has errors: {'; '.join(errors)}": errors,
-        "has no end; say endless=True": earliest_end(program.project) is None and not endless,
+        "has no end; say endless=True": program.project.is_endless and not endless,
     }
     for refusal, applies in refusals.items():
         if applies:
@@ -173,12 +169,12 @@ async def _start(watch: Watch, project: Project) -> float:
         "node": node.node,
         "project": project.number,
         "what": f"the run of project {project.number}",
-        "cause": "it was started, and neither its notice nor a stop was acknowledged since",
+        "cause": "it was started, and its end is not recorded",
         "advice": "`motorbus stop {bus}` ends it",
         READABLE: True,
     }
     await Emit(JournalEntry(RUN, INTENT, facts))
-    node.state.may_run = True
+    node.state.may_run = node.state.is_noted = True
     node.state.outputs.update(dict.fromkeys(range(1, OUTPUTS + 1)))
     request = command(
         node,
@@ -191,7 +187,7 @@ async def _start(watch: Watch, project: Project) -> float:
     try:
         return await request.with_decoder(lambda answer: answer.at)
     except (Refused, RequestError, Interrupted) as error:
-        if not (watch.ordered and isinstance(error, Interrupted)):
+        if not (watch.has_left and isinstance(error, Interrupted)):
             await close_run(node, "not started")
         raise
 
@@ -205,7 +201,7 @@ def setpoints(node: Node, project: Project) -> tuple[Setpoint, ...]:
     low, high = reach(project)
     unit = tau / project.turn_distance if project.turn_distance else nan
     asked = [("relative", unit * far) for far in (high, low) if far] or [("relative", 0.0)]
-    if earliest_end(project) is None:
+    if project.is_endless:
         asked.append(("velocity", fastest))
     asked.append(("speed", fastest))
     return tuple(Setpoint(node.node, quantity, value, -inf, inf) for quantity, value in asked)
@@ -214,115 +210,97 @@ def setpoints(node: Node, project: Project) -> tuple[Setpoint, ...]:
 # -- wait --------------------------------------------------------------------------------------------------------------
 
 
-class Course:
-    """One run: takes its acknowledgement, notices and time, and decides the outcome. Times in s, link clock."""
+class _Course:
+    """One run of a project, `sent` at this time. Times in s, link clock."""
 
-    def __init__(self, watch: Watch, timeout: float | None) -> None:
+    def __init__(
+        self, watch: Watch, project: Project, sent: float, timeout: float | None, notices: list[float]
+    ) -> None:
         self.watch: Final = watch
-        self.timeout: Final = timeout
-        self.ran: Ran | None = None
-        self.is_over = False
-        self.is_pending = True  # neither an acknowledgement nor its loss is known
+        self.predicted: Final = estimate(project, watch.node.tick_ms)
+        self.start = sent
         self.is_button_pressed = False  # input 4
+        self._sent: Final = sent
+        self._least: Final = earliest_end(project) * CLOCK
+        self._timeout: Final = timeout
+        self._notices: Final = notices
+        self._stopped: Final = watch.node.state.stopped
         self._lost: MotorbusError | None = None
-        self._notices: list[tuple[float, bool]] = []
-
-    def expect(self, project: Project, at: float) -> None:
-        """The project is about to be started."""
-        self.predicted = estimate(project)
-        earliest = earliest_end(project)
-        self._least = inf if earliest is None else earliest * CLOCK
-        self._sent = self.start = at
-        self._accepted = self.watch.node.state.stops_accepted
 
     def begin(self, start: float | MotorbusError | None) -> None:
-        """It was acknowledged at this time, or not; None in a dry run."""
-        self.is_pending = False
-        if isinstance(start, MotorbusError):
+        """It was acknowledged at this time; None in a dry run. Raises the error of a start that did not leave."""
+        if not isinstance(start, MotorbusError):
+            self.start = start or self._sent
+        elif isinstance(start, OutcomeUnknown | NoReply | WireError):
             self._lost = start
         else:
-            self.start = start or self._sent
+            raise start
 
     @property
     def deadline(self) -> float:
-        """Until when its notice is waited for (s)."""
-        if self.timeout is not None:
-            return self.start + self.timeout
+        """Until when its notice is waited for."""
+        if self._timeout is not None:
+            return self.start + self._timeout
         if self.predicted.waits and self._lost is None:
             return inf
-        return self.start + self.predicted.high * LONGER + SPARE
+        return self.start + self.predicted.seconds * LONGER + SPARE
 
-    def take(self, notice: Notification) -> bool:
-        """Take a notice; True if the outcome is known."""
-        if notice.kind == COMPLETED:
-            self._notices.append((notice.at, self.watch.is_stopped or self.watch.node.state.stopping > 0))
-            self.decide(notice.at)
-        return self.ran is not None
-
-    def decide(self, now: float) -> None:
-        """Set `ran` if the outcome is known now. While a stop is being sent it is not."""
-        state = self.watch.node.state
-        if self.ran is not None or self.is_pending or state.stopping:
-            return
-        own = [
-            (at, is_doubtful)
-            for at, is_doubtful in self._notices
-            if at > self.start - SETTLES and at - self._sent >= self._least
-        ]
-        if state.stops_accepted > self._accepted:
-            self._end(Outcome.STOPPED, "a stop of this host was acknowledged")
+    def outcome(self, now: float) -> Ran | None:
+        """The outcome; None if it is not known yet."""
+        state, seconds = self.watch.node.state, None
+        end = next((at for at in self._notices if self._is_own(at)), None)
+        if state.stopped > self._stopped:
+            outcome, why = Outcome.STOPPED, "a stop of this host was acknowledged"
         elif self.is_button_pressed:
-            self._end(Outcome.STOPPED, "input 4, which stops projects, was active")
-        elif own:
             state.may_run = False
-            at, is_doubtful = own[0]
-            if is_doubtful:
-                self._end(Outcome.UNKNOWN, "its notice came after a stop that was not acknowledged")
-            else:
-                seconds = max(0.0, at - self.start)
-                self._end(Outcome.COMPLETED, f"its notice came {seconds:.3f} s after the start", seconds)
-        elif now < self.deadline:
-            return
+            outcome, why = Outcome.STOPPED, "input 4, which stops projects, was active"
+        elif end is not None and not self.watch.is_stopped:
+            state.may_run = False
+            seconds = max(0.0, end - self.start)
+            outcome, why = Outcome.COMPLETED, f"its notice came {seconds:.3f} s after the start"
+        elif now < (self.deadline if end is None else end + STOPPING):
+            return None
+        elif end is not None:
+            state.may_run = False
+            outcome, why = Outcome.UNKNOWN, "its notice came after a stop that was not acknowledged"
         elif self._lost is not None:
             why = f"neither an acknowledgement ({self._lost.summary}) nor a notice came; it may run"
-            self._end(Outcome.UNKNOWN, why)
+            outcome = Outcome.UNKNOWN
         elif self._notices:
-            first = self._notices[0][0] - self._sent
-            self._end(
-                Outcome.UNKNOWN, f"a notice came after {first:.3f} s, which is too early; it may still run"
-            )
+            first = self._notices[0] - self._sent
+            why = f"a notice came after {first:.3f} s, which is too early; it may still run"
+            outcome = Outcome.UNKNOWN
         else:
-            self._end(Outcome.TIMEOUT, "no notice came in time; it may still run")
+            outcome, why = Outcome.TIMEOUT, "no notice came in time; it may still run"
+        return Ran(outcome, seconds, self.predicted, why)
 
-    def _end(self, outcome: Outcome, why: str, seconds: float | None = None) -> None:
-        self.ran = Ran(outcome, seconds, self.predicted, why)
+    def _is_own(self, at: float) -> bool:
+        return at > self.start - SETTLES and at - self._sent >= self._least
 
 
-async def _follow(course: Course, levels: Levels) -> None:
-    """Report, read the watched inputs, and decide, until the outcome is known."""
-    reported, whole = -inf, course.predicted.seconds
-    course.decide(await Sleep(0))
-    while course.ran is None:
+async def _follow(course: _Course, levels: Levels) -> Ran:
+    """Report and read the watched inputs until the outcome is known."""
+    reported = -inf
+    while True:
         now = await Sleep(0)
-        if now - reported >= REPORT and whole < inf:
+        if ran := course.outcome(now):
+            return ran
+        if now - reported >= REPORT:
             reported = now
-            await Emit(
-                Progress(round(1000 * (now - course.start)), round(1000 * whole), "running, estimated")
-            )
+            done, whole = now - course.start, course.predicted.seconds
+            await Emit(Progress(round(1000 * done), round(1000 * whole), "running, estimated"))
         for port in levels.settled:
             await _read_watched(course, levels, port)
-        pause = LOOK if levels.settled or now >= course.deadline else min(REPORT, course.deadline - now)
-        await WaitFor(course.take, pause)
-        course.decide(await Sleep(0))
+        await WaitFor(
+            lambda notice: True, LOOK if levels.settled else max(LOOK, min(REPORT, course.deadline - now))
+        )
 
 
-async def _read_watched(course: Course, levels: Levels, port: int) -> None:
-    active = await catch(read_input(course.watch.node, port))
-    if isinstance(active, NoReply | WireError):
+async def _read_watched(course: _Course, levels: Levels, port: int) -> None:
+    try:
+        active = await read_input(course.watch.node, port)
+    except (NoReply, WireError):
         return
-    if isinstance(active, MotorbusError):
-        raise active
     if change := levels.take(port, active, await Sleep(0)):
-        if port == STOP_INPUT and change.active:
-            course.is_button_pressed = True
+        course.is_button_pressed |= port == STOP_INPUT and change.active
         await Emit(change)

@@ -7,15 +7,13 @@ rest. An acknowledgement means that the controller received it, not that the mot
 from __future__ import annotations
 
 from enum import Enum
-from typing import Final, TypeVar
+from typing import Final
 
 from motorbus.core.request import Stops
-from motorbus.core.steps import OUTCOME, Emit, JournalEntry, Runnable, catch
-from motorbus.errors import Interrupted, LinkError, MotorbusError, OutcomeUnknown, Refused, RequestError
+from motorbus.core.steps import ASKED, OUTCOME, Emit, JournalEntry, catch
+from motorbus.errors import Interrupted, LinkError, MotorbusError, OutcomeUnknown, RequestError
 from motorbus.families.stepper.driver.node import Node
 from motorbus.families.stepper.driver.requests import STOPS, command, ignore
-
-T = TypeVar("T")
 
 RUN: Final = "run"  # journal entry of a project that was started
 TRIES: Final = 5  # of each command; a silent controller takes about 2 s
@@ -36,25 +34,20 @@ async def stop(node: Node) -> Promise:
     No motion leaves afterwards that was requested before. Raises OutcomeUnknown if one is not acknowledged: the motor
     may be turning. Raises LinkError if the port is gone.
     """
-    node.state.stops_asked += 1
-    promise = await end_motion(node)
+    node.state.stops += 1
+    await end_motion(node)
     await close_run(node, "stopped")
-    return promise
+    return Promise.STOP_ACCEPTED
 
 
-async def end_motion(node: Node, names: tuple[str, ...] = STOPS) -> Promise:
+async def end_motion(node: Node, names: tuple[str, ...] = STOPS) -> None:
     """Send both stop commands until they are acknowledged, as part of a procedure. Raises as `stop`."""
-    state = node.state
     errors: dict[str, MotorbusError] = {}
-    state.stopping += 1
-    try:
-        for _ in range(TRIES):
-            found = {name: await catch(command(node, name, ignore)) for name in tuple(errors) or names}
-            errors = {name: error for name, error in found.items() if error is not None}
-            if not errors or any(isinstance(error, LinkError | Interrupted) for error in errors.values()):
-                break
-    finally:
-        state.stopping -= 1
+    for _ in range(TRIES):
+        found = {name: await catch(command(node, name, ignore)) for name in tuple(errors) or names}
+        errors = {name: error for name, error in found.items() if error is not None}
+        if not errors or any(isinstance(error, LinkError | Interrupted) for error in errors.values()):
+            break
     for error in errors.values():
         if isinstance(error, LinkError):
             raise error
@@ -66,39 +59,39 @@ async def end_motion(node: Node, names: tuple[str, ...] = STOPS) -> Promise:
             advice="stop again, or cut the power of the motor",
             node=node.node,
         )
-    state.stops_accepted += 1
-    state.may_run = False
-    return Promise.STOP_ACCEPTED
 
 
 async def close_run(node: Node, outcome: str) -> None:
     """The project that was started does not run any more: write its outcome to the journal, if that is possible."""
-    node.state.may_run = False
+    node.state.may_run = node.state.is_noted = False
     await catch(Emit(JournalEntry(RUN, OUTCOME, {"outcome": outcome})))
 
 
-def check_idle(node: Node, what: str) -> None:
-    """Raise RequestError while a project that was started on this bus may not have ended."""
+async def check_free(node: Node, verb: str) -> None:
+    """Raise RequestError while a project of this bus may run, or a change of this bus is unfinished in the journal."""
     if node.state.may_run:
         raise RequestError(
-            f"{what} refused: a project that was started may still run",
+            f"{verb}() refused: a project that was started may still run",
             expected="its notice, or an acknowledged stop",
             cause="a busy controller ignores a start, and a notice does not name its project",
-            advice="call stop() first; nothing was sent",
+            advice="call stop() first",
             node=node.node,
         )
+    if node.state.is_noted:
+        await close_run(node, "stopped")  # by an emergency stop or a command of the manual
+    await Emit(JournalEntry(verb, ASKED, {"node": node.node}))
 
 
 class Watch:
-    """Whether a stop came since this was made, and whether the motion request may have left (`ordered`).
+    """Whether a stop came since this was made, and whether the motion request may have left (`has_left`).
 
     `precondition` is that of the motion request: it does not leave after a stop.
     """
 
     def __init__(self, node: Node) -> None:
         self.node: Final = node
-        self.ordered = False
-        self._asked = node.state.stops_asked
+        self.has_left = False
+        self._asked = node.state.stops
         self._stops: Stops | None = None
         self._count = 0
 
@@ -106,34 +99,18 @@ class Watch:
     def is_stopped(self) -> bool:
         """A stop was requested, by `stop` or as an emergency stop, whether acknowledged or not."""
         is_sent = self._stops is not None and self._stops(self.node.node) != self._count
-        return is_sent or self.node.state.stops_asked != self._asked
+        return is_sent or self.node.state.stops != self._asked
 
     def precondition(self, stops: Stops) -> MotorbusError | None:
         """See `Request.precondition`."""
         if self.is_stopped:
             return Interrupted("a stop came before the motion began", advice="repeat the call")
         self._stops, self._count = stops, stops(self.node.node)
-        self.ordered = True
+        self.has_left = True
         return None
 
     def check(self) -> None:
         """Raise Interrupted after a stop."""
         if self.is_stopped:
-            state = "the motor is at an unknown position" if self.ordered else "nothing was moved"
+            state = "the motor is at an unknown position" if self.has_left else "nothing was moved"
             raise Interrupted("the motion was interrupted by a stop on this bus", advice=state)
-
-
-async def mark_unmoved(watch: Watch, runnable: Runnable[T]) -> T:
-    """Run a motion. Its error is `unmoved` if the motion request did not leave; else no error is a RequestError."""
-    try:
-        return await runnable
-    except MotorbusError as error:
-        ordered = watch.ordered and not isinstance(error, Refused)  # the gate refuses after the precondition
-        error.unmoved = not ordered
-        if ordered and isinstance(error, RequestError):
-            raise OutcomeUnknown(
-                f"after the motion was requested: {error.summary}",
-                advice="the motor is at an unknown position",
-                node=watch.node.node,
-            ) from error
-        raise

@@ -86,11 +86,6 @@ class Machine:
         self.is_homed = False
         self.events: list[Happening] = []
         self._now = 0.0
-        self._then: Callable[[], None] = self._end_manual  # after a slow stop
-
-    @property
-    def is_busy(self) -> bool:
-        return self.phase not in (Phase.IDLE, Phase.OFF)
 
     def position(self, at: float) -> int:
         """In pulses."""
@@ -119,7 +114,7 @@ class Machine:
         """Power on at rest, with all outputs off; with `home_with` home with the speed of its step 1."""
         self._now = at
         self._rest()
-        self.stop_mode = home_with.stop_mode if home_with else 0
+        self.stop_mode = 0
         if home_with:
             self.home(home_with, at)
 
@@ -136,14 +131,7 @@ class Machine:
 
     def jog(self, project: Project, sign: int, at: float) -> bool:
         """Turn until stopped with the speed of step 1 of this project; False if it is busy."""
-        turn = partial(self._move_by_hand, Phase.JOG, project, None, sign)
-        if self._begin(at, turn):
-            return True
-        if self.phase is not Phase.JOG or self.motion is None or self.motion.sign == sign:
-            return False
-        self._stop(turn)  # the opposite jog command stops and reverses # assumption
-        self.advance(at)
-        return True
+        return self._begin(at, partial(self._move_by_hand, Phase.JOG, project, None, sign))
 
     def run_once(self, project: Project, at: float) -> bool:
         """Make the move of step 1 of this project, without its inputs, output and pause; False if it is busy."""
@@ -156,22 +144,20 @@ class Machine:
 
         It ends at once, without a motion, if the input is active.
         """
-        turn = partial(self._move_by_hand, Phase.HOMING, project, None, -1)
-        return self._begin(at, self._end_manual if HOME_INPUT in self.inputs else turn)
+        pulses = 0 if HOME_INPUT in self.inputs else None
+        return self._begin(at, partial(self._move_by_hand, Phase.HOMING, project, pulses, -1))
 
     def stop_project(self, at: float) -> None:
         """Stop the project."""
         self.advance(at)
         if self.run is not None:  # stop project leaves a manual motion alone # assumption
-            self._stop(partial(self._finish, "stopped"))
-            self.advance(at)
+            self._stop()
 
     def stop_motor(self, at: float) -> None:
-        """Stop the motor."""
-        self.stop_project(at)  # stop motor ends the project too # assumption
-        if self.is_busy and self.run is None:
-            self._stop(self._end_manual)
-            self.advance(at)
+        """Stop the motor, and the project too. # assumption"""
+        self.advance(at)
+        if self.phase not in (Phase.IDLE, Phase.OFF):
+            self._stop()
 
     def set_output(self, port: int, level: int, at: float) -> None:
         """Switch outputs (1 to 3, 4 for all) or the LEDs (5), at any time."""
@@ -190,12 +176,12 @@ class Machine:
         if port == HOME_INPUT and self.phase is Phase.HOMING:
             self._rest()  # homing ends at once in every stop mode # assumption
             self.base, self.is_homed = 0, True
-            self._happen("homed")
-            self._end_manual()
+            self._add("homed")
+            self._add("rests")
         elif self.run and self.phase is Phase.WAIT and self.run.step.start_input == port:
-            self._begin_motion()
+            self._begin_motion(self.run)
         elif self.run and self.phase is Phase.MOVE and self.run.step.stop_input == port:
-            self._end_motion()
+            self._end_motion(self.run)
         if port == STOP_INPUT:
             self.stop_project(at)
         elif port == START_INPUT and start:
@@ -213,17 +199,22 @@ class Machine:
         self.base = self.position(self._now)
         self.phase, self.motion, self.since, self.until = phase, None, self._now, until
 
-    def _stop(self, then: Callable[[], None]) -> None:
-        """Stop the motion as the stop mode says, then call `then`; a slow stop that began continues."""
-        self._then = then
-        slow = self.motion.slowing(self._now - self.since) if self.motion else None
+    def _stop(self) -> None:
+        """Stop the motion as the stop mode says; a slow stop that began continues."""
         if self.phase is Phase.SLOWING:
             return
+        slow = self.motion.slowing(self._now - self.since) if self.motion else None
         if slow is None or self.stop_mode == parameters.IMMEDIATE:
-            self._rest()
-            then()
+            self._end_stop()
         else:
             self._go(Phase.SLOWING, slow)
+
+    def _end_stop(self) -> None:
+        if self.run is not None:
+            self._finish(self.run, "stopped")
+        else:
+            self._rest()
+            self._add("rests")
 
     def _begin(self, at: float, begin: Callable[[], None]) -> bool:
         """Begin something, with all of it that takes no time; False if it is busy."""
@@ -236,86 +227,71 @@ class Machine:
 
     def _move_by_hand(self, phase: Phase, project: Project, pulses: int | None, sign: int) -> None:
         self.stop_mode = project.stop_mode
-        speed = ramp.ramp_of(project, project.step(1))
-        self._go(phase, ramp.motion(speed, pulses, sign, self.tick_ms))
-
-    def _end_manual(self) -> None:
-        self._happen("rests")
+        speed = ramp.ramp_of(project, project.step(1), self.tick_ms)
+        self._go(phase, ramp.motion(speed, pulses, sign))
 
     def _end_phase(self) -> None:
         """The phase ends by itself."""
-        if self.phase is Phase.MOVE:
-            self._end_motion()
-        elif self.phase is Phase.PAUSE:
-            self._next_step()
-        elif self.phase is Phase.SLOWING:
-            self._rest()
-            self._then()
-        else:  # one move is made, or a manual motion has no speed
-            self._rest()
-            self._end_manual()
+        if self.run and self.phase is Phase.MOVE:
+            self._end_motion(self.run)
+        elif self.run and self.phase is Phase.PAUSE:
+            self._next_step(self.run)
+        else:
+            self._end_stop()
 
     # -- a project -------------------------------------------------------------------------------------------------
-
-    def _running(self) -> Run:
-        assert self.run is not None, "only a project has steps"
-        return self.run
 
     def _start(self, project: Project, by_command: bool) -> None:
         self.stop_mode = project.stop_mode  # the stop mode belongs to each project # assumption
         self.run = Run(project, by_command, self._now)
-        if sequence.last_step(project):
-            self._begin_step()
+        if project.used:
+            self._begin_step(self.run)
         else:
-            self._finish("ended")  # a project without steps ends at once, with a notice # assumption
+            self._finish(self.run, "ended")  # without steps it ends at once, with a notice # assumption
 
-    def _begin_step(self) -> None:
-        port = self._running().step.start_input
+    def _begin_step(self, run: Run) -> None:
+        port = run.step.start_input
         if port and port not in self.inputs:  # an active input starts a step at once # assumption
             self._rest(Phase.WAIT)
-            self._happen("waits")
+            self._add("waits")
         else:
-            self._begin_motion()
+            self._begin_motion(run)
 
-    def _begin_motion(self) -> None:
+    def _begin_motion(self, run: Run) -> None:
         """Outputs and motor at the same moment."""
-        run = self._running()
-        project, step = run.project, run.step
-        self.outputs = parameters.outputs_after_step(self.outputs, step.output)
-        pulses = ramp.pulses_of(project, step)
-        self._go(Phase.MOVE, ramp.motion(ramp.ramp_of(project, step), pulses, step.sign, self.tick_ms))
-        self._happen("begins")
-        if step.stop_input in self.inputs:
-            self._end_motion()
+        self.outputs = parameters.outputs_after_step(self.outputs, run.step.output)
+        self._go(Phase.MOVE, ramp.move_of(run.project, run.step, self.tick_ms))
+        self._add("begins")
+        if run.step.stop_input in self.inputs:
+            self._end_motion(run)
 
-    def _end_motion(self) -> None:
+    def _end_motion(self, run: Run) -> None:
         """The motion is over, or its stop input ends it at once."""
-        self._rest(Phase.PAUSE, self._now + self._running().step.delay / 1000)
-        self._happen("moved")
+        self._rest(Phase.PAUSE, self._now + run.step.delay / 1000)
+        self._add("moved")
 
-    def _next_step(self) -> None:
-        run = self._running()
+    def _next_step(self, run: Run) -> None:
         place = sequence.following(run.project, run.place)
-        passes = sequence.passes(run.project)
-        if place is None and passes is not None and run.round >= passes:
-            self._finish("ended")
-            return
-        if place is None and passes is None and self._now <= run.began:
-            run.began = -inf
-            self._rest(Phase.PAUSE, self._now + EMPTY_PASS)
-            return
         if place is None:
+            passes = sequence.passes(run.project)
+            if passes is not None and run.round >= passes:
+                self._finish(run, "ended")
+                return
+            if passes is None and self._now <= run.began:
+                run.began = -inf
+                self._rest(Phase.PAUSE, self._now + EMPTY_PASS)
+                return
             run.round, run.began = run.round + 1, self._now
         run.place = place or FIRST
-        self._begin_step()
+        self._begin_step(run)
 
-    def _finish(self, kind: str) -> None:
+    def _finish(self, run: Run, kind: str) -> None:
         """The project has ended. The notice follows a natural end of one that a command started."""
-        self._happen(kind)
+        self._add(kind)
         self._rest()
-        if kind == "ended" and self._running().by_command:
-            self._happen("completed")
+        if kind == "ended" and run.by_command:
+            self._add("completed")
         self.run = None  # the outputs stay as they are at its end # assumption
 
-    def _happen(self, kind: str) -> None:
+    def _add(self, kind: str) -> None:
         self.events.append(Happening(self._now, kind, self.run.place.step if self.run else 0))

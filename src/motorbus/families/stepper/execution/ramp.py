@@ -1,41 +1,35 @@
 """One move: up from the start frequency, steady at the running frequency, and down again.
 
 The manual gives the acceleration in Hz and does not say per what. Here the frequency grows by it in every tick
-of time, 1 ms by default; `slowest` also bounds the other readings. A move at speed 0 does not begin.
+of time, 1 ms unless the bus has another `ramp_tick_ms`. A move at speed 0 does not begin.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from math import ceil, floor, inf, log, sqrt
+from math import floor, inf, sqrt
 from typing import Final, NamedTuple
 
 from motorbus.families.stepper.parameters import IMMEDIATE, Project, Step
 
 TICK_MS: Final = 1.0  # ms in which the frequency grows by the acceleration # assumption
-READINGS: Final = {"per pulse": 0.0, "per 1 ms": 1.0, "per 10 ms": 10.0}
-"""Readings of the acceleration: ticks in ms, 0 for per pulse. The manual's example takes 0.82, 0.69 or 1.43 s."""
 _NOISE: Final = 1e-9  # relative, of a pulse that is just due
-_SUMMED: Final = 64  # periods that are added one by one
 
 
 class Ramp(NamedTuple):
-    """Frequencies (Hz) of the steps of one project: at the start, when running, and the growth."""
+    """Frequencies (Hz) at the start and when running, and the growth (Hz/s)."""
 
     start: float
     run: float
     growth: float
 
-    def rate(self, tick_ms: float) -> float:
-        """Growth in Hz/s."""
-        return self.growth * 1000 / tick_ms
 
-
-def ramp_of(project: Project, step: Step) -> Ramp:
+def ramp_of(project: Project, step: Step, tick_ms: float = TICK_MS) -> Ramp:
     """The ramp of a step; `run` is 0 for a step that does not move."""
     run = step.speed * (project.pulses_per_turn or Fraction(0)) / 60
-    return Ramp(step.start_frequency or 1.0, float(run), step.acceleration)  # start 0 is 1 Hz # assumption
+    start = step.start_frequency or 1.0  # start 0 is 1 Hz # assumption
+    return Ramp(start, float(run), step.acceleration * 1000 / tick_ms)
 
 
 def pulses_of(project: Project, step: Step) -> int:
@@ -115,13 +109,12 @@ class Motion:
         return Motion(self.sign, int(pulses), (Piece(now, -rate, (now - start) / rate),))
 
 
-def motion(ramp: Ramp, pulses: int | None, sign: int, tick_ms: float = TICK_MS) -> Motion:
+def motion(ramp: Ramp, pulses: int | None, sign: int) -> Motion:
     """The move of so many pulses; None: endless."""
-    start, run, _ = ramp
+    start, run, rate = ramp
     if pulses == 0 or run <= 0:
         return Motion(sign, 0, ())
-    rate = ramp.rate(tick_ms) if run > start else 0.0
-    if not rate:  # no ramp if the start frequency is not below the running frequency # assumption
+    if not rate or run <= start:  # then there is no ramp # assumption
         return Motion(sign, pulses, (Piece(run, 0.0, inf if pulses is None else pulses / run),))
     if pulses is None:
         return Motion(sign, None, (Piece(start, rate, (run - start) / rate), Piece(run, 0.0, inf)))
@@ -132,47 +125,12 @@ def motion(ramp: Ramp, pulses: int | None, sign: int, tick_ms: float = TICK_MS) 
     return Motion(sign, pulses, (Piece(start, rate, time), Piece(peak, 0.0, steady), down))
 
 
-# -- bounds over the readings ----------------------------------------------------------------------------------------
+def move_of(project: Project, step: Step, tick_ms: float = TICK_MS) -> Motion:
+    """The move of a step."""
+    return motion(ramp_of(project, step, tick_ms), pulses_of(project, step), step.sign)
 
 
-def duration(ramp: Ramp, pulses: int, tick_ms: float) -> float:
-    """Duration (s) of a move in one reading: growth per tick of so many ms, or per pulse (0)."""
-    if tick_ms or pulses == 0 or not ramp.growth or ramp.run <= ramp.start:
-        return motion(ramp, pulses, 1, tick_ms or TICK_MS).duration
-    count = ceil((ramp.run - ramp.start) / ramp.growth)
-    if 2 * count <= pulses:
-        return 2 * _periods(ramp, count) + (pulses - 2 * count) / ramp.run
-    half, odd = divmod(pulses, 2)
-    return 2 * _periods(ramp, half) + odd / (ramp.start + ramp.growth * half)
-
-
-def _periods(ramp: Ramp, count: int) -> float:
-    """Duration (s) of so many pulses of which each is faster than the last by the growth."""
-    exact = min(count, _SUMMED)
-    total = sum(1 / (ramp.start + ramp.growth * i) for i in range(exact))
-    if count > exact:  # the Euler-Maclaurin formula, which is an upper bound here
-        first, last = ramp.start + ramp.growth * exact, ramp.start + ramp.growth * (count - 1)
-        total += log(last / first) / ramp.growth + (1 / first + 1 / last) / 2
-        total += ramp.growth / 12 * (1 / first**2 - 1 / last**2)
-    return total
-
-
-def slowest(project: Project, step: Step, pulses: int) -> float:
-    """Duration (s) of a move with the speed of this step, in the slowest reading of its ramp."""
-    return max(duration(ramp_of(project, step), pulses, tick) for tick in READINGS.values())
-
-
-def slowest_stop(project: Project) -> float:
-    """Time (s) from a stop to rest, from any step, in the slowest reading; 0 if a stop is immediate."""
-    if project.stop_mode == IMMEDIATE:
-        return 0.0
-    steps = project.used or project.steps[:1]
-    return max(_stop(ramp_of(project, step), tick) for step in steps for tick in READINGS.values())
-
-
-def _stop(ramp: Ramp, tick_ms: float) -> float:
-    if not ramp.growth or ramp.run <= ramp.start:
-        return 0.0
-    if tick_ms:
-        return (ramp.run - ramp.start) / ramp.rate(tick_ms)
-    return _periods(ramp, ceil((ramp.run - ramp.start) / ramp.growth))
+def stop_seconds(project: Project, step: Step, tick_ms: float = TICK_MS) -> float:
+    """Time (s) from a stop of a step at its running frequency to rest; 0 if a stop is immediate."""
+    start, run, rate = ramp_of(project, step, tick_ms)
+    return (run - start) / rate if project.stop_mode != IMMEDIATE and rate and run > start else 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hashlib import sha256
-from typing import Annotated, Final, Literal
+from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta, Struct
@@ -12,8 +12,6 @@ from motorbus.errors import RequestError
 from motorbus.families.stepper.parameters import PROJECTS, ROW_LENGTH, Order, Project, decode_image
 from motorbus.families.stepper.program.file import Program, read_toml
 from motorbus.families.stepper.protocol import DUMP_LENGTH, HEADER, READ_PROJECT, REPLY_LENGTH
-
-KIND: Final = "stepper backup"
 
 
 class ProjectTable(Struct, kw_only=True, forbid_unknown_fields=True):
@@ -44,20 +42,16 @@ class Backup(Struct, frozen=True, kw_only=True):
         """The numbers of the projects in it, in order."""
         return tuple(sorted(self.dumps))
 
-    def image(self, number: int) -> bytes:
-        """The 220 bytes of a project. Raises RequestError if it is not in the backup."""
+    def project(self, number: int) -> Project:
+        """The numbers of a project. Raises RequestError if it is not in the backup."""
         if number not in self.dumps:
             listed = ", ".join(map(str, self.projects))
             raise RequestError(f"no project {number} in this backup", expected=f"one of {listed}")
-        return self.dumps[number][REPLY_LENGTH:]
-
-    def project(self, number: int) -> Project:
-        """The numbers of a project. Raises RequestError if it is not in the backup."""
-        return decode_image(self.image(number), self.order)
+        return decode_image(self.dumps[number][REPLY_LENGTH:], self.order)
 
     def text(self) -> str:
         """The file; comments give each project as a program."""
-        lines = ["format = 1", f'kind = "{KIND}"', f'dump_order = "{self.order}"']
+        lines = ["format = 1", 'kind = "stepper backup"', f'dump_order = "{self.order}"']
         for number in self.projects:
             dump = self.dumps[number]
             rows = [
@@ -65,14 +59,12 @@ class Backup(Struct, frozen=True, kw_only=True):
             ]
             lines += ["", "[[project]]", f"number = {number}", f'sha256 = "{_checksum(dump)}"']
             lines += ["dump = '''", dump[:REPLY_LENGTH].hex(" "), *rows, "'''"]
-            lines += [f"# {line}".rstrip() for line in self._program(number)]
+            try:
+                program = Program.from_dump(dump, order=self.order).text()
+            except RequestError as error:
+                program = f"no program: {error.summary}"
+            lines += [f"# {line}".rstrip() for line in program.splitlines()]
         return "\n".join(lines) + "\n"
-
-    def _program(self, number: int) -> list[str]:
-        try:
-            return Program.from_dump(self.dumps[number], order=self.order).text().splitlines()
-        except RequestError as error:
-            return [f"no program: {error.summary}"]
 
     @classmethod
     def parse(cls, source: str) -> Backup:
@@ -103,6 +95,6 @@ def _checksum(dump: bytes) -> str:
 def _wrong(what: str) -> RequestError:
     return RequestError(
         f"this backup cannot be used: {what}",
-        expected="a file of `motorbus stepper read --all`",
+        expected="a file of `motorbus backup`",
         advice="take another copy of it",
     )

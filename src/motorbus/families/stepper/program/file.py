@@ -1,4 +1,4 @@
-"""A project as a TOML file with units and names; its schema is that of `ProgramFile`.
+"""A project as a TOML file with units and names; `ProgramFile` is its schema.
 
 Conversion is exact: a value that is no whole number of what the controller counts is an error that gives the two
 neighbours. Errors name the step and the field.
@@ -26,20 +26,11 @@ from motorbus.families.stepper.program.lint import Finding, lint
 from motorbus.families.stepper.protocol import DUMP_LENGTH, HEADER, READ_PROJECT, REPLY_LENGTH
 
 LONGEST: Final = 1 << 20  # characters of a file
-FORMAT: Final = 1
 
 _QUANTITY: Final = re.compile(
-    r"([+-]?(?:\d{1,20}(?:\.\d{0,20})?|\.\d{1,20}))\s*([^\d\s.].*)", re.ASCII | re.DOTALL
+    r"\s*([+-]?(?:\d{1,20}(?:\.\d{0,20})?|\.\d{1,20}))\s*([^\d\s.].*?)\s*", re.ASCII
 )
-_SAME: Final = {
-    "unit": "units",
-    "pulse": "pulses",
-    "turn": "turns",
-    "°": "deg",
-    "RPM": "rpm",
-    "µm": "um",
-    "μm": "um",
-}
+_SAME: Final = {"unit": "units", "pulse": "pulses", "turn": "turns", "°": "deg", "RPM": "rpm"}
 _LENGTH: Final = {"mm": Fraction(1), "um": Fraction(1, 1000), "cm": Fraction(10), "m": Fraction(1000)}
 _TIME: Final = {"ms": Fraction(1), "s": Fraction(1000), "min": Fraction(60_000), "h": Fraction(3_600_000)}
 _HERTZ: Final = {"Hz": Fraction(1), "kHz": Fraction(1000)}
@@ -49,20 +40,16 @@ _Each = Mapping[str, Fraction]
 class Quantity:
     """A number with a unit, as `-12.5 mm`. Raises ValueError for anything else."""
 
-    __slots__ = ("number", "text", "unit")
+    __slots__ = ("is_negative", "number", "text", "unit")
 
     def __init__(self, text: object) -> None:
-        match = _QUANTITY.fullmatch(text.strip()) if isinstance(text, str) else None
-        if match is None or not isinstance(text, str):
+        match = _QUANTITY.fullmatch(text) if isinstance(text, str) else None
+        if match is None:
             raise ValueError("expected a number with a unit in quotes")
-        self.text = text
-        self.number = Fraction(match[1])
+        self.text = match.string
+        self.number = abs(Fraction(match[1]))
+        self.is_negative = match[1].startswith("-")  # also of -0
         self.unit = _SAME.get(match[2], match[2])
-
-    @property
-    def is_negative(self) -> bool:
-        """Also for -0."""
-        return self.text.strip().startswith("-")
 
 
 def _range(name: str) -> Meta:
@@ -117,14 +104,11 @@ class ProgramFile(Struct, kw_only=True, forbid_unknown_fields=True):
     step: Annotated[list[StepTable], Meta(min_length=1, max_length=STEPS)]
 
 
-_TABLES: Final = {"": ProgramFile, "motor": MotorTable, "loop": LoopTable, "step": StepTable}
-
-
-def schema() -> dict[str, Any]:
-    """The JSON schema of a program file."""
-    return msgspec.json.schema(
-        ProgramFile, schema_hook=lambda _: {"type": "string", "description": "number and unit"}
-    )
+_TABLES: Final = {"motor": MotorTable, "loop": LoopTable, "step": StepTable}
+_INPUTS: Final = {"none": 0, **{f"input {number}": number for number in range(1, INPUTS + 1)}}
+_OUTPUTS: Final = {text: action for action, text in PARAMETERS["output"].choices.items()}
+_WORDS: Final = {*_INPUTS, "all", *(f"output {number}" for number in range(1, parameters.OUTPUTS + 1))}
+"""Fixed words of inputs and outputs, which are no names."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,6 +126,9 @@ class Program:
     def parse(cls, source: str) -> Program:
         """From the text of a file. Raises RequestError, naming step and field."""
         file = _decode(source)
+        for name in (*file.inputs, *file.outputs):
+            if name in _WORDS or name != name.strip() or not name:
+                raise _wrong(f"inputs, outputs: {shown(name)} is no name", "a word that is not a fixed one")
         base, lead = _motor(file.motor)
         repeat = ENDLESS if file.repeat == "endless" else file.repeat
         base = replace(base, number=file.project, project_loop=repeat)
@@ -156,7 +143,14 @@ class Program:
     @classmethod
     def load(cls, path: str) -> Program:
         """From a file. Raises RequestError if it cannot be read, and as `parse`."""
-        return cls.parse(read_text(path))
+        try:
+            with open(path, encoding="utf-8") as file:
+                source = file.read(LONGEST + 1)
+        except UnicodeDecodeError as error:
+            raise RequestError(f"{path} is not text: {error.reason}", expected="TOML in UTF-8") from None
+        except OSError as error:
+            raise RequestError(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
+        return cls.parse(source)
 
     @classmethod
     def from_dump(cls, data: bytes, *, name: str = "", order: Order = "little") -> Program:
@@ -166,34 +160,27 @@ class Program:
             raise RequestError(
                 "no dump of a project", received=data[:12], expected="226 bytes that begin with FF AA 3E"
             )
-        return cls(
-            project=replace(parameters.decode_image(data[REPLY_LENGTH:], order), number=data[3]), name=name
-        )
+        project = parameters.decode_image(data[REPLY_LENGTH:], order)
+        return cls(project=replace(project, number=data[3]), name=name)
 
     def text(self) -> str:
-        """The file. Raises RequestError for numbers that no file may hold, as those of a cleared project."""
+        """The file. Raises RequestError for a project without steps, and for numbers that no file may hold."""
+        if self.project.is_cleared:
+            raise RequestError(
+                f"project {self.project.number} has no steps: it was cleared or its memory was erased",
+                advice="write a program to it",
+            )
         for error in parameters.check_project(self.project, expert=True):
             raise error
         return "\n".join(_lines(self)) + "\n"
 
-    def lint(self, **conditions: Any) -> list[Finding]:
+    def lint(self) -> list[Finding]:
         """What in it does not do what it seems to say; see `lint.lint`."""
-        return lint(self.project, **conditions)
+        return lint(self.project)
 
     def estimate(self) -> Estimate:
         """How long it takes."""
         return estimate(self.project)
-
-
-def read_text(path: str) -> str:
-    """The text of a file. Raises RequestError if it cannot be read."""
-    try:
-        with open(path, encoding="utf-8") as file:
-            return file.read(LONGEST + 1)
-    except UnicodeDecodeError as error:
-        raise RequestError(f"{path} is not text: {error.reason}", expected="TOML in UTF-8") from None
-    except OSError as error:
-        raise RequestError(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
 
 
 # -- reading ---------------------------------------------------------------------------------------------------------
@@ -206,14 +193,14 @@ def _decode(source: str) -> ProgramFile:
     except msgspec.ValidationError as error:
         message, _, path = str(error).partition(" - at `$")
     keys = re.findall(r"[a-z_0-9]+", path.partition("`")[0])
-    value: Any = data
-    for key in keys:
-        value = value[int(key) if key.isdigit() else key]
     words = [f"step {int(keys[1]) + 1}", *keys[2:]] if keys[1:] and keys[0] == "step" else keys
     where = ", ".join(words) or "the file"
     if "field" in message:
-        table = _TABLES.get("".join(keys[:1]), ProgramFile)
+        table: type[Any] = _TABLES.get("".join(keys[:1]), ProgramFile)
         raise _wrong(f"{where}: {message}", f"one of {', '.join(table.__struct_fields__)}")
+    value: Any = data
+    for key in keys:
+        value = value[int(key) if key.isdigit() else key]
     raise _wrong(f"{where}: {shown(value)} is not possible", message)
 
 
@@ -231,7 +218,7 @@ def _motor(table: MotorTable) -> tuple[Project, Fraction | None]:
     lead = None
     if table.lead:
         lead = table.lead.number * _LENGTH.get(table.lead.unit, Fraction(0))
-        if lead <= 0:
+        if not lead or table.lead.is_negative:
             raise _wrong(f"motor, lead: {shown(table.lead.text)} is no length", "a length as 5 mm")
     base = Project(
         microsteps=table.microsteps,
@@ -244,22 +231,14 @@ def _motor(table: MotorTable) -> tuple[Project, Fraction | None]:
     return base, lead
 
 
-def _distances(project: Project, lead: Fraction | None) -> dict[str, Fraction]:
-    """User units in one of each unit of distance."""
-    turn, pulses = Fraction(project.turn_distance), project.pulses_per_turn or Fraction(1)
-    each = {"units": Fraction(1), "pulses": turn / pulses, "turns": turn, "deg": turn / 360}
-    return each | ({unit: size * turn / lead for unit, size in _LENGTH.items()} if lead else {})
-
-
-def _speeds(project: Project, lead: Fraction | None) -> dict[str, Fraction]:
-    """RPM in one of each unit of speed."""
-    each = {"rpm": Fraction(1), "Hz": 60 / (project.pulses_per_turn or Fraction(1)), "deg/s": Fraction(1, 6)}
-    return each | ({f"{unit}/s": size * 60 / lead for unit, size in _LENGTH.items()} if lead else {})
-
-
 def _step(entry: StepTable, number: int, file: ProgramFile, base: Project, lead: Fraction | None) -> Step:
     where = f"step {number}, "
-    distances, speeds = _distances(base, lead), _speeds(base, lead)
+    turn, pulses = Fraction(base.turn_distance), base.pulses_per_turn or Fraction(1)
+    distances = {"units": Fraction(1), "pulses": turn / pulses, "turns": turn, "deg": turn / 360}
+    speeds = {"rpm": Fraction(1), "Hz": 60 / pulses, "deg/s": Fraction(1, 6)}
+    for unit, size in _LENGTH.items() if lead else ():
+        distances[unit] = size * turn / (lead or 1)
+        speeds[f"{unit}/s"] = size * 60 / (lead or 1)
     distance = _whole(entry.move, distances, "distance", f"{where}move", is_signed=True)
     if distance and entry.speed is None:
         raise _wrong(f"{where}speed: it is missing, and the step moves", _one_of(speeds))
@@ -276,48 +255,47 @@ def _step(entry: StepTable, number: int, file: ProgramFile, base: Project, lead:
     )
 
 
-def _whole(said: Quantity | None, each: _Each, name: str, where: str, *, is_signed: bool = False) -> int:
+def _whole(given: Quantity | None, each: _Each, name: str, where: str, *, is_signed: bool = False) -> int:
     """The raw value of a quantity, 0 for None; `each` are raw counts in one of each unit."""
-    if said is None:
+    if given is None:
         return 0
-    where = f"{where}: {shown(said.text)}"
-    if said.unit not in each:
+    where = f"{where}: {shown(given.text)}"
+    if given.unit not in each:
         raise _wrong(f"{where} has no unit that is possible here", _one_of(each))
-    if said.is_negative and not is_signed:
+    if given.is_negative and not is_signed:
         raise _wrong(f"{where} is negative", _one_of(each))
-    raw, row = abs(said.number) * each[said.unit], PARAMETERS[name]
+    raw, row = given.number * each[given.unit], PARAMETERS[name]
     low, high, below, above = (
-        f"{float(count / each[said.unit]):.10g}" for count in (row.low, row.high, floor(raw), ceil(raw))
+        f"{float(count / each[given.unit]):.10g}" for count in (row.low, row.high, floor(raw), ceil(raw))
     )
     if not row.low <= raw <= row.high:
-        raise _wrong(f"{where} is not possible", f"{low} to {high} {said.unit} (raw {row.low} to {row.high})")
+        raise _wrong(
+            f"{where} is not possible", f"{low} to {high} {given.unit} (raw {row.low} to {row.high})"
+        )
     if raw.denominator != 1:
         fault = f"{where} is {float(raw):.12g}, and the controller counts whole numbers"
-        raise _wrong(fault, f"{below} or {above} {said.unit}")
+        raise _wrong(fault, f"{below} or {above} {given.unit}")
     return int(raw)
 
 
-def _input(said: int | str, file: ProgramFile, where: str) -> int:
-    words = file.inputs | {"none": 0} | {f"input {number}": number for number in range(1, INPUTS + 1)}
-    number = said if isinstance(said, int) else words.get(said.strip(), -1)
+def _input(given: int | str, file: ProgramFile, where: str) -> int:
+    number = given if isinstance(given, int) else (file.inputs | _INPUTS).get(given.strip(), -1)
     try:
         parameters.check_value("start_input", number, expert=file.expert)
     except RequestError as error:
         hint = "; 3 and 4 with expert = true" if number in (3, 4) else ""
-        raise _wrong(
-            f"{where}: {shown(said)} is not possible", f"{error.expected}{hint}, or a name of [inputs]"
-        ) from None
+        expected = f"{error.expected}{hint}, or a name of [inputs]"
+        raise _wrong(f"{where}: {shown(given)} is not possible", expected) from None
     return number
 
 
-def _output(said: str, names: Mapping[str, int], where: str) -> int:
-    words = {text: action for action, text in PARAMETERS["output"].choices.items()}
+def _output(given: str, names: Mapping[str, int], where: str) -> int:
+    words = dict(_OUTPUTS)
     for name, number in names.items():
-        for level in ("on", "off"):
-            words.setdefault(f"{name} {level}", words[f"output {number} {level}"])
-    action = words.get(said.strip())
+        words |= {f"{name} {level}": words[f"output {number} {level}"] for level in ("on", "off")}
+    action = words.get(given.strip())
     if action is None:
-        raise _wrong(f"{where}: {shown(said)} is not possible", f"one of {', '.join(words)}")
+        raise _wrong(f"{where}: {shown(given)} is not possible", f"one of {', '.join(words)}")
     return action
 
 
@@ -336,37 +314,32 @@ def _wrong(what: str, expected: str) -> RequestError:
 def _lines(program: Program) -> list[str]:
     project = program.project
     inputs = {step.start_input for step in project.used} | {step.stop_input for step in project.used}
-    lines = [f"format = {FORMAT}"]
-    lines += [f"name = {_quoted(program.name)}"] if program.name else []
+    lines = ["format = 1"]
+    lines += _entry("name", program.name)
     lines += [f"project = {project.number}"]
     lines += ['repeat = "endless"' if project.is_endless else f"repeat = {project.project_loop}"]
     lines += ["expert = true"] if program.expert or inputs & {3, 4} else []
     lines += ["", "[motor]", f"microsteps = {project.microsteps}"]
-    lines += [
-        f'step_angle = "{project.step_angle / 100:.2f} deg"',
-        f"turn_distance = {project.turn_distance}",
-    ]
-    lines += [f'lead = "{float(program.lead):.12g} mm"'] if program.lead else []
-    lines += ['stop = "immediate"'] if project.stop_mode else []
+    lines += _entry("step_angle", f"{project.step_angle / 100:.2f} deg")
+    lines += [f"turn_distance = {project.turn_distance}"]
+    lines += _entry("lead", f"{float(program.lead):.12g} mm" if program.lead else "")
+    lines += _entry("stop", "immediate" if project.stop_mode else "")
     lines += [f"mode4 = {project.mode4}"] if project.mode4 else []
     lines += ["home_at_power_on = true"] if project.power_on_home else []
     if project.loop_first:
         lines += ["", "[loop]", f"first = {project.loop_first}", f"last = {project.loop_last}"]
         lines += [f"count = {project.loop_count}"]
     for kind, names in (("inputs", program.inputs), ("outputs", program.outputs)):
-        lines += (
-            ["", f"[{kind}]", *(f"{_quoted(name)} = {number}" for name, number in names.items())]
-            if names
-            else []
-        )
+        lines += ["", f"[{kind}]"] if names else []
+        lines += [f"{_quoted(name)} = {number}" for name, number in names.items()]
     for step in project.used:
         lines += ["", "[[step]]", *_step_lines(step, program)]
     return lines
 
 
 def _step_lines(step: Step, program: Program) -> list[str]:
-    inputs = {number: name for name, number in program.inputs.items()}
-    output = PARAMETERS["output"].choices[step.output]
+    inputs = {0: "", **{number: name for name, number in {**_INPUTS, **program.inputs}.items() if number}}
+    output = PARAMETERS["output"].choices[step.output] if step.output else ""
     for name, number in program.outputs.items():
         output = output.replace(f"output {number} ", f"{name} ")
     values = {
@@ -374,12 +347,17 @@ def _step_lines(step: Step, program: Program) -> list[str]:
         "speed": f"{step.speed} rpm" if step.distance or step.speed else "",
         "start": f"{step.start_frequency} Hz" if step.start_frequency else "",
         "acceleration": f"{step.acceleration} Hz" if step.acceleration else "",
-        "output": output if step.output else "",
+        "output": output,
         "delay": f"{step.delay} ms" if step.delay else "",
-        "wait_for": inputs.get(step.start_input, f"input {step.start_input}") if step.start_input else "",
-        "stop_on": inputs.get(step.stop_input, f"input {step.stop_input}") if step.stop_input else "",
+        "wait_for": inputs[step.start_input],
+        "stop_on": inputs[step.stop_input],
     }
-    return [f"{key} = {_quoted(text)}" for key, text in values.items() if text]
+    return [line for key, text in values.items() for line in _entry(key, text)]
+
+
+def _entry(key: str, text: str) -> list[str]:
+    """A line of the file; none for an empty text."""
+    return [f"{key} = {_quoted(text)}"] if text else []
 
 
 def _quoted(text: str) -> str:

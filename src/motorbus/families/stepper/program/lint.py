@@ -10,12 +10,13 @@ from msgspec import Struct
 from motorbus.families.stepper import parameters
 from motorbus.families.stepper.execution import ramp, sequence
 from motorbus.families.stepper.parameters import PARAMETERS, Project, Step
-from motorbus.families.stepper.program.estimate import net_units, numbers
+from motorbus.families.stepper.program.estimate import net_units
 
 Level: TypeAlias = Literal["error", "warning", "note"]
 
 RULES: Final[dict[str, tuple[Level, str]]] = {
-    "L1": ("error", "without angle, microsteps and distance of a turn the motor does not move"),
+    "L1": ("error", "without steps, angle, microsteps and distance of a turn the motor does not move"),
+    "L2": ("error", "no request can carry it"),
     "L3": ("warning", "the part of a pulse is lost, an assumption"),
     "L4": ("warning", "the motor may not follow this frequency"),
     "L5": ("error", "without a start frequency below the running frequency there is no ramp, or no motion"),
@@ -33,9 +34,9 @@ RULES: Final[dict[str, tuple[Level, str]]] = {
     "L17": ("warning", "the motor moves at power-on: keep clear"),
     "L19": ("warning", "a delay is in ms, and empty memory reads FF FF FF"),
     "L21": ("warning", "the manual does not explain mode 4"),
-    "L22": ("warning", "a wait for an input has no timeout"),
 }
 """Level and reason of each rule; numbers that are missing were rules of earlier versions."""
+HIGHEST: Final = 100_000.0  # Hz that a motor driver follows # assumption
 LONG_PAUSE: Final = 3_600_000  # ms
 LONG_PAUSES: Final = 8 * 3_600_000  # ms, of a run, or of one pass of an endless project
 _Found: TypeAlias = Iterator[tuple[str, str]]
@@ -45,39 +46,38 @@ class Finding(Struct, frozen=True):
     """A finding of a rule at a step (0: of the project)."""
 
     rule: str
+    level: Level
     step: int
     text: str
-
-    @property
-    def level(self) -> Level:
-        return RULES[self.rule][0]
+    reason: str
 
     def __str__(self) -> str:
         where = f"step {self.step}: " if self.step else ""
-        return f"{self.rule} {self.level}: {where}{self.text} ({RULES[self.rule][1]})"
+        return f"{self.rule} {self.level}: {where}{self.text} ({self.reason})"
 
 
-def lint(project: Project, *, highest: float = 100_000.0, unattended: bool = False) -> list[Finding]:
-    """All findings: those of the project first, then by step.
+def lint(project: Project) -> list[Finding]:
+    """All findings: those of the project first, then by step."""
+    if project.is_cleared:
+        return [_finding("L1", 0, "the project has no steps")]
+    found = [(0, *one) for one in _of_project(project)]
+    for number, step in enumerate(project.used, 1):
+        found += [(number, *one) for one in _motion(project, step, number)]
+        found += [(number, *one) for one in _pauses_and_inputs(project, step)]
+    return [_finding(rule, number, text) for number, rule, text in found]
 
-    `highest` is the frequency (Hz) that the motor driver follows, `unattended` that no operator can press a button.
-    """
-    found = [Finding(rule, 0, text) for rule, text in _of_project(project)]
-    homing = bool(project.power_on_home)
-    for number in numbers(project):
-        step = project.step(number)
-        rules = [*_motion(project, step, number, highest), *_pauses(step), *_inputs(step, homing, unattended)]
-        found += [Finding(rule, number, text) for rule, text in rules]
-    return found
+
+def _finding(rule: str, step: int, text: str) -> Finding:
+    level, reason = RULES[rule]
+    return Finding(rule, level, step, text, reason)
 
 
 def _of_project(project: Project) -> _Found:
-    if project.is_cleared:
-        yield "L1", "the project has no steps: it was cleared"
-        return
     for name in ("step_angle", "microsteps", "turn_distance"):
         if not getattr(project, name):
             yield "L1", f"{name} is 0"
+    for error in parameters.check_project(project, expert=True):
+        yield "L2", error.summary
     first, last, count = project.loop_first, project.loop_last, project.loop_count
     if (first or last or count) and not project.has_loop:
         yield "L9", f"steps {first} to {last} of {project.total_steps}, count {count}"
@@ -96,59 +96,49 @@ def _of_project(project: Project) -> _Found:
         yield "L15", f"output {', '.join(str(n) for n in (1, 2, 3) if outputs >> n - 1 & 1)}"
     if project.number == 1:
         step = project.step(1)
-        yield (
-            "L16",
-            f"from now on at {step.speed} rpm, from {step.start_frequency} Hz by {step.acceleration} Hz",
-        )
+        yield "L16", f"at {step.speed} rpm, from {step.start_frequency} Hz by {step.acceleration} Hz"
     if project.power_on_home:
         yield "L17", "in reverse until input 5, without a limit of travel or time"
-    pauses = sum(project.step(n).delay * sequence.times(project, n) for n in numbers(project)) * (passes or 1)
+    pauses = sum(project.step(place.step).delay for place in sequence.one_pass(project)) * (passes or 1)
     if pauses > LONG_PAUSES:
         yield "L19", f"{pauses / 1000:g} s of pauses in all"
     if project.mode4:
         yield "L21", f"mode 4 is {project.mode4}"
 
 
-def _motion(project: Project, step: Step, number: int, highest: float) -> _Found:
-    if not step.distance or project.pulses_per_unit is None:
+def _motion(project: Project, step: Step, number: int) -> _Found:
+    if not step.distance or project.pulses_per_unit is None or project.pulses_per_turn is None:
         return
     speed = ramp.ramp_of(project, step)
     if not speed.run:
         yield "L5", "speed 0"
         return
-    exact = step.distance * project.pulses_per_unit
-    pulses = ramp.pulses_of(project, step)
+    exact, pulses = step.distance * project.pulses_per_unit, ramp.pulses_of(project, step)
     if exact != pulses:
         times = sequence.times(project, number) * (sequence.passes(project) or 1)
-        yield (
-            "L3",
-            f"{float(exact):.6g} pulses, {float(exact - pulses) * times:.3g} lost in {times} executions",
-        )
-    if speed.run > highest:
-        yield "L4", f"{step.speed} rpm are {speed.run:.6g} Hz, more than {highest:g} Hz"
+        lost = float(exact - pulses) * times
+        yield "L3", f"{float(exact):.6g} pulses, {lost:.3g} lost in {times} executions"
+    if speed.run > HIGHEST:
+        yield "L4", f"{step.speed} rpm are {speed.run:.6g} Hz, more than {HIGHEST:g} Hz"
     if not step.start_frequency or step.start_frequency >= speed.run:
         yield "L5", f"start {step.start_frequency} Hz, running {speed.run:.6g} Hz"
     if not step.acceleration:
         yield "L6", "acceleration 0"
     peak = ramp.motion(speed, pulses, 1).peak
-    if pulses and peak < speed.run and project.pulses_per_turn:
+    if pulses and peak < speed.run:
         yield "L7", f"{peak * 60 / float(project.pulses_per_turn):.4g} rpm at most, {step.speed} rpm wanted"
 
 
-def _pauses(step: Step) -> _Found:
+def _pauses_and_inputs(project: Project, step: Step) -> _Found:
     if not (step.distance or step.delay or step.output):
         yield "L8", "only a wait" if step.start_input else "nothing at all"
     if step.delay == PARAMETERS["delay"].high or step.delay > LONG_PAUSE:
         yield "L19", f"a pause of {step.delay / 1000:.10g} s"
-
-
-def _inputs(step: Step, homing: bool, unattended: bool) -> _Found:
-    for port in (step.start_input, step.stop_input):
-        if port and port not in parameters.STEP_INPUTS:
+    inputs = (step.start_input, step.stop_input)
+    for port in inputs:
+        if port in (parameters.START_INPUT, parameters.STOP_INPUT):
             yield "L12", f"input {port}"
-    if homing and parameters.HOME_INPUT in (step.start_input, step.stop_input):
+    if project.power_on_home and parameters.HOME_INPUT in inputs:
         yield "L13", "input 5"
     if step.start_input and step.start_input == step.stop_input:
         yield "L14", f"input {step.start_input}"
-    if step.start_input and unattended:
-        yield "L22", f"input {step.start_input}"

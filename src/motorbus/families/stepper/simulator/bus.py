@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from math import inf
 from typing import Final
 
 from motorbus.core.framing import FrameParser
 from motorbus.core.request import Data
 from motorbus.core.simulated import SerialLine
-from motorbus.errors import RequestError
 from motorbus.families.stepper.protocol import HEADER, NOTICE, ONLY, RATE, REQUEST_LENGTH, is_request
 from motorbus.families.stepper.simulator.controller import Controller
 
-_CHANGE: Final = re.compile(r"(\d+(?:\.\d+)?) +([1-5]) +(on|off)", re.ASCII)
 GAP: Final = 0.1  # s after which the begin of a request is dropped # assumption
 
 
@@ -32,16 +29,16 @@ class StepperBus(SerialLine[Controller]):
         super().__init__({ONLY: controller}, RATE, _parser())
         self.controller = controller
         self._busy_until = -inf
-        self._heard = -inf
+        self._last_byte = -inf
         controller.on_power_off = self._power_off
 
     def receive(self, data: Data, at: float) -> None:
         """Take bytes of the host whose last bit arrives at this moment (s)."""
         self.controller.advance(max(at, self.now))
         self._send_notices()
-        if at - self._heard > GAP:
+        if at - self._last_byte > GAP:
             self._parser = _parser()
-        self._heard = at
+        self._last_byte = at
         if self.controller.quirks.echo and isinstance(data, bytes):
             self.send(at, data)
         if self.controller.plugged:
@@ -66,18 +63,6 @@ class StepperBus(SerialLine[Controller]):
         self._send_notices()
         moment = min([self.controller.due(), *(at for at, _ in self._replies)])
         return None if moment == inf else moment
-
-    def script(self, text: str) -> None:
-        """Plan changes of inputs, one a line: `SECONDS INPUT on|off`. Raises RequestError for another line."""
-        planned = []
-        for line in text.splitlines():
-            match = _CHANGE.fullmatch(line.strip())
-            if match is None:
-                raise RequestError(
-                    f"{line!r} is no change of an input", expected="SECONDS INPUT on|off, as 2.5 1 on"
-                )
-            planned.append((float(match[1]), int(match[2]), match[3] == "on"))
-        self.controller.planned = sorted(planned)
 
     def _send_notices(self) -> None:
         for at in self.controller.notices:

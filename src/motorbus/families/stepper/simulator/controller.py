@@ -10,18 +10,16 @@ from dataclasses import replace
 from math import inf
 from typing import Final, NamedTuple
 
-from motorbus.core.family import Remark
 from motorbus.core.request import TimeoutClass
 from motorbus.core.simulated import PoweredDevice
 from motorbus.errors import RequestError
 from motorbus.families.stepper.execution.machine import Machine, Phase
-from motorbus.families.stepper.parameters import HOME_INPUT, INPUTS, Project, check_value
+from motorbus.families.stepper.parameters import HOME_INPUT, INPUTS, PARAMETERS, Project, values_of
 from motorbus.families.stepper.protocol import MOTOR, Command, decode_request, encode_reply
 from motorbus.families.stepper.simulator.memory import Memory
 from motorbus.families.stepper.simulator.quirks import Quirks
 
 STORE_TIME: Final = 0.03  # s that a save or a clear takes before its reply # assumption
-LOG: Final = 1000  # remarks that are kept
 
 
 class Storing(NamedTuple):
@@ -34,7 +32,7 @@ class Storing(NamedTuple):
 
 
 class Controller(PoweredDevice):
-    """A simulated controller. `store` is its memory, `machine` what it does, `log` what it does not report to a host.
+    """A simulated controller. `store` is its memory, `machine` what it does.
 
     `position` counts from power-on or homing; `offset` is the place of its zero (pulses).
     """
@@ -43,14 +41,11 @@ class Controller(PoweredDevice):
         self.quirks: Final = quirks
         self.store: Final = Memory(quirks)
         self.machine: Final = Machine(tick_ms=quirks.ramp_tick_ms)
-        self.log: list[Remark] = []
         self.now = 0.0
         self.offset = 0
         self.notices: list[float] = []
-        self.planned: list[tuple[float, int, bool]] = []  # changes of inputs: moment (s), input, active
         self.on_power_off: Callable[[], object] = list  # set by the bus
         self._storing: Storing | None = None
-        self._remarks = 0
         self._crossing: tuple[object, bool, float] = (None, False, inf)
         self.power_on()
 
@@ -59,7 +54,7 @@ class Controller(PoweredDevice):
     @property
     def memory(self) -> Mapping[str, int]:
         """The raw value of each row of the project that is edited."""
-        return self.store.values
+        return values_of(self.store.working)
 
     @property
     def position(self) -> int:
@@ -75,7 +70,6 @@ class Controller(PoweredDevice):
 
     def put(self, number: int, project: Project) -> None:
         """Store a project as if it had been written and saved."""
-        check_value("project", number)
         self.store.put(number, replace(project, number=number))
 
     def notice(self) -> None:
@@ -131,8 +125,7 @@ class Controller(PoweredDevice):
     def due(self) -> float:
         """The next moment (s) at which something happens by itself; inf if none."""
         stored = inf if self._storing is None else self._storing.end
-        planned = self.planned[0][0] if self.planned else inf
-        return min(stored, planned, self.machine.until, self._home_crossing())
+        return min(stored, self.machine.until, self._home_crossing())
 
     def advance(self, to: float) -> None:
         """Let time pass until this moment (s)."""
@@ -141,9 +134,6 @@ class Controller(PoweredDevice):
             if self._storing is not None and self._storing.end <= moment:
                 self.store.put(self._storing.number, self._storing.project)
                 self._storing = None
-            elif self.planned and self.planned[0][0] <= moment:
-                _, port, active = self.planned.pop(0)
-                self.set_input(port, active)
             elif self._home_crossing() <= moment:
                 self._set_input(HOME_INPUT, HOME_INPUT not in self.machine.inputs, moment)
             self.machine.advance(moment)
@@ -188,52 +178,40 @@ class Controller(PoweredDevice):
         self.advance(at)
         ready = at + self.quirks.turnaround
         found = decode_request(request)
-        refusal = self._refusal(request, found)
-        if found is None or refusal:
-            self._remark(refusal)
+        if found is None or not self._accepts(request, *found):
             return b"", ready
         command, values = found
         number = values.get("project", 0)
         if command.reply_within is TimeoutClass.STORE:
             begun, ready = ready, ready + STORE_TIME
-            saved = (
-                replace(self.store.working, number=number) if command.name == "save_project" else Project()
-            )
+            is_save = command.name == "save_project"
+            saved = replace(self.store.working, number=number) if is_save else Project()
             self._storing = Storing(number, saved, begun, ready)
         elif command.is_edit:
             self._edit(command, values)
         else:
-            self._act(command, values, at)
+            self._act(command.name, values, at)
         self._collect()
         image = self.store.image(number) if command.name == "read_project" else b""
         level = int(values.get("port") in self.machine.inputs)
         return encode_reply(request, selected=self.store.selected, level=level, image=image), ready
 
-    def _refusal(self, request: bytes, found: tuple[Command, dict[str, int]] | None) -> str:
-        """Why it stays silent; "" if it does not. That it is silent is an assumption."""
-        if found is None:
-            return f"unknown command {request[2]:02X} {request[3]:02X}"
-        command, values = found
-        if command.code[0] == MOTOR and request[2] != self.quirks.motor:
-            return f"motor {request[2]} is another one"
-        try:
-            for name, raw in values.items():
-                check_value(name, raw, expert=True)
-        except RequestError as error:
-            return f"{command.name}: {error.summary}"
-        return ""
+    def _accepts(self, request: bytes, command: Command, values: Mapping[str, int]) -> bool:
+        """Whether it replies: not to another motor, nor to a number out of range. # assumption"""
+        is_own = command.code[0] != MOTOR or request[2] == self.quirks.motor
+        rows = [(PARAMETERS[name], raw) for name, raw in values.items()]
+        return is_own and all(row.low <= raw <= row.high for row, raw in rows)
 
     def _edit(self, command: Command, values: Mapping[str, int]) -> None:
+        """Edit; a project that runs is not changed, except by a stop mode."""
         run = self.machine.run
-        if run is not None:
-            self._remark(f"{command.name} while project {run.project.number} runs, which is not changed")
         self.store.edit(command.name, values)
         if command.name == "set_stop_mode" and (run is None or run.project.number == self.store.selected):
             self.machine.stop_mode = values["stop_mode"]
 
-    def _act(self, command: Command, values: Mapping[str, int], at: float) -> None:
+    def _act(self, name: str, values: Mapping[str, int], at: float) -> None:
         machine, manual = self.machine, self.store.project(1)
-        actions: dict[str, Callable[[], bool | None]] = {
+        actions: dict[str, Callable[[], object]] = {
             "start_project": lambda: machine.start(self.store.project(values["project"]), at),
             "jog_forward": lambda: machine.jog(manual, 1, at),
             "jog_reverse": lambda: machine.jog(manual, -1, at),
@@ -243,9 +221,5 @@ class Controller(PoweredDevice):
             "stop_motor": lambda: machine.stop_motor(at),
             "set_output": lambda: machine.set_output(values["port"], values["level"], at),
         }
-        if command.name in actions and actions[command.name]() is False:
-            self._remark(f"{command.name} is ignored while it is {machine.phase.value}")
-
-    def _remark(self, text: str) -> None:
-        self._remarks += 1
-        self.log = [*self.log[1 - LOG :], Remark(self._remarks, self.now, text)]
+        if name in actions:
+            actions[name]()

@@ -17,7 +17,6 @@ from motorbus.families.stepper.parameters import (
     Step,
     checked_order,
     encode_image,
-    values_of,
     with_steps,
 )
 from motorbus.families.stepper.simulator.quirks import Quirks
@@ -42,21 +41,12 @@ class Memory:
         if quirks.shipped == "example":
             self.stored[1] = EXAMPLE
         self.selected_at_power_on = 1
-        self._values: dict[str, int] = {}
-        self._values_of: Project | None = None
         self.power_on()
 
     def power_on(self) -> None:
         """What was not saved is lost."""
         self.selected = self.selected_at_power_on
         self.working = self.stored[self.selected]
-
-    @property
-    def values(self) -> Mapping[str, int]:
-        """The raw value of each row of the edited copy."""
-        if self._values_of is not self.working:
-            self._values, self._values_of = values_of(self.working), self.working
-        return self._values
 
     def project(self, number: int) -> Project:
         """What a start of this project runs: of the selected one its edits, assumption."""

@@ -1,4 +1,4 @@
-"""The loan of project 1: what the journal holds, what is refused, what is given back.
+"""Temporary use of project 1: what the journal holds, what is refused, what is restored.
 
 Cuts at every frame are in `test_power_cuts.py`.
 """
@@ -26,7 +26,7 @@ MINE = with_steps(
         Step(distance=50, start_frequency=50, acceleration=30, speed=120),
     ),
 )
-"""A project 1 in which every field that is lent has a value of its own."""
+"""A project 1 in which every field that a motion changes has a value of its own."""
 JOG = (tau, 0.2)
 
 
@@ -56,7 +56,7 @@ def on_move(one: Bench, act: Callable[[], object]) -> None:
     one.line.change = change
 
 
-def test_loan_edits_moves_stops_and_gives_back(one: Bench) -> None:
+def test_use_edits_moves_stops_and_restores(one: Bench) -> None:
     before = image(one)
     moved = one.device.jog(*JOG)
     assert image(one) == before
@@ -67,7 +67,7 @@ def test_loan_edits_moves_stops_and_gives_back(one: Bench) -> None:
         "03 0C", "03 0D", "5E 00",
         "3E 01", "3E 01", "6E 01", "03 02", "03 03", "03 04", "03 05", "3E 01",
     ]  # fmt: skip
-    assert states(one) == ["asked", "intent", "lent", "returning", "outcome"]
+    assert states(one) == ["asked", "intent", "edited", "restoring", "outcome"]
     assert one.journal.unfinished() is None
     assert one.simulated.position == pytest.approx(moved.angle / tau * 1600)
 
@@ -89,7 +89,7 @@ def test_journal_holds_project_1_before_the_first_edit(one: Bench) -> None:
     assert (asked[1], intent[1]) == (0, 2), "nothing but two dumps left before"
     facts = intent[0].facts
     assert bytes.fromhex(str(facts["image"])) == encode_image(MINE)
-    assert facts["lent"] == {
+    assert facts["changed"] == {
         "turn_distance": 1600, "step_1_distance": 320, "step_1_direction": 0, "step_1_speed": 60,
     }  # fmt: skip
 
@@ -100,9 +100,9 @@ def test_stop_comes_before_the_edits_where_nothing_is_acknowledged(one: Bench) -
         one.device.jog(*JOG)
     after = one.sent()[9:]
     assert set(after) == {STOP_MOTOR, STOP_PROJECT}
-    assert one.journal.unfinished() is not None, "project 1 is still lent"
+    assert one.journal.unfinished() is not None, "project 1 is still edited"
     one.line.change = lambda data: data
-    with pytest.raises(RequestError, match="the loan of project 1 to jog"):
+    with pytest.raises(RequestError, match="the temporary use of project 1 by jog"):
         one.device.jog(*JOG)
     change = one.journal.unfinished()
     assert change is not None
@@ -114,24 +114,22 @@ def test_stop_comes_before_the_edits_where_nothing_is_acknowledged(one: Bench) -
 
 def test_supply_lost_during_the_motion_is_told(one: Bench) -> None:
     on_move(one, one.simulated.power_cycle)
-    with pytest.raises(OutcomeUnknown, match="lost its supply") as caught:
+    with pytest.raises(OutcomeUnknown, match="lost its supply"):
         one.device.jog(*JOG)
-    assert not caught.value.unmoved
     assert one.journal.unfinished() is None
     assert image(one) == encode_image(MINE)
 
 
 def test_controller_that_shows_what_is_stored_is_not_moved() -> None:
     with bench(MINE, read_view="stored") as one:
-        with pytest.raises(VerificationFailed, match="cannot be read") as caught:
+        with pytest.raises(VerificationFailed, match="cannot be read"):
             one.device.jog(*JOG)
-        assert caught.value.unmoved
         assert not [frame for frame in one.sent() if frame.startswith("FF AA 03 0C")]
         assert one.simulated.store.working == MINE, "the edits are undone though they cannot be read"
         assert one.journal.unfinished() is None
 
 
-def test_loan_that_would_lose_edits_is_refused(one: Bench) -> None:
+def test_use_that_would_lose_edits_is_refused(one: Bench) -> None:
     one.simulated.put(2, made(number=2))
     one.device.write(project=2, save=False, step_1_delay=1.0)
     one.sent()
@@ -139,22 +137,22 @@ def test_loan_that_would_lose_edits_is_refused(one: Bench) -> None:
         one.device.jog(*JOG)
     assert one.sent() == [READ_1] * 2
     assert one.device.read_raw("step_1_delay", project=2) == {"step_1_delay": 1000}
-    one.device.save(2)
+    one.device.write(project=2, step_1_delay=1.0)
     one.device.jog(*JOG)
 
 
-def test_project_1_that_cannot_be_given_back_is_not_lent(one: Bench) -> None:
+def test_project_1_that_cannot_be_restored_is_not_edited(one: Bench) -> None:
     one.simulated.put(1, replace(MINE, mode4=9))
-    with pytest.raises(RequestError, match="could not be given back: mode4"):
+    with pytest.raises(RequestError, match="could not be restored: mode4"):
         one.device.jog(*JOG)
     assert set(one.sent()) == {READ_1}
 
 
-def test_unsaved_edits_of_project_1_are_given_back(one: Bench) -> None:
+def test_unsaved_edits_of_project_1_are_restored(one: Bench) -> None:
     one.device.write(project=1, save=False, step_2_delay=1.0)
     one.device.jog(*JOG)
     assert one.device.read_raw("step_2_delay") == {"step_2_delay": 1000}
-    one.device.save(1)
+    one.device.write(project=1, step_2_delay=1.0)
     one.simulated.power_cycle()
     assert one.device.read_raw("step_2_delay") == {"step_2_delay": 1000}
 
@@ -164,7 +162,7 @@ def test_unsaved_edits_of_project_1_are_given_back(one: Bench) -> None:
 
 @pytest.fixture
 def cut(one: Bench) -> tuple[Bench, str, dict[str, Any]]:
-    """A loan whose host has died while the motor turned."""
+    """A host that has died while the motor turned."""
     facts: dict[str, Any] = {}
 
     def record(event: object) -> None:
@@ -177,10 +175,10 @@ def cut(one: Bench) -> tuple[Bench, str, dict[str, Any]]:
     one.simulated.store.working = facts.pop("working")
     one.device.state.projects.clear()
     one.sent()
-    return one, "jog", {**facts, "reached": ["intent", "lent"]}
+    return one, "jog", {**facts, "reached": ["intent", "edited"]}
 
 
-def test_recover_reverts_what_was_lent_and_keeps_the_rest(cut: tuple[Bench, str, dict[str, Any]]) -> None:
+def test_recover_restores_what_was_edited_and_keeps_the_rest(cut: tuple[Bench, str, dict[str, Any]]) -> None:
     one, change, facts = cut
     one.simulated.store.working = one.simulated.store.working.with_step(2, delay=5)
     assert one.device.recover(change, facts) == "old"
@@ -197,8 +195,8 @@ def test_recover_refuses_what_something_else_has_written(cut: tuple[Bench, str, 
     assert set(one.sent()) == {STOP_MOTOR, STOP_PROJECT, READ_1}
 
 
-@pytest.mark.parametrize("reached", [["intent"], ["intent", "lent", "returning"]])
-def test_recover_writes_a_half_lent_project_back_in_full(
+@pytest.mark.parametrize("reached", [["intent"], ["intent", "edited", "restoring"]])
+def test_recover_writes_a_half_edited_project_back_in_full(
     cut: tuple[Bench, str, dict[str, Any]], reached: list[str]
 ) -> None:
     one, change, facts = cut
@@ -212,8 +210,8 @@ def test_recover_refuses_facts_of_something_else(cut: tuple[Bench, str, dict[str
     for verb, wrong in (
         (change, {}),
         (change, {**facts, "image": "FF"}),
-        (change, {**facts, "lent": {"speed_of_light": 1}}),
-        (change, {**facts, "lent": {"step_1_speed": "fast"}}),
+        (change, {**facts, "changed": {"speed_of_light": 1}}),
+        (change, {**facts, "changed": {"step_1_speed": "fast"}}),
         (change, {**facts, "order": "big"}),
         (change, {**facts, "motor": 7}),
         ("set_id", facts),
