@@ -216,7 +216,7 @@ class EmergencyStop:
                 while received[-1][0] and select.select((server,), (), (), 0.0)[0]:
                     received.append(server.recvfrom(LONGEST))
                 clients = [one for one in received if one[0].startswith(b"estop")]
-                if clients or any(STOP in data for data, _ in received):
+                if clients or any(STOP in data and not data.strip(STOP + END) for data, _ in received):
                     self._stop_for(server, clients)
             if self._closed:
                 return
