@@ -16,8 +16,7 @@ import pytest
 
 import motorbus
 from motorbus import feetech, stepper
-from motorbus.bus.blocking import exchange_on
-from motorbus.bus.running import run_on
+from motorbus.bus.blocking import exchange_on, run_on
 from motorbus.core.request import Effect, Request
 from motorbus.core.steps import Exclusive, Sleep, catch, gather
 from motorbus.errors import Interrupted, LinkLost

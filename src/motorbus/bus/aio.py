@@ -18,8 +18,8 @@ from typing import Any, Final, Self, TypeAlias, TypeVar
 from weakref import WeakKeyDictionary
 
 from motorbus.bus.base import BaseBus, check_clocks
+from motorbus.bus.blocking import Part, wait_for
 from motorbus.bus.interrupts import DEFAULTS, SIGNALS
-from motorbus.bus.running import Part, wait_for
 from motorbus.bus.tasks import Notify, Tree, starting
 from motorbus.core.steps import Runnable, discard
 

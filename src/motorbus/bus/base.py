@@ -20,7 +20,7 @@ from motorbus.bus.tasks import Notify, Pause, Tree, in_order
 from motorbus.bus.turn import Turn
 from motorbus.core.family import BusDriver, Family, IdChanged
 from motorbus.core.request import Priority, Request
-from motorbus.core.steps import JournalEntry, Runnable
+from motorbus.core.steps import JournalEntry
 from motorbus.errors import LinkError, LinkLost, MotorbusError, RequestError
 from motorbus.link.base import Link, Renewable
 from motorbus.link.memory import MemoryLink
@@ -80,8 +80,6 @@ class BaseBus:
         self.engine.before_motion = self._start_stopper
         self.reconnects = isinstance(link, Renewable)
         """A lost port is opened again by the next request. May be set to False only."""
-        self.watches: list[Tree[Any]] = []
-        """Procedures that are stepped whenever the bus is used; for virtual time, which passes only then."""
         self._on_reconnect: list[Callable[[], None]] = []
         self._open = True
         if stop_socket is not None:
@@ -340,17 +338,6 @@ class BaseBus:
     def on_reconnect(self, function: Callable[[], None]) -> None:
         """Call this function each time the lost port was opened again, before anything is sent."""
         self._on_reconnect.append(function)
-
-    def watch(self, procedure: Runnable[Any]) -> Tree[Any]:
-        """Step this procedure whenever the bus is used, in virtual time, until `unwatch`."""
-        tree: Tree[Any] = Tree(self.engine, procedure, now=self.now, report=self.event_sink(None))
-        self.watches.append(tree)
-        return tree
-
-    def unwatch(self, tree: Tree[Any]) -> None:
-        """End what `watch` began."""
-        self.watches.remove(tree)
-        tree.drop()
 
     def expect_echo(self, test: Request[Any]) -> None:
         """Let the next reply to this request show whether the adapter echoes."""

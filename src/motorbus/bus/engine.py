@@ -19,14 +19,13 @@ from motorbus.bus.attempt import Attempt
 from motorbus.bus.echo import Echo
 from motorbus.bus.interlock import Interlock
 from motorbus.bus.nodes import GATED, Nodes, addressed, is_refusal, moves
-from motorbus.bus.sync import SyncTable
+from motorbus.bus.sync import SyncTable, is_read, must_sync
 from motorbus.bus.trace import Feed, Statistics, TraceRecord
 from motorbus.core.family import BusDriver
 from motorbus.core.request import (
     ANY,
     EVERY_LANE,
     Data,
-    Effect,
     Event,
     Expected,
     Noise,
@@ -598,13 +597,3 @@ class Engine:
         """The link has this rate (bit/s) now."""
         self.rate = rate
         self.receiver, self.holds_data = self.driver.receiver(), False
-
-
-def must_sync(request: Request[Any]) -> bool:
-    """The nodes of this request must be in sync: not of a stop, nor of a scan, whose usual answer is silence."""
-    return request.priority is not Priority.STOP and request.reply_within is not TimeoutClass.SCAN
-
-
-def is_read(request: Request[Any]) -> bool:
-    """Sending it again changes nothing."""
-    return request.repeatable and request.effect is Effect.NONE
