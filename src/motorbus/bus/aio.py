@@ -20,7 +20,7 @@ from weakref import WeakKeyDictionary
 from motorbus.bus.base import BaseBus, check_clocks
 from motorbus.bus.blocking import Part, wait_for
 from motorbus.bus.interrupts import DEFAULTS, SIGNALS
-from motorbus.bus.tasks import Notify, Tree, starting
+from motorbus.bus.tasks import Notify, Starting, Tree
 from motorbus.core.steps import Runnable, discard
 
 T = TypeVar("T")
@@ -43,7 +43,7 @@ class AsyncBus(BaseBus):
         return self._run(Owned(procedure), report)
 
     async def _run(self, owned: Owned, report: Notify | None) -> Any:
-        with starting(owned.procedure):
+        with Starting(owned.procedure):
             call = self.submit(owned.procedure, report)
         await _finish([call])
         return call.tree.result()
@@ -146,7 +146,7 @@ async def run_on(procedures: Mapping[AsyncBus, Runnable[Any]]) -> dict[AsyncBus,
 
     Any other error of one of them, and a cancellation, cancels all; it is raised when all have cleaned up.
     """
-    with starting(*procedures.values()):
+    with Starting(*procedures.values()):
         check_clocks(procedures)
         calls = {bus: bus.submit(procedure) for bus, procedure in procedures.items()}
     await _finish(calls.values())

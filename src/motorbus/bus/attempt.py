@@ -23,6 +23,7 @@ class Attempt(Step["Attempt | None"]):
         self, request: Request[Any], *, is_probe: bool = False, excluded: tuple[int, ...] = ()
     ) -> None:
         self.request = request
+        self.priority = request.priority
         self.is_probe = is_probe
         self.is_probed = False  # a probe was answered, so a reply may equal what was sent
         self.excluded = excluded

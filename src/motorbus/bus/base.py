@@ -16,7 +16,7 @@ from motorbus.bus.interlock import Interlock
 from motorbus.bus.nodes import Reading
 from motorbus.bus.stop import EmergencyStop
 from motorbus.bus.stop_socket import StopOutcome, asked_by
-from motorbus.bus.tasks import Notify, Pause, Tree, in_order
+from motorbus.bus.tasks import PRIORITY, Notify, Pause, Tree
 from motorbus.bus.turn import Turn
 from motorbus.core.family import BusDriver, Family, IdChanged
 from motorbus.core.request import Priority, Request
@@ -141,19 +141,20 @@ class BaseBus:
         moment = inf
         try:
             now = link.now()
-            if any(tree.sending for tree in trees) and (stale := link.read(now)):
+            waiting = [one for tree in trees for one in tree.sending]
+            if waiting and (stale := link.read(now)):
                 engine.feed(stale, now)  # it cannot answer what has not left
-            while (moment := self._send_next(trees, now)) == 0.0:
-                pass
+            while waiting and (moment := self._send_next(waiting, now)) == 0.0:
+                waiting = [one for tree in trees for one in tree.sending]
         except LinkError as error:
             self._fail(self.lost(error), trees)
         self.hand_over()
         return moment
 
-    def _send_next(self, trees: Sequence[Tree[Any]], now: float) -> float:
+    def _send_next(self, waiting: list[Attempt | Pause], now: float) -> float:
         """Send the first that may leave and return 0; else the moment (s) from which one may, inf if unknown."""
         engine, moment = self.engine, inf
-        for one in in_order(trees):
+        for one in sorted(waiting, key=PRIORITY):
             if not self._may_use_bus(one):
                 continue
             if isinstance(one, Pause):
@@ -173,7 +174,7 @@ class BaseBus:
         return moment
 
     def _may_use_bus(self, one: Attempt | Pause) -> bool:
-        if isinstance(one, Attempt) and one.request.priority is Priority.STOP:
+        if one.priority is Priority.STOP:
             return True
         owner = self.engine.exclusive
         return not self.engine.stopping and (owner is None or owner is one.task.owner)

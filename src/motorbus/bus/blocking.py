@@ -16,7 +16,7 @@ from motorbus.bus.attempt import Attempt
 from motorbus.bus.base import IDLE, BaseBus, check_clocks
 from motorbus.bus.engine import PENDING
 from motorbus.bus.interrupts import ELSEWHERE, INTERRUPTS, MAIN, interrupts
-from motorbus.bus.tasks import STEPPING, Notify, Tree, check_outside, decode, starting
+from motorbus.bus.tasks import STEPPING, Notify, Starting, Tree, check_outside, decode
 from motorbus.core.register import shown
 from motorbus.core.request import Priority, Request, Response
 from motorbus.core.steps import Runnable, discard, gather
@@ -154,10 +154,7 @@ class Bus(BaseBus):
         except LinkLost:
             raise
         except LinkError as error:
-            if not engine.not_written(attempt, error):
-                self.hand_over()
-                raise
-            return None
+            return None if engine.not_written(attempt, error) else attempt
         if engine.window > 1 or not attempt.in_flight:
             engine.written(attempt)
         return attempt
@@ -175,10 +172,9 @@ class Bus(BaseBus):
                     if value is not PENDING:
                         return value
             engine.feed(chunks, link.now(), attempt.sent_at)
-            if attempt.accepted is None:
-                return PENDING
+        if attempt.accepted is None:
+            return PENDING
         self.hand_over()
-        assert attempt.accepted is not None
         return decode(request, attempt.accepted)
 
     def _rest_of(self, attempt: Attempt, chunks: list[Any]) -> bytes:
@@ -261,7 +257,7 @@ def _check_requests(requests: Sequence[Any]) -> None:
 def run_here(bus: BaseBus, procedure: Runnable[T], report: Notify | None = None, since: int = -1) -> T:
     """Run a procedure in this thread; it was called at epoch `since`, -1: now."""
     with interrupts():
-        with starting(procedure):
+        with Starting(procedure):
             part = Part(bus)
             tree = part.add(procedure, report, since)
         run_parts([part], single=isinstance(procedure, Request))
@@ -274,7 +270,7 @@ def run_on(procedures: Mapping[Any, Runnable[Any]]) -> dict[BaseBus, Any]:
     An error that is not a MotorbusError, or a signal, cancels all; it is raised after all have cleaned up.
     """
     with interrupts():
-        with starting(*procedures.values()):
+        with Starting(*procedures.values()):
             check_clocks(procedures)
             parts = [Part(bus) for bus in procedures]
             trees = [part.add(procedures[part.bus]) for part in parts]
@@ -332,14 +328,13 @@ class Part:
         while self.orders:
             self.orders.popleft()()
         while True:
-            for tree in self.trees:
-                tree.advance()
-            self.finished = all(tree.finished for tree in self.trees)
+            going = [tree for tree in self.trees if not tree.advance()]
+            self.finished = not going
             if self.finished:
                 self.release_turn()
                 return True
-            self.sends_at = self.bus.send(self.trees)
-            if not any(tree.ready for tree in self.trees):
+            self.sends_at = self.bus.send(going)
+            if not [tree for tree in going if tree.ready]:
                 return False
 
     def cancel(self, error: BaseException) -> None:

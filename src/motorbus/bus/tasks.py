@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from bisect import bisect_left, insort
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from math import inf
+from operator import attrgetter
 from threading import local
 from types import CoroutineType
 from typing import Any, Final, Generic, TypeVar
@@ -36,6 +37,7 @@ from motorbus.core.steps import (
 from motorbus.errors import MotorbusError, RequestError
 
 T = TypeVar("T")
+PRIORITY: Final = attrgetter("priority")
 Notify = Callable[[object], None]
 
 CLEANUP_TIMEOUT: Final = 2.0
@@ -67,16 +69,21 @@ def check_outside() -> None:
         )
 
 
-@contextmanager
-def starting(*runnables: object) -> Iterator[None]:
-    """Close these procedures if they are refused. Raises RequestError inside of another procedure."""
-    try:
-        check_outside()
-        yield
-    except BaseException:
-        for one in runnables:
-            discard(one)
-        raise
+class Starting:
+    """Closes these procedures if they are refused. Raises RequestError inside of another procedure."""
+
+    def __init__(self, *runnables: object) -> None:
+        self._runnables = runnables
+        if STEPPING.active:
+            discard(runnables)
+            check_outside()
+
+    def __enter__(self) -> None:
+        return
+
+    def __exit__(self, kind: object, *rest: object) -> None:
+        if kind is not None:
+            discard(self._runnables)
 
 
 class Timer:
@@ -194,7 +201,9 @@ class Tree(Generic[T]):
 
     def next_moment(self) -> float:
         """The moment (s) at which `advance` has something to do by itself; inf when there is none."""
-        return inf if self.finished else min([self.deadline, *[timer.until for timer in self.timers]])
+        if self.finished or not self.timers:
+            return inf if self.finished else self.deadline
+        return min(self.deadline, *[timer.until for timer in self.timers])
 
     def result(self) -> T:
         """What the procedure returned; raises its error, or the cancellation."""
@@ -366,11 +375,11 @@ class Tree(Generic[T]):
         self._enqueue(attempt)
 
     def _enqueue(self, one: Attempt | Pause) -> None:
-        insort(self.sending, one, key=_priority)
+        insort(self.sending, one, key=PRIORITY)
 
     def put_back(self, attempt: Attempt) -> None:
         """The link was full: this attempt leaves before others of its priority."""
-        self.sending.insert(bisect_left(self.sending, _priority(attempt), key=_priority), attempt)
+        self.sending.insert(bisect_left(self.sending, attempt.priority, key=PRIORITY), attempt)
 
     def _push(self, task: Task, request: Request[Any], attempt: Attempt | None) -> None:
         """Let the policy carry out the request that this task awaits."""
@@ -532,15 +541,6 @@ class Tree(Generic[T]):
 def decode(request: Request[Any], answer: Response) -> Any:
     """The value of an answered request."""
     return answer if request.decode is None else request.decode(answer)
-
-
-def _priority(one: Attempt | Pause) -> int:
-    return one.request.priority if isinstance(one, Attempt) else one.priority
-
-
-def in_order(trees: Sequence[Tree[Any]]) -> list[Attempt | Pause]:
-    """What these trees are to send, by priority."""
-    return sorted([one for tree in trees for one in tree.sending], key=_priority)
 
 
 def _add_note(error: BaseException, other: BaseException | None) -> None:
