@@ -143,7 +143,7 @@ def test_a_lost_port_is_noted_where_its_error_is_tolerated(monkeypatch: pytest.M
         monkeypatch.setattr(bus.link, "read", lose)
         _, error = bus.exchange(batch, (MotorbusError,))
         assert isinstance(error, LinkLost)
-        assert bus.loss_count == 1
+        assert bus.engine.losses == 1
 
 
 def test_a_kept_request_waits_for_a_full_link_each_time(monkeypatch: pytest.MonkeyPatch) -> None:

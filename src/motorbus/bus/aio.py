@@ -14,7 +14,7 @@ from collections.abc import Callable, Coroutine, Iterable, Mapping
 from functools import partial
 from queue import SimpleQueue
 from threading import Thread
-from typing import Any, Final, Self, TypeAlias, TypeVar
+from typing import Any, Final, Self, TypeVar
 from weakref import WeakKeyDictionary
 
 from motorbus.bus.base import BaseBus, check_clocks
@@ -24,15 +24,13 @@ from motorbus.bus.tasks import Notify, Starting, Tree
 from motorbus.core.steps import Runnable, discard
 
 T = TypeVar("T")
-Ended: TypeAlias = tuple[asyncio.AbstractEventLoop, "asyncio.Future[None]"]
-"""The future of a call that has ended, and its loop."""
 
 
 class AsyncBus(BaseBus):
     """An open bus on the running event loop. Any number of its tasks may call `run`."""
 
     is_async = True
-    _worker: _Thread | None = None
+    _worker: _Worker | None = None
 
     def run(self, procedure: Runnable[T], report: Notify | None = None) -> Coroutine[Any, Any, T]:
         """Run a procedure as `Bus.run` does. A cancelled task cleans up, then raises CancelledError.
@@ -50,12 +48,14 @@ class AsyncBus(BaseBus):
 
     def submit(self, procedure: Runnable[Any], report: Notify | None = None) -> Call:
         """Let the worker of this bus run the procedure; in virtual time that of the loop."""
-        worker: _Thread | _LoopTask
         if self.link.virtual:
             self.check_thread()
-            worker = _LOOP_TASKS.setdefault(asyncio.get_running_loop(), _LoopTask())
+            worker = _loop_worker(asyncio.get_running_loop())
+        elif self._worker is None:
+            worker = self._worker = _Worker()
+            Thread(target=worker.work, name="motorbus asyncio", daemon=True).start()
         else:
-            worker = self._worker = self._worker or _Thread()
+            worker = self._worker
         call = Call(self, procedure, report, worker.wake)
         worker.add(call)
         return call
@@ -153,22 +153,59 @@ async def run_on(procedures: Mapping[AsyncBus, Runnable[Any]]) -> dict[AsyncBus,
     return {bus: call.tree.outcome() for bus, call in calls.items()}
 
 
-class _Runner:
-    """Steps the procedures of calls in one thread, on one bus or several."""
+class _Worker:
+    """Steps the procedures of calls: in a thread those of one bus, in a task of the loop those of all virtual buses.
 
-    def __init__(self, inbox: deque[Call], wakes: SimpleQueue[None]) -> None:
-        self._inbox = inbox
-        self._wakes = wakes
+    It keeps a bus alive only while it has a call of it.
+    """
+
+    def __init__(self) -> None:
+        self._inbox: deque[Call] = deque()
+        self._wakes: SimpleQueue[None] = SimpleQueue()
         self._calls: list[Call] = []
         self._parts: dict[BaseBus, Part] = {}
+        self._ended = False
+        self.task: asyncio.Task[None] | None = None  # of the loop
 
-    @property
-    def has_work(self) -> bool:
-        """A call waits or runs."""
-        return bool(self._inbox or self._calls)
+    def add(self, call: Call) -> None:
+        """Run this procedure, beside those that run."""
+        self._inbox.append(call)
+        self.wake()
 
-    def step(self) -> list[Ended]:
-        """Wait, then step all procedures; the futures of those that have ended."""
+    def wake(self) -> None:
+        """Let the thread look at its procedures; from any thread."""
+        if self._wakes.empty():
+            self._wakes.put(None)
+
+    def end(self) -> None:
+        """Let the thread end when its procedures have."""
+        self._ended = True
+        self.wake()
+
+    def work(self) -> None:
+        """Run what is added until `end`; for a thread."""
+        while True:
+            while not (self._inbox or self._ended):
+                self._wakes.get()
+            if not self._inbox:
+                return
+            while self._inbox or self._calls:
+                for loop, future in self._step():
+                    _call_in(loop, _set_result, future)
+
+    async def work_in_loop(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Run what has been added."""
+        try:
+            while self._inbox or self._calls:
+                for _, future in self._step():
+                    _set_result(future)
+                with contextlib.suppress(asyncio.CancelledError):  # the loop ends: what runs cleans up first
+                    await asyncio.sleep(0)
+        finally:
+            del _LOOP_WORKERS[loop]
+
+    def _step(self) -> list[tuple[asyncio.AbstractEventLoop, asyncio.Future[None]]]:
+        """Wait, then step all procedures; the loops and futures of calls that have ended."""
         try:
             if going := [part for part in self._parts.values() if not part.finished]:
                 wait_for(going)
@@ -186,6 +223,8 @@ class _Runner:
             part.finished = not part.trees
             if part.finished or not part.bus.link.virtual:
                 part.release_turn()
+        if not self._calls:
+            self._parts.clear()
         return [(call.loop, call.ended) for call in ended]
 
     def _take_calls(self) -> None:
@@ -202,72 +241,17 @@ class _Runner:
                 self._parts[call.bus].orders.append(call.orders.popleft())
 
 
-class _Thread:
-    """A thread that runs the procedures of one bus, which it keeps alive only while it has some."""
-
-    def __init__(self) -> None:
-        self._wakes: SimpleQueue[None] = SimpleQueue()
-        self._inbox: deque[Call] = deque()
-        self._ended = False
-        Thread(target=self._work, name="motorbus asyncio", daemon=True).start()
-
-    def add(self, call: Call) -> None:
-        """Run this procedure, beside those that run."""
-        self._inbox.append(call)
-        self.wake()
-
-    def wake(self) -> None:
-        """Let the thread look at its procedures; from any thread."""
-        if self._wakes.empty():
-            self._wakes.put(None)
-
-    def end(self) -> None:
-        """Let the thread end when its procedures have."""
-        self._ended = True
-        self.wake()
-
-    def _work(self) -> None:
-        while True:
-            while not (self._inbox or self._ended):
-                self._wakes.get()
-            if not self._inbox:
-                return
-            runner: _Runner | None = _Runner(self._inbox, self._wakes)
-            while runner is not None:
-                ended = runner.step()
-                if not runner.has_work:
-                    runner = None  # nothing here holds the bus when its last call is reported
-                for loop, future in ended:
-                    _call_in(loop, _set_result, future)
+_LOOP_WORKERS: Final[WeakKeyDictionary[asyncio.AbstractEventLoop, _Worker]] = WeakKeyDictionary()
+"""By loop, what runs its calls in virtual time."""
 
 
-class _LoopTask:
-    """A task of the loop that runs the procedures of all its buses in virtual time."""
-
-    def __init__(self) -> None:
-        self._inbox: deque[Call] = deque()
-        self._task: asyncio.Task[None] | None = None
-
-    def add(self, call: Call) -> None:
-        """Run this procedure, beside those that run."""
-        self._inbox.append(call)
-        if self._task is None:
-            self._task = call.loop.create_task(self._work())
-
-    def wake(self) -> None:
-        """It looks at its procedures in every turn of the loop."""
-
-    async def _work(self) -> None:
-        runner = _Runner(self._inbox, SimpleQueue())
-        while runner.has_work:
-            for _, future in runner.step():
-                _set_result(future)
-            with contextlib.suppress(asyncio.CancelledError):  # the loop ends: what runs cleans up first
-                await asyncio.sleep(0)
-        self._task = None
-
-
-_LOOP_TASKS: Final[WeakKeyDictionary[asyncio.AbstractEventLoop, _LoopTask]] = WeakKeyDictionary()
+def _loop_worker(loop: asyncio.AbstractEventLoop) -> _Worker:
+    """What runs the calls of this loop in virtual time."""
+    worker = _LOOP_WORKERS.get(loop)
+    if worker is None:
+        worker = _LOOP_WORKERS[loop] = _Worker()
+        worker.task = loop.create_task(worker.work_in_loop(loop))
+    return worker
 
 
 def _set_result(future: asyncio.Future[None]) -> None:

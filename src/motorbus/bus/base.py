@@ -36,7 +36,8 @@ class BaseBus:
 
     `interlock` judges requests that move a motor or switch torque; without it they are refused. `report` gets the
     events of procedures. `journal` gets the journal entries first. `stop_socket` is where another process can request
-    an emergency stop. `warnings` are for the user. `on_id_change` is called before a device gets another id.
+    an emergency stop. `warnings` are for the user. `on_id_change` is called before a device gets another id,
+    `on_reconnect` when the lost port was opened again, before anything is sent.
     """
 
     _open = False
@@ -80,7 +81,7 @@ class BaseBus:
         self.engine.before_motion = self._start_stopper
         self.reconnects = isinstance(link, Renewable)
         """A lost port is opened again by the next request. May be set to False only."""
-        self._on_reconnect: list[Callable[[], None]] = []
+        self.on_reconnect: Callable[[], None] | None = None
         self._open = True
         if stop_socket is not None:
             self.stopper.start()
@@ -283,8 +284,8 @@ class BaseBus:
             self.lost(error)
             return False
         engine.reconnected(link.now(), link.latency)
-        for function in self._on_reconnect:
-            function()
+        if self.on_reconnect is not None:
+            self.on_reconnect()
         if link.rate != engine.rate:
             with contextlib.suppress(MotorbusError):
                 link.tune(engine.rate)
@@ -330,15 +331,6 @@ class BaseBus:
     def stop_count(self, node: int | None = None) -> int:
         """A number that a stop of this node changes; None: of any node, an emergency stop or a lost port as well."""
         return self.engine.nodes.epoch if node is None else self.engine.nodes.last_stop(node)
-
-    @property
-    def loss_count(self) -> int:
-        """Number of times the port was lost."""
-        return self.engine.losses
-
-    def on_reconnect(self, function: Callable[[], None]) -> None:
-        """Call this function each time the lost port was opened again, before anything is sent."""
-        self._on_reconnect.append(function)
 
     def expect_echo(self, test: Request[Any]) -> None:
         """Let the next reply to this request show whether the adapter echoes."""

@@ -160,7 +160,7 @@ class SafetyGate:
         self._deferred: dict[int, int] = {}  # node: number of its stops when its deferred write was sent
         bus.interlock = self
         bus.on_id_change = self.rename
-        bus.on_reconnect(self.forget)
+        bus.on_reconnect = self.forget
 
     def check(self, request: Request[Any], now: float) -> None:
         """Raise MotorbusError if this request must not leave at `now` (s)."""
