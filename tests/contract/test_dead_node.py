@@ -60,7 +60,7 @@ def test_a_group_read_in_a_loop(rounds: Rounds) -> None:
             assert sim.now - back < BACK_OFF + TIMEOUT
 
 
-@pytest.mark.parametrize("silence", [0.05, 0.1, 0.15])
+@pytest.mark.parametrize("silence", [0.05, 0.1, 0.2])
 def test_a_servo_that_was_silent_for_a_moment_is_asked_again_before_a_control_loop_gives_up(
     silence: float,
 ) -> None:
@@ -77,7 +77,7 @@ def test_a_servo_that_was_silent_for_a_moment_is_asked_again_before_a_control_lo
             assert bus.run(group.positions).missing == (DEAD,)
         sim[DEAD].plug()
         while bus.run(group.positions).missing:
-            assert sim.now < begun + LOOP_ENDS - 2 * TIMEOUT
+            assert sim.now < begun + LOOP_ENDS
 
 
 def test_a_control_loop_survives_a_gap() -> None:

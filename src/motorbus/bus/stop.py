@@ -28,7 +28,7 @@ from motorbus.bus.stop_socket import LONGEST, STOP_TIMEOUT, StopOutcome, asked_b
 from motorbus.bus.tasks import Tree
 from motorbus.core.request import ANY, Priority, Request
 from motorbus.core.steps import Sleep, catch, gather
-from motorbus.errors import LinkError, LinkFull, LinkLost
+from motorbus.errors import LinkError, LinkFull
 
 ROUNDS_TIME: Final = 3.0
 """s for all rounds of a stop, less than `STOP_TIMEOUT`."""
@@ -103,11 +103,8 @@ class EmergencyStop:
 
     @property
     def bus(self) -> Any:
-        """The bus. Raises LinkLost when it was dropped."""
-        bus = self._bus()
-        if bus is None:
-            raise LinkLost("the bus was dropped: no stop was sent", advice="open it again, or cut the power")
-        return bus
+        """The bus; None when it was dropped, which ends the thread."""
+        return self._bus()
 
     def start(self) -> None:
         """Start the thread, unless it runs or time is virtual.

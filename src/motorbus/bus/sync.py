@@ -161,7 +161,7 @@ class SyncTable:
         node = self.of(number)
         node.quiet_until = now
         node.silent_since = node.silent_since or now
-        pause = max(2 * quiet, BACK_OFF * (now - node.silent_since))
+        pause = max(quiet, BACK_OFF * (now - node.silent_since))
         node.probe_at = now + min(pause, LONGEST_BACK_OFF)
 
     def is_put_off(self, number: int, now: float) -> bool:
