@@ -8,12 +8,12 @@ PEERS := .peers/.ready
 SOURCES := src tests bench examples scripts
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check soak bench docs lint types contracts interpreters lock clean
+.PHONY: help demo test check soak bench docs lint types contracts interpreters lerobot lock clean
 
 help:
 	@echo "make demo    nine simulated axes of three families move together; picture in build/demo.png"
 	@echo "make test    every test but the long ones"
-	@echo "make check   lint, types, import contracts, strict docs, a few tests on every other Python found"
+	@echo "make check   lint, types, contracts, strict docs, a few tests on other Pythons, LeRobot with the plugin"
 	@echo "make soak    the long runs; their figures are printed"
 	@echo "make bench   side by side with other libraries"
 	@echo "make docs    the documentation, into build/site"
@@ -43,7 +43,7 @@ docs: $(READY)
 	$(BIN)/python -m scripts.machine_file
 	$(BIN)/zensical build --strict --clean
 
-check: lint types contracts docs interpreters
+check: lint types contracts docs interpreters lerobot
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -57,6 +57,9 @@ contracts: $(READY)
 
 interpreters: $(READY)
 	$(BIN)/python scripts/interpreters.py
+
+lerobot: $(READY)
+	$(BIN)/python -m scripts.lerobot
 
 $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "motorbus needs Python 3.11 or later, \
@@ -80,6 +83,10 @@ lock:
 		--no-header --no-annotate --quiet --output-file requirements.lock
 	build/lock/bin/uv pip compile peers.in --no-deps --universal --python-version 3.11 --generate-hashes --upgrade \
 		--no-header --no-annotate --quiet --output-file peers.txt
+	build/lock/bin/uv pip compile lerobot.in --universal --python-version 3.11 --generate-hashes --upgrade \
+		--no-header --no-annotate --quiet --output-file lerobot.txt
+	build/lock/bin/uv pip compile lerobot-0.6.in --no-deps --universal --python-version 3.12 --generate-hashes --upgrade \
+		--no-header --no-annotate --quiet --output-file lerobot-0.6.txt
 	@rm -rf build/lock
 
 clean:

@@ -18,17 +18,16 @@ from motorbus.errors import (
     UnexpectedReply,
 )
 
-SERIAL_WORDS: Final = {"rate": "baud rate", "flag": "--baud", "bus": ""}
+SERIAL_WORDS: Final = {"rate": "baud rate", "bus": ""}
 CAN_WORDS: Final = {
     "rate": "bit rate",
-    "flag": "--bitrate",
     "bus": ", a bus without its two terminating resistors",
 }
 FAULTS: Final[dict[str, tuple[type[MotorbusError], str, str]]] = {
     "silence": (
         NoReply,
         "no such id on this bus, another {rate}, no power, or a loose cable{bus}",
-        "`motorbus scan BUS` lists who answers; add `{flag} all` to try every rate",
+        "`motorbus scan BUS` lists who answers; add `--rates all` to try every rate",
     ),
     "checksum": (
         ChecksumError,

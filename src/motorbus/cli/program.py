@@ -43,6 +43,9 @@ COMMANDS: Final[Mapping[str, Mapping[str, tuple[str, str]]]] = {
         "info": ("discover", "Show model, firmware, limits, mode, and what blocks motion."),
         "init": ("discover", "Write a machine file from the devices that answer."),
     },
+    "Set up": {
+        "setup": ("motorbus.cli.setup:app", "Set up an arm step by step."),
+    },
     "Read and write": {
         "read": ("registers", "Read registers, or the state of a device."),
         "write": ("registers", "Write registers."),
@@ -108,7 +111,8 @@ def build() -> App:
         group = Group(title, sort_key=order)
         for name, (module, line) in commands.items():
             function = name.replace("-", "_")
-            app.command(f"motorbus.cli.{module}:{function}", name=name, help=line, group=group)
+            place = module if ":" in module else f"motorbus.cli.{module}:{function}"
+            app.command(place, name=name, help=line, group=group)
     group = Group("One family", sort_key=len(COMMANDS))
     for name, module in _families().items():
         app.command(f"{module}:app", name=name, help=f"Commands of {name} devices only.", group=group)

@@ -14,8 +14,8 @@ from motorbus.core.family import Positions, PositionStream
 from motorbus.core.request import Precondition, Request, SetpointGroup, SetpointWrite, Stops
 from motorbus.core.steps import catch, discard, gather
 from motorbus.core.stream import read_positions
-from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, NoReply, RequestError
-from motorbus.motion.axis import Axis, by_bus, on_axes
+from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, NoReply, Refused, RequestError
+from motorbus.motion.axis import Axis, by_bus, name_axis, on_axes
 from motorbus.motion.gate import check_owned
 from motorbus.motion.health import HealthMonitor
 from motorbus.motion.lease import lease_lost
@@ -496,6 +496,9 @@ class ControlLoop:
                     node=axis.config.node,
                 )
         self._check_owned()
+        for value in values.values():
+            if isinstance(value, Refused) and value.reason == "stale":
+                raise Interrupted("the program was held up while it led axes", advice="move again") from value
         raise_first(values)
         for value in values.values():
             raise_first({i: one for i, one in enumerate(value) if not isinstance(one, LOST)})
@@ -519,7 +522,20 @@ async def _open(
 
 
 async def start_axes(bus: BaseBus, axes: list[Axis], health: HealthMonitor) -> None:
-    """Procedure: torque on, without a jump, for axes of one bus that are to follow setpoints."""
+    """Procedure: torque on, without a jump, for axes of one bus that are to follow setpoints.
+
+    An error of a device names its axis.
+    """
+    try:
+        await _start_axes(bus, axes, health)
+    except MotorbusError as error:
+        for axis in axes:
+            if axis.config.node == error.node:
+                name_axis(axis, error)
+        raise
+
+
+async def _start_axes(bus: BaseBus, axes: list[Axis], health: HealthMonitor) -> None:
     led = [axis for axis in axes if not axis.config.is_wheel]
     await gather(*[health.check_kept(axis) for axis in axes])
     before = {axis.name: bus.stop_count(axis.config.node) for axis in axes}
