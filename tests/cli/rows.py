@@ -58,4 +58,11 @@ ROWS: Final = (
     Row("stepper run", "{stepper} 1", "{stepper} 9", consent=True),
     Row("stepper io", "{stepper}", "{stepper} 9=on"),
 )
+KST: Final = (
+    Row("set-id", "{kst}#0x25 0x26", "", consent=True),
+    Row("set-baud", "{kst}#0x25 1M", "", consent=True),
+    Row("command", "{kst}#0x25 set_mid_point", "", consent=True),
+    Row("command", "{kst}#0x25 move 30deg", "", consent=True),
+    Row("write", "{kst}#0x25 goal_position=30deg", "", consent=True),
+)
 NAMES: Final = tuple(row.name for row in ROWS)

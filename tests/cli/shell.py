@@ -52,7 +52,8 @@ FILES: Final = {
     "wave.csv": "time (s),shoulder (deg)\n0,0\n2,5\n",
 }
 PYTHON: Final = re.compile(r"Traceback|NoneType|object at 0x|\berrno\b|Errno|KeyError|invalid literal|__")
-WRITES: Final = {0x03, 0x04, 0x05, 0x06, 0x0A, 0x0B, 0x83}  # FEETECH instructions that change something
+FEETECH_READS: Final = {0x01, 0x02, 0x82}  # ping, read, sync read
+STEPPER_READS: Final = (b"\x3e", b"\x00\x0b")  # read project, read input
 
 
 class Ran(NamedTuple):
@@ -77,8 +78,17 @@ class Shell:
         return Ran(code, *self._capsys.readouterr())
 
     def writes(self) -> list[bytes]:
-        """The FEETECH frames sent that change something."""
-        return [frame for frame in self.frames if frame[:2] == b"\xff\xff" and frame[4] in WRITES]
+        """The frames sent that change something."""
+        return [frame for frame in self.frames if changes(frame)]
+
+
+def changes(frame: bytes) -> bool:
+    """Whether a FEETECH, stepper or CAN frame is more than a question."""
+    if frame[:2] == b"\xff\xff":
+        return frame[4] not in FEETECH_READS
+    if frame[:2] == b"\xff\xaa":
+        return not frame[2:].startswith(STEPPER_READS)
+    return frame[5] & 0xE0 != 0x40  # SDO: anything but an upload
 
 
 @pytest.fixture

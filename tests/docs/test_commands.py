@@ -14,13 +14,13 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from io import StringIO
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 
 import motorbus
 from motorbus.cli import main
 from motorbus.motion.machine import MachineConfig
+from tests.cli.shell import PROGRAM, Ran
 from tests.docs.pages import FIRST_MACHINE, PAGES, ROOT, blocks, commands
 
 BY_HAND = re.compile("motorbus setup( calibrate| replace| --)")  # tests/setup moves the arm
@@ -31,28 +31,7 @@ PORT = re.compile(r"(feetech|kst|stepper):(?!sim\b)([^\s#,]+)")
 IDS = {"feetech": "1-7", "kst": "0x25", "stepper": "1"}
 WITHOUT_MACHINE = re.compile(r"motorbus (decode|demo|recover|scan|setup|simulate|stepper check)")
 GROUPS = '\n[group.left]\naxes = ["base", "shoulder"]\n[group.right]\naxes = ["wrist", "roll"]\n'
-FEED = """format = 1
-name = "Feed"
-project = 2
-[motor]
-microsteps = 8
-step_angle = "1.8 deg"
-turn_distance = 1600
-[[step]]
-move = "1 turns"
-speed = "240 rpm"
-start = "200 Hz"
-acceleration = "20 Hz"
-"""
 WAVE = "time (s),shoulder (deg),elbow (deg)\n0,0,0\n1,10,-10\n2,0,0\n"
-
-
-class Ran(NamedTuple):
-    """Exit code and output of a command."""
-
-    code: int
-    out: str
-    err: str
 
 
 Shell = Callable[[str], Ran]
@@ -62,7 +41,7 @@ Shell = Callable[[str], Ran]
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The working folder, with the files that the pages name."""
     (tmp_path / "examples").symlink_to(ROOT / "examples")
-    (tmp_path / "feed.toml").write_text(FEED, encoding="utf-8")
+    (tmp_path / "feed.toml").write_text(PROGRAM, encoding="utf-8")
     (tmp_path / "wave.csv").write_text(WAVE, encoding="utf-8")
     monkeypatch.setattr("sys.stdin", StringIO("\n" * 20))
     monkeypatch.chdir(tmp_path)

@@ -27,7 +27,7 @@ FAULTS: Final[dict[str, tuple[type[MotorbusError], str, str]]] = {
     "silence": (
         NoReply,
         "no such id on this bus, another {rate}, no power, or a loose cable{bus}",
-        "`motorbus scan BUS` lists who answers; add `--rates all` to try every rate",
+        "`motorbus scan BUS` lists who answers; `--rates all` tries every rate",
     ),
     "checksum": (
         ChecksumError,

@@ -6,18 +6,26 @@ import inspect
 from collections.abc import Mapping
 from dataclasses import asdict, is_dataclass
 from enum import Enum
-from functools import partial
-from typing import Any
+from typing import Any, Final
 
 from msgspec import Struct
 
 from motorbus.cli.common import Common, Target, Writing
 from motorbus.cli.dryrun import carry_out
 from motorbus.cli.output import emit
-from motorbus.cli.registers import assignments, map_of, parse_value
+from motorbus.cli.registers import assignments, parse_value
 from motorbus.cli.target import bus_address, open_devices
 from motorbus.core import units
 from motorbus.errors import RequestError
+
+QUANTITIES: Final = {  # of the arguments of driver functions; any unit of it is taken
+    "to": "position",
+    "tolerance": "position",
+    "velocity": "velocity",
+    "seconds": "time",
+    "timeout": "time",
+    "deadline": "time",
+}
 
 
 class Command(Struct, frozen=True):
@@ -44,7 +52,7 @@ def command(
     writing: Writing = Writing(),
     common: Common = Common(),
 ) -> None:
-    """List the commands of the manual of a device, or run one.
+    """List the commands of the manual of a device with their units, or run one.
 
     Examples:
 
@@ -64,16 +72,16 @@ def command(
         for one in devices:
             function = _find(one, name)
             given, named = _parse(one, name, function, arguments)
-            run = partial(_run, function, given, named)
-            result = carry_out(writing, one, run, f"run {name} on {one.name}")
+            result = carry_out(
+                writing,
+                one,
+                lambda device: device.bus.run(function(device, *given, **named)),  # noqa: B023
+                f"run {name} on {one.name}",
+            )
             if not writing.dry_run:
                 results.append(CommandResult(one.name, name, "done" if result is None else _plain(result)))
     for result in results:
         emit(result, common)
-
-
-def _run(function: Any, given: list[Any], named: dict[str, Any], device: Any) -> Any:
-    return device.bus.run(function(device, *given, **named))
 
 
 def _find(target: Target, name: str) -> Any:
@@ -88,13 +96,14 @@ def _find(target: Target, name: str) -> Any:
 def _describe(name: str, function: Any) -> Command:
     words = []
     for one in list(inspect.signature(function).parameters.values())[1:]:
-        text = one.name.upper()
+        unit = next(iter(units.SCALES[QUANTITIES[one.name]])) if one.name in QUANTITIES else ""
+        text = one.name.upper() + (f"({unit})" if unit else "")
         if one.kind is one.VAR_POSITIONAL:
             text = f"{text}…"
         elif one.kind is one.VAR_KEYWORD:
             text = "REGISTER=VALUE…"
         elif one.kind is one.KEYWORD_ONLY:
-            text = f"{one.name}=…"
+            text = f"{one.name}={unit or '…'}"
         words.append(text if one.default is one.empty and one.kind is not one.VAR_POSITIONAL else f"[{text}]")
     return Command(name, " ".join(words), (inspect.getdoc(function) or "").partition("\n")[0])
 
@@ -116,7 +125,7 @@ def _parse(
             named[key] = _value(known[key], text)
         elif equals and takes_registers:
             [(register, text)] = assignments([word])
-            named[register] = parse_value(target, map_of(target)[register], text)
+            named[register] = parse_value(target, register, text)
         elif len(given) < len(plain) or rest is not None:
             given.append(_value(plain[len(given)] if len(given) < len(plain) else rest, word))
         else:
@@ -134,27 +143,21 @@ def _usage(name: str, function: Any, what: str) -> RequestError:
 
 
 def _value(parameter: Any, text: str) -> Any:
-    """A word as the type of this parameter; a quantity may have any unit of the API."""
+    """A word as the type of this parameter. A bare number is in the API unit."""
     text, kind = text.strip(), str(parameter.annotation)
+    if kind.startswith("float") and parameter.name in QUANTITIES:
+        return units.parse(text, QUANTITIES[parameter.name])
     try:
         if "bool" in kind:
             return {"yes": True, "no": False, "on": True, "off": False, "1": True, "0": False}[text]
         if kind.startswith("int"):
             return units.whole(text)
         if kind.startswith("float"):
-            return _quantity(text)
+            return units.real(text)
     except (ValueError, KeyError):
         form = "yes or no" if "bool" in kind else "a whole number" if kind.startswith("int") else "a number"
         raise RequestError(f"{parameter.name}: {text!r} is not possible", expected=form) from None
     return text
-
-
-def _quantity(text: str) -> float:
-    unit = text.lstrip("+-.0123456789eE").strip()
-    for quantity, scales in units.SCALES.items():
-        if unit in scales:
-            return units.parse(text, quantity)
-    return units.real(text)
 
 
 def _plain(value: Any) -> Any:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from datetime import UTC, datetime
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Parameter
 from msgspec import Struct
@@ -93,18 +92,23 @@ def decode(
     """
     if file is not None and data:
         raise RequestError("bytes and --file", expected="one of them")
-    driver = _driver(family, common)
-    source = _can_lines(data, file) if driver.family.link.kind == "frames" else _read_serial(data, file)
-    if summary:
-        return _summarize(driver.family, source, common)
-    return _explain(driver, source, common)
-
-
-def _driver(name: str, common: Common) -> BusDriver:
-    if not (name or common.bus):
+    if not (family or common.bus):
         raise RequestError("no protocol", expected="--family feetech, kst or stepper")
-    found = families.load(name or bus_address("", common).partition(":")[0])
-    return found.open(**key_values(common))
+    found = families.load(family or bus_address("", common).partition(":")[0])
+    source = _can_lines(data, file) if found.link.kind == "frames" else _read_serial(data, file)
+    if summary:
+        return _summarize(found, source, common)
+    frame = None
+    is_bad = False
+    for frame in _frames(found.open(**key_values(common)), source):
+        if common.json:
+            emit(frame, common)
+        else:
+            _print(frame)
+        is_bad = is_bad or bool(frame.fault)
+    if frame is None:
+        raise RequestError("no frames to decode", expected="ID#DATA, the text of candump, or a CAN log")
+    return Exit.FAILURE if is_bad else Exit.OK
 
 
 def _read_serial(texts: Sequence[str], file: Path | None) -> bytes:
@@ -135,47 +139,32 @@ def _can_lines(texts: Sequence[str], file: Path | None) -> Iterator[Logged]:
 # -- frames --------------------------------------------------------------------------------------------------------
 
 
-def _explain(driver: BusDriver, source: bytes | Iterator[Logged], common: Common) -> int:
-    start, bad = 0, False
-    for one, noted in _explanations(driver, source):
-        time = None if noted is None else noted.at
-        fields = [
-            Field(part.start, part.data.hex(" ").upper(), part.name, part.meaning) for part in one.parts
-        ]
-        shown = _shown(one.data, driver.family)
-        direction = "" if noted is None else noted.direction
-        channel = "" if noted is None else noted.channel
-        frame = Frame(start, shown, one.title, one.fault, fields, time, direction, channel)
-        if common.json:
-            emit(frame, common)
-        else:
-            _print(frame)
-        bad = bad or bool(one.fault)
-        start += len(one.data) if noted is None else 1
-    if not start:
-        raise RequestError("no frames to decode", expected="ID#DATA, the text of candump, or a CAN log")
-    return Exit.FAILURE if bad else Exit.OK
-
-
-def _explanations(
-    driver: BusDriver, source: bytes | Iterator[Logged]
-) -> Iterator[tuple[Explanation, Logged | None]]:
+def _frames(driver: BusDriver, source: bytes | Iterator[Logged]) -> Iterator[Frame]:
     if isinstance(source, bytes):
+        start = 0
         for one in driver.decode(source):
-            yield one, None
+            yield Frame(start, one.data.hex(" ").upper(), one.title, one.fault, _fields(one))
+            start += len(one.data)
         return
-    for noted in source:
-        if noted.frame is None:
-            what = f"line {noted.line}" if noted.line else f"CAN frame {noted.text}"
-            yield Explanation(b"", what, (), noted.fault), noted
+    for number, logged in enumerate(source):
+        if logged.frame is None:
+            title = f"line {logged.line}" if logged.line else f"CAN frame {logged.text}"
+            found = [Explanation(b"", title, (), logged.fault)]
         else:
-            for one in driver.decode(noted.frame.flat()):
-                yield one, noted
+            found = list(driver.decode(logged.frame.flat()))
+        for one in found:
+            data = _candump(one.data)
+            where = (logged.at, logged.direction, logged.channel)
+            yield Frame(number, data, one.title, one.fault, _fields(one), *where)
 
 
-def _shown(data: bytes, family: Family) -> str:
-    """Bytes, or a CAN frame as candump writes it."""
-    if family.link.kind == "bytes" or len(data) < HEAD:
+def _fields(one: Explanation) -> list[Field]:
+    return [Field(part.start, part.data.hex(" ").upper(), part.name, part.meaning) for part in one.parts]
+
+
+def _candump(data: bytes) -> str:
+    """A CAN frame as candump writes it."""
+    if len(data) < HEAD:
         return data.hex(" ").upper()
     head = int.from_bytes(data[:4], "big")
     width = 8 if head >> 31 or head & ERROR_FLAG else 3
@@ -184,18 +173,12 @@ def _shown(data: bytes, family: Family) -> str:
 
 
 def _print(frame: Frame) -> None:
-    when = _when(frame.time) if frame.time is not None else f"at {frame.start}"
-    print(" ".join(filter(None, (when, escape(frame.channel), frame.direction, escape(frame.data)))))
+    where = f"at {frame.start}" if frame.time is None else f"{frame.time:.6f} s"
+    print(" ".join(filter(None, (where, escape(frame.channel), frame.direction, escape(frame.data)))))
     print(f"{escape(frame.title)}: {f'BAD: {frame.fault}' if frame.fault else 'good'}")
     for field in frame.fields:
         print(f"  {field.start:3}  {field.data:<12} {field.name:<14} {escape(field.meaning)}")
     print(flush=True)
-
-
-def _when(time: float) -> str:
-    if time < 1e8:
-        return f"+{time:.6f} s"
-    return datetime.fromtimestamp(time, UTC).isoformat(timespec="microseconds").replace("+00:00", "Z")
 
 
 # -- summary -------------------------------------------------------------------------------------------------------
@@ -213,21 +196,19 @@ def _summarize(family: Family, source: bytes | Iterator[Logged], common: Common)
     packets = [*chain.from_iterable(map(decoder.feed, chunks)), *decoder.flush()]
     if not packets and not damaged:
         raise RequestError("no frames to count")
-    numbers: Counter[Any] = Counter()
-    sizes: Counter[Any] = Counter()
+    sizes: defaultdict[tuple[str, str, int, int], list[int]] = defaultdict(list)
     for one in packets:
-        key = (bool(one.fault), one.kind + (f": {one.fault}" if one.fault else ""), one.node, one.code)
-        numbers[key] += 1
-        sizes[key] += len(one.data)
+        sizes[one.fault, one.kind, one.node, one.code].append(len(one.data))
     groups = [
-        Group(kind, _known(node), "" if code == ABSENT else f"0x{code:02X}", numbers[key], sizes[key])
-        for key in sorted(numbers)
-        for _, kind, node, code in [key]
+        Group(
+            kind + (f": {fault}" if fault else ""),
+            None if node == ABSENT else node,
+            "" if code == ABSENT else f"0x{code:02X}",
+            len(found),
+            sum(found),
+        )
+        for (fault, kind, node, code), found in sorted(sizes.items())
     ]
-    noise = sum(size for key, size in sizes.items() if key[0])
+    noise = sum(sum(found) for (fault, *_), found in sizes.items() if fault)
     emit(Summary(groups, len(packets), noise, damaged), common)
     return Exit.FAILURE if noise or damaged else Exit.OK
-
-
-def _known(node: int) -> int | None:
-    return None if node == ABSENT else node

@@ -12,7 +12,7 @@ from msgspec import Struct
 
 from motorbus import Robot, plot
 from motorbus.cli.common import Common
-from motorbus.cli.output import emit, note_once
+from motorbus.cli.output import emit, note
 from motorbus.core import units
 from motorbus.errors import RequestError
 from motorbus.motion.commands import AxisResult
@@ -59,7 +59,7 @@ def demo(
             f"{output}: not a picture", expected=f"a name that ends in {', '.join(plot.KINDS)}"
         )
     if not common.json:
-        note_once("simulated")
+        note("simulated", once=True)
     states: list[RobotState] = []
     with as_file(files("motorbus.cli") / "demo.toml") as file, Robot.load(file) as robot:
         robot.set_position("slide", 0.0)

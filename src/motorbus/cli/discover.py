@@ -2,26 +2,39 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from math import ceil, floor
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import Parameter
 from msgspec import Meta, Struct
 
-from motorbus.cli.common import Common, Partial, Target
+from motorbus.cli.common import Common, Target
 from motorbus.cli.output import emit, note, progress
-from motorbus.cli.registers import Value, read_values
-from motorbus.cli.target import load_machine, open_bus, open_devices
+from motorbus.cli.registers import Value, raise_errors, read_values
+from motorbus.cli.target import address_of, load_machine, open_bus, open_devices
 from motorbus.core import units
 from motorbus.core.family import AxisDriver, Found
 from motorbus.core.steps import Progress
 from motorbus.errors import DeviceError, LinkError, MotorbusError, NoReply, RequestError
 
+if TYPE_CHECKING:
+    from motorbus.motion.machine import AxisConfig
+
 VELOCITY: Final = "90 deg/s"  # of an axis in a new machine file
 ACCELERATION: Final = "180 deg/s2"
+FIXES: Final = {  # commands that do what a device method does
+    "enable_torque()": "torque on {}",
+    "set_mode('position')": "feetech mode {} position",
+    "recover_overload()": "feetech recover-overload {}",
+    "set_velocity()": "write {} goal_velocity=1rad/s",
+    "set_duty()": "write {} goal_time=10%",
+    "set_current()": "write {} goal_torque=0.1A",
+    "write(protection_current=…)": "write {} protection_current=0.5A",
+    "cap_torque(1.0)": "write {} torque_limit=100%",
+    "write(max_torque=1.0)": "write {} max_torque=100%",
+}
 
 
 class Port(Struct, frozen=True):
@@ -79,7 +92,8 @@ def scan(
         return
     results = []
     for port in found:
-        for family in ("feetech", "stepper") if port.family not in ("feetech", "stepper") else (port.family,):
+        known = port.family in ("feetech", "stepper")
+        for family in (port.family,) if known else ("feetech", "stepper"):
             try:
                 results.append(_scan(f"{family}:{port.port}", ids, rates, common))
             except (LinkError, NoReply) as error:
@@ -94,10 +108,9 @@ def _scan(bus: str, ids: str, rates: str, common: Common) -> ScanResult:
 
     nodes = parse_ids(ids) if ids else ()
     with open_bus(common, bus) as opened, progress("scan") as advance:
+        asked = tuple(units.rate(rate) for rate in rates.split("+") if rate not in ("", "all"))
         if rates == "all":
             asked = opened.family.link.rates
-        else:
-            asked = tuple(units.rate(rate) for rate in rates.split("+") if rate)
 
         def report(event: object) -> None:
             if isinstance(event, Progress):
@@ -108,12 +121,11 @@ def _scan(bus: str, ids: str, rates: str, common: Common) -> ScanResult:
         found: list[Found] = opened.run(opened.driver.scan(nodes, asked), report)
         rate = opened.rate
     if not found:
+        tried = ", ".join(map(str, asked)) or rate
         raise NoReply(
-            f"{bus}: no device answers at {'any rate' if rates == 'all' else f'{rate} bit/s'}",
+            f"{bus}: no device answers at {'any rate' if rates == 'all' else f'{tried} bit/s'}",
             cause="no power, a loose cable, or devices at another rate",
-            advice="check the supply"
-            if rates == "all"
-            else f"`motorbus scan {bus} --rates all` tries every rate",
+            advice="check the supply" if rates == "all" else f"`motorbus scan {bus} --rates all` tries all",
         )
     return ScanResult(bus, [_device(one) for one in found])
 
@@ -165,10 +177,12 @@ def info(
     """
     failures: dict[str, MotorbusError] = {}
     shown: list[Info] = []
+    machine = load_machine(common)
     with open_devices(common, (target,)) as devices:
         for one in devices:
             try:
-                shown.append(_info(one, common, registers=registers))
+                config = machine.axes.get(one.name) if machine is not None else None
+                shown.append(_info(one, config, registers=registers))
             except (NoReply, DeviceError) as error:
                 failures[one.name] = error
     if common.json:
@@ -177,19 +191,16 @@ def info(
         for number, result in enumerate(shown):
             print("\n" * (number > 0), end="")
             emit(result, common)
-    if failures and shown:
-        raise Partial("; ".join(f"{name}: {error.summary}" for name, error in failures.items()))
-    if failures:
-        raise next(iter(failures.values()))
+    raise_errors(failures, is_partial=bool(shown))
 
 
-def _info(target: Target, common: Common, *, registers: bool) -> Info:
+def _info(target: Target, config: AxisConfig | None, *, registers: bool) -> Info:
     device, bus = target.device, target.bus
     identity = device.identify()
-    driver = bus.driver.axis(identity)
-    low, high = _limits(target, driver) or (None, None)
-    config = (machine.axes if (machine := load_machine(common)) else {}).get(target.name)
-    stops = target.family.link.stops
+    low, high = _limits(target, bus.driver.axis(identity)) or (None, None)
+    has_mode = identity.table and hasattr(device, "mode")
+    mode = device.mode() if has_mode else ""
+    blocked = device.why_not_moving() if has_mode and hasattr(device, "why_not_moving") else ()
     return Info(
         target.name,
         target.node,
@@ -197,20 +208,23 @@ def _info(target: Target, common: Common, *, registers: bool) -> Info:
         identity.firmware,
         identity.table or "unknown: the device is never written",
         bus.rate,
-        _word(device.mode()) if identity.table and hasattr(device, "mode") else "",
+        str(getattr(mode, "value", mode)),
         low,
         high,
-        tuple(device.why_not_moving()) if identity.table and hasattr(device, "why_not_moving") else (),
+        tuple(in_shell(text, target) for text in blocked),
         _axis_limits(config),
         "" if config is None else config.exit_action,
-        (config.estop if config is not None and config.estop else "") or (stops[0] if stops else "stop"),
+        (config.estop if config is not None else "") or next(iter(target.family.link.stops), "stop"),
         {name: str(value) for name, value in identity.details.items() if name not in Info.__struct_fields__},
         read_values(target, (), all=True) if registers else [],
     )
 
 
-def _word(value: Any) -> str:
-    return str(getattr(value, "value", value))
+def in_shell(text: str, target: Target) -> str:
+    """A fix that names a device method, with the command in its place."""
+    for method, command in FIXES.items():
+        text = text.replace(method, f"`motorbus {command.format(address_of(target))}`")
+    return text
 
 
 def _limits(target: Target, driver: AxisDriver) -> tuple[float, float] | None:
@@ -222,8 +236,8 @@ def _limits(target: Target, driver: AxisDriver) -> tuple[float, float] | None:
         return None
 
 
-def _axis_limits(config: Any) -> str:
-    if config is None or config.low is None:
+def _axis_limits(config: AxisConfig | None) -> str:
+    if config is None or config.low is None or config.high is None:
         return ""
     return f"{config.show(config.low)} to {config.show(config.high)}"
 
@@ -285,20 +299,13 @@ def init(
     if wanted:
         raise RequestError(f"--names: no device for {', '.join(wanted)}", expected=f"{len(models)} names")
     machine = MachineConfig.of(tables)
-    _write_text(path, machine_edit.write(machine), force=force)
+    with path.open("w" if force else "x", encoding="utf-8") as file:
+        file.write(machine_edit.write(machine))
     axes = {
         name: InitAxis(axis.device, models[name], _axis_limits(axis)) for name, axis in machine.axes.items()
     }
     emit(InitResult(str(path), axes), common)
     note(f"check low and high in {path}; then `motorbus info {next(iter(axes))}`")
-
-
-def _write_text(path: Path, text: str, *, force: bool) -> None:
-    try:
-        with path.open("w" if force else "x", encoding="utf-8") as file:
-            file.write(text)
-    except OSError as error:
-        raise RequestError(f"{path} cannot be written: {os.strerror(error.errno or 0)}") from None
 
 
 def _split(text: str) -> tuple[str, str]:

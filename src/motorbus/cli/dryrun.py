@@ -1,14 +1,14 @@
-"""--dry-run: the same action with each write withheld and shown; the plan of a command of a robot."""
+"""--dry-run: the frames that an action would send, up to the first reply that only a real run gets."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
-from math import pi
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from msgspec import Meta, Struct
+from msgspec import Struct
 
+from motorbus.cli import output
 from motorbus.cli.output import confirm, note
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import ANY, Effect, Priority, Request, Step, TimeoutClass
@@ -19,10 +19,7 @@ if TYPE_CHECKING:
     from motorbus.bus.blocking import Bus
     from motorbus.cli.common import Target, Writing
     from motorbus.core.family import Explanation
-    from motorbus.motion.profile import Kind
-    from motorbus.motion.robot import Robot
 
-FAR: Final = pi  # rad; a longer move needs consent
 FRAMING: Final = ("header", "length", "checksum", "identifier", "reserved")
 
 
@@ -30,29 +27,18 @@ class Unforeseeable(MotorbusError):
     """What would be sent next depends on a reply that only a real run gets."""
 
 
-class _AsWritten:
-    """The value of a read after a withheld write: equal to everything, of no other use."""
+class Withheld(Struct, frozen=True, tag="dry_run"):
+    """A frame that would be sent, and its meaning."""
 
-    def __eq__(self, other: object) -> bool:
-        return True
-
-    __hash__ = None  # type: ignore[assignment]
-
-    def _use(self, *_: object) -> Any:
-        raise Unforeseeable("what follows depends on replies that only a real run gets")
-
-    __getattr__ = __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __and__ = __rshift__ = __getitem__ = (
-        _use
-    )
-    __lt__ = __le__ = __gt__ = __ge__ = __int__ = __float__ = __index__ = __abs__ = __len__ = __iter__ = _use
-    __contains__ = __bool__ = __rmul__ = __mod__ = __truediv__ = _use
+    would_send: str
+    meaning: str
 
 
 class Overlay:
     """Stands in place of a bus: reads go through, writes are kept in `withheld`."""
 
     def __init__(self, bus: Bus) -> None:
-        self.family, self.link, self.rate, self.trace = bus.family, bus.link, bus.rate, bus.trace
+        self.family, self.rate = bus.family, bus.rate
         self.driver = copy(bus.driver)
         self.withheld: list[bytes] = []
         self._bus = bus
@@ -99,9 +85,10 @@ class Overlay:
 
     def _request(self, request: Request[Any]) -> Any:
         nodes = set() if request.expected is ANY else {one.node for one in request.expected}
-        if _only_reads(request):
-            if self._written and (nodes | {-1}) & self._written:
-                return _AsWritten()
+        is_polled = request.priority is Priority.POLL or request.reply_within is TimeoutClass.SCAN
+        if request.effect is Effect.NONE and is_polled:
+            if {-1, *nodes} & self._written:
+                raise Unforeseeable("later frames depend on replies to these: they are not shown")
             return self._bus.run(request)
         if self._bus.interlock is not None:
             self._bus.interlock.check(request, self._bus.now())
@@ -110,11 +97,6 @@ class Overlay:
             self._written.add(-1)
         self.withheld.append(request.wire.flat() if isinstance(request.wire, CanFrame) else request.wire)
         return None
-
-
-def _only_reads(request: Request[Any]) -> bool:
-    is_polled = request.priority is Priority.POLL or request.reply_within is TimeoutClass.SCAN
-    return request.effect is Effect.NONE and is_polled
 
 
 def carry_out(
@@ -141,20 +123,22 @@ def carry_out(
             if bus.rate != overlay.rate:
                 bus.run(SetBitrate(overlay.rate))
         if writing.dry_run:
-            print_frames(overlay)
+            _print_frames(overlay)
             return None
         if overlay.withheld:
             confirm(question, writing)
     return action(real)
 
 
-def print_frames(overlay: Overlay) -> None:
-    """Print each withheld frame and its meaning."""
-    if not overlay.withheld:
+def _print_frames(overlay: Overlay) -> None:
+    found = [one for frame in overlay.withheld for one in overlay.driver.decode(frame)]
+    frames = [Withheld(one.data.hex(" ").upper(), _meaning(one)) for one in found]
+    if output.as_json:
+        output.print_json(frames)
+    elif not frames:
         print("nothing would be written")
-    for frame in overlay.withheld:
-        for one in overlay.driver.decode(frame):
-            print(f"would send {one.data.hex(' ').upper()}\n    {_meaning(one)}")
+    else:
+        print("\n".join(f"would send {one.would_send}\n    {one.meaning}" for one in frames))
 
 
 def _meaning(one: Explanation) -> str:
@@ -167,71 +151,3 @@ def _meaning(one: Explanation) -> str:
         if part.name not in FRAMING and not part.name.startswith("as an")
     ]
     return "; ".join([one.title.partition(" (or ")[0], *parts])
-
-
-# -- robot ---------------------------------------------------------------------------------------------------------
-
-
-class AxisPlan(Struct, frozen=True):
-    """Start and goal of one axis."""
-
-    start: str
-    goal: str
-
-
-class Plan(Struct, frozen=True, tag="plan"):
-    """What a move would do; nothing was sent."""
-
-    axes: dict[str, AxisPlan]
-    duration: Annotated[float | None, Meta(extra={"unit": "s"})] = None
-    limited_by: str = ""
-
-
-def execute(writing: Writing, robot: Robot, command: Any) -> Any:
-    """Carry out a command of a robot, after consent to a far move; --dry-run gives the plan."""
-    goals = _goals(robot, command)
-    if not writing.dry_run and (writing.yes or not goals):
-        return robot.execute(command)
-    places = robot.positions(list(goals)) if goals else {}
-    if writing.dry_run:
-        return _plan(robot, command, goals, places)
-    far = []
-    for name, goal in goals.items():
-        config, place = robot.axes[name].config, places[name]
-        if place is not None and abs((goal - place) * config.ratio) > FAR:
-            far.append(f"{name} by {config.show(goal - place)}")
-    if far:
-        _plan(robot, command, goals, places)
-        confirm(f"move {', '.join(far)}", writing)
-    return robot.execute(command)
-
-
-def _goals(robot: Robot, command: Any) -> dict[str, float]:
-    goals = dict(getattr(command, "goals", {}))
-    if type(command).__name__ == "Pose":
-        goals = dict(robot.config.poses.get(command.name, {}))
-    return goals
-
-
-def _plan(robot: Robot, command: Any, goals: dict[str, float], places: dict[str, float | None]) -> Plan:
-    from motorbus.motion.moves import check_reach
-    from motorbus.motion.profile import Limits, Move, synchronize
-
-    moves, shown = {}, {}
-    for name, goal in goals.items():
-        axis, place = robot.axes[name], places[name]
-        if getattr(command, "relative", False):
-            goal += place or 0.0
-        check_reach(axis, goal)
-        shown[name] = AxisPlan(
-            "unknown" if place is None else axis.config.show(place), axis.config.show(goal)
-        )
-        if place is not None:
-            speed = command.speed
-            limits = Limits(axis.config.max_velocity * speed, axis.config.acceleration * speed**2)
-            moves[name] = Move(place, goal, limits)
-    if not moves:
-        return Plan(shown)
-    kind: Kind = getattr(command, "kind", "trapezoid")
-    profile = synchronize(moves, kind=kind, duration=command.duration)
-    return Plan(shown, profile.duration, profile.limited_by)

@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Any, Final
 
+import msgspec
 from cyclopts import Parameter
 from msgspec import Struct
 
-from motorbus.cli.common import Common, Partial, Target, Writing
+from motorbus.cli.common import Common, NeedsConsent, Partial, Target, Writing
 from motorbus.cli.dryrun import carry_out
 from motorbus.cli.output import confirm, emit, note
-from motorbus.cli.registers import map_of
-from motorbus.cli.target import bus_address, load_machine, open_bus, open_devices, parse_quantity
+from motorbus.cli.registers import map_of, raise_errors
+from motorbus.cli.target import (
+    bus_address,
+    bus_of,
+    edit_machine,
+    need_machine,
+    open_bus,
+    open_devices,
+    parse_quantity,
+)
 from motorbus.core import units
 from motorbus.core.register import Storage
 from motorbus.core.request import Effect
 from motorbus.errors import LinkError, MotorbusError, RequestError
-
-FORMAT: Final = 1
+from motorbus.journal import Change, everywhere
+from motorbus.session.journals import journal_of, unfinished
 
 
 class Changed(Struct, frozen=True, tag="changed"):
@@ -52,18 +60,25 @@ class Saved(Struct, frozen=True, tag="saved"):
     settings: tuple[str, ...]
 
 
+class Settings(Struct, frozen=True):
+    """A settings file: raw register values by name."""
+
+    format: int
+    family: str
+    model: str
+    firmware: str
+    map: str
+    values: dict[str, int]
+
+
 def _one(devices: list[Target], method: str, what: str) -> Target:
     """The only device, which has this method. Raises RequestError."""
     if len(devices) != 1:
         names = ", ".join(one.name for one in devices)
         raise RequestError(f"{len(devices)} devices: {names}", expected="one device, as BUS#ID")
-    _check(devices[0], method, what)
+    if not hasattr(devices[0].device, method):
+        raise RequestError(f"{devices[0].family.name} devices have no {what}")
     return devices[0]
-
-
-def _check(target: Target, method: str, what: str) -> None:
-    if not hasattr(target.device, method):
-        raise RequestError(f"{target.family.name} devices have no {what}")
 
 
 def set_id(
@@ -95,30 +110,16 @@ def set_id(
         found = carry_out(writing, target, lambda one: one.set_id(number), question)
         if found is None:
             return
-        place = _place(target)
-    _move_axis(common, target, found.node)
-    emit(Changed((found.node,), f"{place}#{found.node}"), common)
+    if not target.name.startswith("#"):
+        _move_axis(common, target.name, found.node)
+    emit(Changed((found.node,), f"{bus_of(target)}#{found.node}"), common)
 
 
-def _place(target: Target) -> str:
-    """The address of the bus of a device, without options."""
-    name, family = target.bus.link.name, target.family.name
-    return name if name.startswith(f"{family}:") else f"{family}:{name}"
-
-
-def _move_axis(common: Common, target: Target, node: int) -> None:
+def _move_axis(common: Common, axis: str, node: int) -> None:
     """Change the entry of an axis of the machine file whose device has another id now."""
-    if target.name.startswith("#"):
-        return
-    from motorbus.motion.machine_edit import edit
-
-    machine = load_machine(common)
-    if machine is None:
-        return
-    path = Path(common.machine)
-    change = {f"axis.{target.name}.device": f"{machine.axes[target.name].bus}#{node}"}
-    path.write_text(edit(path.read_text("utf-8"), change), "utf-8")
-    note(f"note: {path}: {target.name} is {change[f'axis.{target.name}.device']}")
+    device = f"{need_machine(common).axes[axis].bus}#{node}"
+    edit_machine(Path(common.machine), {f"axis.{axis}.device": device})
+    note(f"note: {common.machine}: {axis} is {device}")
 
 
 def set_baud(
@@ -141,36 +142,30 @@ def set_baud(
     """
     wanted = units.rate(rate)
     done: list[int] = []
-    errors: list[MotorbusError] = []
-    place = ""
+    errors: dict[str, MotorbusError] = {}
     with open_devices(common, (target,)) as devices:
-        names = ", ".join(one.name for one in devices)
-        question = f"write rate {wanted} bit/s to the EEPROM of {names}"
-        for number, one in enumerate(devices):
-            _check(one, "set_baud", "rate that can be changed")
-            how = writing if number == 0 else Writing(yes=True, dry_run=writing.dry_run)
-            option = "baud" if one.family.link.kind == "bytes" else "bitrate"
-            place = f"{_place(one)},{option}={wanted}"
+        first = _one(devices[:1], "set_baud", "rate that can be changed")
+        question = f"write rate {wanted} bit/s to the EEPROM of {', '.join(one.name for one in devices)}"
+        how = writing
+        for one in devices:
             try:
                 if carry_out(how, one, lambda device: device.set_baud(wanted), question) is not None:
                     done.append(one.node)
-            except LinkError as error:
-                error.add_note(f"at {wanted} bit/s already: {_ids(done)}")
+            except (LinkError, NeedsConsent) as error:
+                if done:
+                    error.add_note(f"at {wanted} bit/s already: {_ids(done)}")
                 raise
             except MotorbusError as error:
-                if not done and len(devices) == 1:
-                    raise
-                errors.append(error)
+                errors[one.name] = error
+            how = Writing(yes=True, dry_run=writing.dry_run)
     if done:
-        emit(Changed(tuple(done), f"{place}#{_ids(done)}"), common)
-    if errors:
-        if not done:
-            raise errors[0]
-        raise Partial("; ".join(error.summary for error in errors))
+        option = "baud" if first.family.link.kind == "bytes" else "bitrate"
+        emit(Changed(tuple(done), f"{bus_of(first)},{option}={wanted}#{_ids(done)}"), common)
+    raise_errors(errors, is_partial=bool(done))
 
 
 def _ids(nodes: list[int]) -> str:
-    return "+".join(map(str, nodes)) or "none"
+    return "+".join(map(str, nodes))
 
 
 def set_zero(
@@ -237,46 +232,41 @@ def recover(
     if not (bus or common.bus):
         _list_changes(common)
         return
-    from motorbus.session.journals import journal_of, unfinished
-
+    address = bus_address(bus, common)
+    ended: Recovered | None = Recovered(address, "nothing is unfinished")
     if forget:
-        address = bus_address(bus, common)
         journal = journal_of(address)
-        change = journal.unfinished() if journal is not None else None
-        if journal is None or change is None:
-            emit(Recovered(address, "nothing is unfinished"), common)
-            return
-        confirm(f"forget {change.describe().rstrip(',')}", writing)
-        journal.forget()
-        emit(Recovered(address, change.describe().rstrip(","), "forgotten"), common)
-        return
-    with open_bus(common, bus) as opened:
-        change = unfinished(opened)
-        if change is None:
-            emit(Recovered(opened.link.name, "nothing is unfinished"), common)
-            return
-        device = opened.family.devices.blocking(opened, change.node)
-        target = Target(f"#{change.node}", opened, change.node, opened.family, device)
-        _check(target, "recover", "change that can be recovered")
-        text = change.describe().rstrip(",")
-        verb, facts = change.verb, change.facts
-        outcome = carry_out(writing, target, lambda one: one.recover(verb, facts), f"end {text}")
-        if outcome is not None:
-            emit(Recovered(change.bus, text, OUTCOMES.get(outcome, outcome)), common)
+        if journal is not None and (change := journal.unfinished()):
+            confirm(f"forget {_text(change)}", writing)
+            journal.forget()
+            ended = Recovered(address, _text(change), "forgotten")
+    else:
+        with open_bus(common, address) as opened:
+            if change := unfinished(opened):
+                device = opened.family.devices.blocking(opened, change.node)
+                target = Target(f"#{change.node}", opened, change.node, opened.family, device)
+                verb, facts = change.verb, change.facts
+                question = f"end {_text(change)}"
+                outcome = carry_out(writing, target, lambda one: one.recover(verb, facts), question)
+                ended = outcome and Recovered(change.bus, _text(change), OUTCOMES.get(outcome, outcome))
+    if ended is not None:
+        emit(ended, common)
 
 
 def _list_changes(common: Common) -> None:
-    from motorbus.journal import everywhere
-
     found = everywhere()
     errors = [one for one in found if isinstance(one, MotorbusError)]
-    changes = [one for one in found if not isinstance(one, MotorbusError)]
+    changes = [Recovered(one.bus, _text(one)) for one in found if isinstance(one, Change)]
     if changes or common.json:
-        emit([Recovered(one.bus, one.describe().rstrip(",")) for one in changes], common)
+        emit(changes, common)
     elif not errors:
         print("nothing is unfinished")
-    for error in errors:
-        raise error
+    if errors:
+        raise errors[0]
+
+
+def _text(change: Change) -> str:
+    return change.describe().rstrip(",")
 
 
 # -- backup, restore -----------------------------------------------------------------------------------------------
@@ -302,14 +292,10 @@ def backup(device: str, file: Path, /, *, common: Common = Common()) -> None:
             values = _read_settings(target)
             names = tuple(values)
             identity = target.device.identify()
-            head = {
-                "format": FORMAT,
-                "family": target.family.name,
-                "model": identity.model,
-                "firmware": identity.firmware,
-                "map": map_of(target).name,
-            }
-            text = json.dumps({**head, "values": values}, indent=2) + "\n"
+            kept = Settings(
+                1, target.family.name, identity.model, identity.firmware, map_of(target).name, values
+            )
+            text = msgspec.json.format(msgspec.json.encode(kept)).decode() + "\n"
     with file.open("x", encoding="utf-8") as stream:
         stream.write(text)
     emit(Saved(target.name, str(file), names), common)
@@ -357,31 +343,29 @@ def restore(file: Path, device: str, /, *, writing: Writing = Writing(), common:
             raise RequestError(f"{file}: {unknown[0]!r} is not a setting of {target.name}")
         table = map_of(target)
         changed = {name: raw for name, raw in values.items() if now[name] != raw}
-        if not changed:
-            emit(Saved(target.name, str(file), ()), common)
-            return
         orders = {name: table[name].to_value(raw) for name, raw in changed.items()}
         question = f"write {', '.join(changed)} to the EEPROM of {target.name}"
-        if carry_out(writing, target, lambda one: one.write(**orders) or True, question):
-            after = _read_settings(target)
-            wrong = [name for name, raw in changed.items() if after[name] != raw]
-            if wrong:
-                raise Partial(f"{target.name}: {', '.join(wrong)} read back another value")
-            emit(Saved(target.name, str(file), tuple(changed)), common)
+        if changed and not carry_out(writing, target, lambda one: one.write(**orders) or True, question):
+            return
+        after = _read_settings(target) if changed else now
+        wrong = [name for name, raw in changed.items() if after[name] != raw]
+        if wrong:
+            raise Partial(f"{target.name}: {', '.join(wrong)} read back another value")
+        emit(Saved(target.name, str(file), tuple(changed)), common)
+        if not changed:
+            note(f"{target.name} has these settings already: nothing was written")
 
 
 def _parse_settings(text: str, file: Path, target: Target) -> dict[str, int]:
     """The values of a settings file for this device. Raises RequestError."""
     try:
-        data = json.loads(text)
-        values = {str(name): int(raw) for name, raw in data["values"].items()}
-        family, table = str(data["family"]), str(data["map"])
-    except (ValueError, KeyError, TypeError, AttributeError):
-        raise RequestError(f"{file} is not a file of `motorbus backup`") from None
-    known = map_of(target)
-    if (family, table) != (target.family.name, known.name):
+        saved = msgspec.json.decode(text, type=Settings)
+    except msgspec.MsgspecError as error:
+        raise RequestError(f"{file} is not a file of `motorbus backup`: {error}") from None
+    table = map_of(target).name
+    if (saved.family, saved.map) != (target.family.name, table):
         raise RequestError(
-            f"{file} is of a {family} device with map {table}",
-            expected=f"{target.family.name}, map {known.name}",
+            f"{file} is of a {saved.family} device with map {saved.map}",
+            expected=f"{target.family.name}, map {table}",
         )
-    return values
+    return saved.values

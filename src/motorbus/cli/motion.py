@@ -5,8 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from inspect import signature
-from math import inf
-from os import replace
+from math import inf, pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -14,20 +13,32 @@ from cyclopts import Parameter
 from msgspec import Struct
 
 from motorbus.cli.common import Common, Partial, Target, Writing
-from motorbus.cli.dryrun import FAR, carry_out, execute
-from motorbus.cli.output import confirm, emit, note, print_table
-from motorbus.cli.target import is_address, load_machine, open_bus, open_devices, open_robot, parse_quantity
+from motorbus.cli.dryrun import carry_out
+from motorbus.cli.output import confirm, emit, note
+from motorbus.cli.target import (
+    edit_machine,
+    is_address,
+    load_machine,
+    need_machine,
+    open_bus,
+    open_devices,
+    open_robot,
+    parse_quantity,
+    parse_time,
+)
 from motorbus.errors import LinkError, MotorbusError, RequestError, VerificationFailed
-from motorbus.motion.commands import LoopResult, Move, MoveResult, Pose, StopResult, StopState
+from motorbus.motion.commands import DeviceCommand, LoopResult, Move, MoveResult, Pose, StopResult, StopState
+from motorbus.motion.moves import check_reach
 from motorbus.session.address import parse_address
 
 if TYPE_CHECKING:
-    from motorbus.motion.machine import AxisConfig, MachineConfig
+    from motorbus.motion.machine import MachineConfig
     from motorbus.motion.robot import Robot
 
 Kind = Literal["trapezoid", "minimum_jerk"]
 For = Annotated[str, Parameter(name="--for", help="Time, as 2s; without it until Enter.")]
 Speed = Annotated[float, Parameter(help="Share of the velocity, above 0 to 1.")]
+FAR = pi  # rad; a longer move needs consent
 LEASE = 1.0  # s after which a jog without end is stopped if its loop hangs
 
 
@@ -59,35 +70,40 @@ class TorqueResult(Struct, frozen=True, tag="torque"):
     broadcast: tuple[str, ...] = ()
 
 
+class Planned(Struct, frozen=True, tag="planned"):
+    """What a dry run would have done; nothing was sent."""
+
+    would: str
+
+
 # -- words of the command line ---------------------------------------------------------------------------------
 
 
-def axes_of(robot: Robot, word: str) -> tuple[str, ...]:
-    """The axes of a name, or of an address. Raises RequestError."""
-    if not is_address(word):
-        return robot.config.axes_of(word)
-    nodes = parse_address(word).nodes
-    return tuple(f"#{node}" for node in nodes) if nodes else tuple(robot.axes)
+def axes_of(robot: Robot, *words: str) -> tuple[str, ...]:
+    """The axes of names and addresses. Raises RequestError."""
+    found: list[str] = []
+    for word in words:
+        if not is_address(word):
+            found += robot.config.axes_of(word)
+        elif nodes := parse_address(word).nodes:
+            found += [f"#{node}" for node in nodes]
+        else:
+            found += robot.axes
+    return tuple(found)
 
 
-def parse_position(config: AxisConfig, text: str, *, named: bool) -> float:
-    """A position (rad, m); a bare number of a named axis is in its display unit."""
-    unit = config.display_unit if named else ""
+def parse_position(robot: Robot, name: str, text: str) -> float:
+    """A position (rad, m); a bare number of an axis of the machine file is in its display unit."""
+    config = robot.config.axes[name]
+    unit = "" if name.startswith("#") else config.display_unit
     return parse_quantity(text, "length" if config.travel else "position", unit)
 
 
-def parse_velocity(config: AxisConfig, text: str, *, named: bool) -> float:
-    """A velocity (rad/s, m/s); a bare number of a named axis is in its display unit per s."""
-    unit = f"{config.display_unit}/s" if named else ""
+def parse_velocity(robot: Robot, name: str, text: str) -> float:
+    """A velocity (rad/s, m/s); a bare number of an axis of the machine file is in its display unit per s."""
+    config = robot.config.axes[name]
+    unit = "" if name.startswith("#") else f"{config.display_unit}/s"
     return parse_quantity(text, "linear velocity" if config.travel else "velocity", unit)
-
-
-def parse_time(text: str) -> float | None:
-    """A time (s); None for "". Raises RequestError."""
-    seconds = parse_quantity(text, "time", "s") if text else None
-    if seconds is not None and seconds <= 0:
-        raise RequestError(f"{text} is not a time", expected="a time above 0, as 2s")
-    return seconds
 
 
 def until_enter() -> Callable[[], bool]:
@@ -97,50 +113,61 @@ def until_enter() -> Callable[[], bool]:
     from select import select
 
     note("Enter ends it")
-
-    def pressed() -> bool:
-        if not select([sys.stdin], [], [], 0)[0]:
-            return False
-        sys.stdin.readline()
-        return True
-
-    return pressed
-
-
-class Planned(Struct, frozen=True, tag="planned"):
-    """What a dry run would have done; nothing was sent."""
-
-    would: str
+    return lambda: bool(select([sys.stdin], [], [], 0)[0] and sys.stdin.readline() is not None)
 
 
 def agree(action: str, writing: Writing, common: Common, *, ask: bool = True) -> bool:
     """Whether an action is carried out: --dry-run only shows it, else the user is asked."""
     if writing.dry_run:
         emit(Planned(action), common)
-        return False
-    if ask:
+    elif ask:
         confirm(action, writing)
-    return True
+    return not writing.dry_run
 
 
-def report(robot: Robot, result: Any, common: Common) -> None:
+def far_moves(robot: Robot, ways: Mapping[str, float]) -> str:
+    """The axes of these ways (rad, m) that move so far that the user is asked; "" if none does."""
+    axes = robot.config.axes
+    far = {name: way for name, way in ways.items() if abs(way * axes[name].ratio) > FAR}
+    return ", ".join(f"{name} by {axes[name].show(way)}" for name, way in far.items())
+
+
+def _agree_to_goals(robot: Robot, goals: Mapping[str, float], writing: Writing, common: Common) -> bool:
+    """Whether axes move to these positions: --dry-run shows them, far moves need consent."""
+    if writing.yes and not writing.dry_run:
+        return True
+    moves, ways = [], {}
+    for name, start in robot.positions(list(goals)).items():
+        check_reach(robot.axes[name], goals[name])
+        show = robot.config.axes[name].show
+        moves.append(f"{name} from {'unknown' if start is None else show(start)} to {show(goals[name])}")
+        if start is not None:
+            ways[name] = goals[name] - start
+    return agree(f"move {', '.join(moves)}", writing, common, ask=bool(far_moves(robot, ways)))
+
+
+def report(robot: Robot, result: MoveResult | LoopResult, common: Common) -> None:
     """Print the result of a motion: positions in the display units, in JSON in rad (m)."""
-    if common.json or not isinstance(result, MoveResult | LoopResult):
+    if common.json:
         emit(result, common)
         return
     if isinstance(result, MoveResult):
         places = {name: one.position for name, one in result.axes.items()}
-        text = f"{result.duration:.2f} s, limited by {result.limited_by or 'nothing'}"
+        how = f"limited by {result.limited_by or 'nothing'}"
     else:
         places = dict(result.positions)
-        text = f"{result.duration:.2f} s, {result.cycles} cycles"
+        how = f"{result.cycles} cycles"
+    _print_positions(robot, places)
+    print(f"{result.duration:.2f} s, {how}", flush=True)
+    for text in getattr(result, "notes", ()):
+        note(f"note: {text}")
+
+
+def _print_positions(robot: Robot, places: Mapping[str, float | None]) -> None:
     for name, place in places.items():
         shown = "position not known" if place is None else robot.config.axes[name].show(place)
         is_estimated = robot.axes[name].status.position is None and place is not None
-        print(f"{name}: {shown}{' (estimated)' if is_estimated else ''}")
-    print(text, flush=True)
-    for text in getattr(result, "notes", ()):
-        note(f"note: {text}")
+        print(f"{name}: {shown}{' (estimated)' if is_estimated else ''}", flush=True)
 
 
 # -- move, jog, home -------------------------------------------------------------------------------------------
@@ -168,52 +195,48 @@ def move(
     """
     if not goals:
         raise RequestError("no goal", expected="AXIS=POSITION, as shoulder=30deg")
-    words, relative = [], set()
+    pairs = []
     for goal in goals:
-        word, equals, text = goal.rpartition("=")
-        if not (equals and word and text):
+        word, _, text = goal.rpartition("=")
+        if not (word and text):
             raise RequestError(f"{goal!r} is not a goal", expected="AXIS=POSITION, as shoulder=30deg")
-        relative.add(word.endswith("+"))
-        words.append((word.removesuffix("+"), text))
-    if len(relative) > 1:
-        raise RequestError("positions and distances in one command", advice="use two commands")
+        if word.endswith("+") is not goals[0].rpartition("=")[0].endswith("+"):
+            raise RequestError("positions and distances in one command", advice="use two commands")
+        pairs.append((word.removesuffix("+"), text))
+    relative = "+=" in goals[0]
+    if no_wait and (duration or relative):
+        raise RequestError("--no-wait goes without --duration and +=")
     seconds = parse_time(duration)
-    with open_robot(common, join_addresses([word for word, _ in words]), velocity) as robot:
+    with open_robot(common, join_addresses([word for word, _ in pairs]), velocity) as robot:
         found: dict[str, float] = {}
-        fastest = None
-        for word, text in words:
+        for word, text in pairs:
             for name in axes_of(robot, word):
                 if name in found:
                     raise RequestError(f"{name} has two goals")
-                config, named = robot.config.axes[name], not is_address(word)
-                found[name] = parse_position(config, text, named=named)
-                if velocity:
-                    fastest = parse_velocity(config, velocity, named=named)
-        if no_wait:
-            if seconds is not None or relative == {True}:
-                raise RequestError("--no-wait goes without --duration and +=")
-            _send_goals(robot, found, speed, fastest, writing)
+                found[name] = parse_position(robot, name, text)
+        fastest = parse_velocity(robot, next(iter(found)), velocity) if velocity else None
+        starts = robot.positions(list(found)) if relative else {}
+        places = {name: goal + (starts.get(name) or 0.0) for name, goal in found.items()}
+        if not _agree_to_goals(robot, places, writing, common):
             return
-        command = Move(found, seconds, speed, kind, relative == {True}, fastest)
-        report(robot, execute(writing, robot, command), common)
+        if no_wait:
+            _send_goals(robot, found, speed, fastest)
+            return
+        command = Move(found, seconds, speed, kind, relative, fastest)
+        report(robot, robot.execute(command), common)
 
 
 def join_addresses(words: Sequence[str]) -> list[str]:
     """The words; addresses of one bus as one address."""
-    addresses = [word for word in dict.fromkeys(words) if is_address(word)]
-    buses = {word.partition("#")[0] for word in addresses}
-    if len(buses) != 1 or len(addresses) < 2:
-        return list(dict.fromkeys(words))
-    ids = "+".join(word.partition("#")[2] for word in addresses)
-    return [f"{buses.pop()}#{ids}", *(word for word in words if not is_address(word))]
+    words = list(dict.fromkeys(words))
+    buses = {word.partition("#")[0] for word in words}
+    if len(words) < 2 or len(buses) != 1 or not all(map(is_address, words)):
+        return words
+    return [f"{buses.pop()}#{'+'.join(word.partition('#')[2] for word in words)}"]
 
 
-def _send_goals(
-    robot: Robot, goals: Mapping[str, float], speed: float, fastest: float | None, writing: Writing
-) -> None:
+def _send_goals(robot: Robot, goals: Mapping[str, float], speed: float, fastest: float | None) -> None:
     """Let each device move by itself."""
-    from motorbus.motion.commands import DeviceCommand
-
     for name, goal in goals.items():
         axis = robot.axis(name)
         function = getattr(type(axis.device), "move", None)
@@ -223,7 +246,7 @@ def _send_goals(
         if "velocity" in signature(function.function).parameters:
             highest = min(axis.config.max_velocity * speed, fastest or axis.config.max_velocity)
             arguments["velocity"] = highest * abs(axis.config.ratio)
-        execute(writing, robot, DeviceCommand(name, "move", arguments))
+        robot.execute(DeviceCommand(name, "move", arguments))
 
 
 def jog(
@@ -248,14 +271,13 @@ def jog(
     seconds = parse_time(for_)
     pressed = None if seconds is not None or writing.dry_run else until_enter()
     with open_robot(common, [axis], velocity) as robot:
-        names = axes_of(robot, axis)
-        if len(names) != 1:
-            raise RequestError(f"{axis} is {len(names)} axes", expected="one axis")
-        config = robot.config.axes[names[0]]
-        speed = parse_velocity(config, velocity, named=not is_address(axis))
-        is_far = abs(speed * (seconds or 0.0) * config.ratio) > FAR
-        action = f"jog {names[0]} at {config.show(speed)}/s for {for_ or 'the time until Enter'}"
-        if not agree(action, writing, common, ask=is_far):
+        name, *others = axes_of(robot, axis)
+        if others:
+            raise RequestError(f"{axis} is {len(others) + 1} axes", expected="one axis")
+        speed = parse_velocity(robot, name, velocity)
+        shown = robot.config.axes[name].show(speed)
+        action = f"jog {name} at {shown}/s for {for_ or 'the time until Enter'}"
+        if not agree(action, writing, common, ask=bool(far_moves(robot, {name: speed * (seconds or 0.0)}))):
             return
         with robot.attended(inf if pressed is None else LEASE) as lease:
 
@@ -263,7 +285,7 @@ def jog(
                 lease.beat()
                 return pressed is not None and pressed()
 
-            report(robot, robot.jog(names[0], speed, seconds, ended), common)
+            report(robot, robot.jog(name, speed, seconds, ended), common)
 
 
 def home(
@@ -285,19 +307,20 @@ def home(
     """
     limit = parse_time(timeout) or 30.0
     with open_robot(common, axes, velocity) as robot:
-        names = tuple(name for word in axes for name in axes_of(robot, word)) or None
-        limits: list[float] = [
-            one.config.max_velocity for name, one in robot.axes.items() if name.startswith("#")
-        ]
-        speed = min(limits) if limits else None
+        names = axes_of(robot, *axes) or None
+        limits = [one.config.max_velocity for name, one in robot.axes.items() if name.startswith("#")]
+        speed: float | None = min(limits, default=None)
         if velocity:
-            for name in names or robot.axes:
-                speed = parse_velocity(robot.config.axes[name], velocity, named=name[0] != "#")
+            speed = parse_velocity(robot, next(iter(names or robot.axes)), velocity)
         moved = names or [name for name, one in robot.axes.items() if "home" in one.driver]
         action = f"move {', '.join(moved) or 'no axis'} until the reference switch is active"
         if agree(action, writing, common, ask=bool(moved)):
             with robot.attended():
-                emit(HomeResult(robot.home(names, timeout=limit, velocity=speed)), common)
+                positions = robot.home(names, timeout=limit, velocity=speed)
+            if common.json:
+                emit(HomeResult(positions), common)
+            else:
+                _print_positions(robot, positions)
 
 
 # -- pose ------------------------------------------------------------------------------------------------------
@@ -322,9 +345,7 @@ def pose(
       motorbus pose ready --speed 0.5
       motorbus pose --save ready
     """
-    machine = load_machine(common)
-    if machine is None:
-        raise RequestError(f"no machine file {common.machine}", advice="`motorbus init NAME=BUS` writes one")
+    machine = need_machine(common)
     if name and save:
         raise RequestError("NAME and --save NAME in one command", expected="one of them")
     if save:
@@ -334,24 +355,21 @@ def pose(
             known = ", ".join(machine.poses) or "none; `motorbus pose --save NAME` adds one"
             raise RequestError(f"no pose {name!r}", expected=f"one of {known}")
         with open_robot(common, tuple(machine.poses[name])) as robot:
-            report(robot, execute(writing, robot, Pose(name, speed=speed)), common)
-    else:
-        _list_poses(machine, common)
-
-
-def _list_poses(machine: MachineConfig, common: Common) -> None:
-    if common.json:
+            if _agree_to_goals(robot, machine.poses[name], writing, common):
+                report(robot, robot.execute(Pose(name, speed=speed)), common)
+    elif common.json:
         poses = {name: {axis: float(at) for axis, at in pose.items()} for name, pose in machine.poses.items()}
         emit(PoseList(poses), common)
-        return
-    for name, places in machine.poses.items():
-        print(f"{name}: {', '.join(f'{axis} {machine.axes[axis].show(at)}' for axis, at in places.items())}")
-    if not machine.poses:
+    elif not machine.poses:
         note("the machine file has no pose; `motorbus pose --save NAME` adds one")
+    else:
+        for name, places in machine.poses.items():
+            shown = ", ".join(f"{axis} {machine.axes[axis].show(at)}" for axis, at in places.items())
+            print(f"{name}: {shown}")
 
 
 def _save_pose(machine: MachineConfig, name: str, writing: Writing, common: Common) -> None:
-    from motorbus.motion.machine_edit import edit, pose_change
+    from motorbus.motion.machine_edit import pose_change
 
     file = Path(machine.path)
     if name in machine.poses and not writing.dry_run:
@@ -362,14 +380,14 @@ def _save_pose(machine: MachineConfig, name: str, writing: Writing, common: Comm
         change = pose_change(robot.config, name, places)
     if unknown:
         note(f"note: the position of {', '.join(unknown)} is not known: left out")
-    text = edit(file.read_text("utf-8"), change)
     if writing.dry_run:
         note(f"note: {file} stays as it is")
     else:
-        new = file.with_name(f".{file.name}.new")
-        new.write_text(text, "utf-8", newline="")
-        replace(new, file)
-    emit(SavedPose(name, str(file), places), common)
+        edit_machine(file, change)
+    if common.json:
+        emit(SavedPose(name, str(file), places), common)
+    else:
+        _print_positions(robot, places)
 
 
 # -- torque, stop ----------------------------------------------------------------------------------------------
@@ -396,7 +414,7 @@ def torque(
     writing = Writing(yes=True, dry_run=dry_run)
     if switch == "on":
         with open_robot(common, targets) as robot:
-            names = tuple(name for word in targets for name in axes_of(robot, word)) or None
+            names = axes_of(robot, *targets) or None
             action = f"switch torque on of {', '.join(names or robot.axes)}, which hold where they are"
             if agree(action, writing, common):
                 emit(TorqueResult(True, robot.enable_torque(names)), common)
@@ -444,29 +462,20 @@ def stop(
     """
     done, errors = _visit(common, targets, "stop", lambda target: target.device.stop())
     states = {name: StopState(getattr(promise, "value", str(promise))) for name, promise in done.items()}
-    moving = []
-    if verify:
-        for words in _by_bus(common, targets):
-            try:
-                with open_robot(common, words) as robot:
-                    seen = robot.stop(verify=True).axes
-            except MotorbusError as error:
-                errors.append(error)
-            else:
-                states |= seen
-                moving += [name for name, state in seen.items() if state.at_rest is False]
+    for words in _by_bus(common, targets) if verify else ():
+        try:
+            with open_robot(common, words) as robot:
+                states |= robot.stop(verify=True).axes
+        except MotorbusError as error:
+            errors.append(error)
     if states and common.json:
         emit(StopResult(states), common)
-    elif states:
-        print_table(
-            [
-                [name, one.promise if one.at_rest is None else "at rest" if one.at_rest else "not at rest"]
-                for name, one in states.items()
-            ]
-        )
+    for name, one in () if common.json else states.items():
+        at_rest = "at rest" if one.at_rest else "not at rest"
+        print(f"{name}: {one.promise if one.at_rest is None else at_rest}", flush=True)
+    moving = [name for name, state in states.items() if state.at_rest is False]
     if moving:
-        errors.insert(0, VerificationFailed(f"{', '.join(moving)}: not seen at rest within 1 s"))
-        raise with_others(errors)
+        raise with_others([VerificationFailed(f"{', '.join(moving)}: not seen at rest within 1 s"), *errors])
     _raise_all(done, errors)
 
 
@@ -528,7 +537,7 @@ def with_others(errors: Sequence[MotorbusError]) -> MotorbusError:
 
 def _raise_all(done: Mapping[str, Any], errors: Sequence[MotorbusError]) -> None:
     """Raise the errors: Partial if some devices did it."""
-    if errors and not done:
-        raise with_others(errors)
-    if errors:
+    if errors and done:
         raise Partial("; ".join(error.summary for error in errors), advice=errors[0].advice)
+    if errors:
+        raise with_others(errors)

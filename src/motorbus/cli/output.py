@@ -6,7 +6,7 @@ import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any, Final, get_type_hints
+from typing import TYPE_CHECKING, Any, Final, TextIO, get_type_hints
 
 from motorbus.errors import MotorbusError
 
@@ -25,19 +25,24 @@ def emit(result: Any, common: Common) -> None:
     A mapping of Structs, and a list of them, is a table; other fields are lines `name: value`.
     """
     if common.json:
-        print(_encode(result), flush=True)
+        print_json(result)
     elif isinstance(result, list | tuple):
-        print_table(_rows(result))
+        for line in table_lines(_rows(result)):
+            print(line)
+        sys.stdout.flush()
     else:
         _print_struct(result)
 
 
+as_json = False  # of the command that runs
 _drawn: list[int] = []  # lines of the last table on the terminal
-_noted: set[str] = set()  # by `note_once`
+_noted: set[str] = set()  # of `note` in this command
 
 
-def begin() -> None:
-    """A command begins."""
+def begin(*, json: bool) -> None:
+    """A command begins; `json`: it has --json."""
+    global as_json
+    as_json = json
     _drawn.clear()
     _noted.clear()
 
@@ -51,32 +56,27 @@ def redraw(lines: Sequence[str]) -> None:
     print("\n".join(lines), flush=True)
 
 
-def _encode(result: Any) -> str:
+def print_json(result: Any, file: TextIO | None = None) -> None:
+    """Print one JSON document."""
     import msgspec
 
-    return msgspec.json.encode(result, enc_hook=str).decode()
+    print(msgspec.json.encode(result, enc_hook=str).decode(), file=file, flush=True)
 
 
 def _print_struct(result: Any) -> None:
-    print("\n".join(_struct_lines(result)), flush=True)
-
-
-def _struct_lines(result: Any) -> list[str]:
     values, tables = [], []
     units = _units(type(result))
     for name in result.__struct_fields__:
         value = getattr(result, name)
         if _is_table(value):
             tables.append(value)
-        elif isinstance(value, Mapping):
-            values += [[f"{key.replace('_', ' ')}:", show(one)] for key, one in value.items()]
-        elif value not in (None, "", (), []):
+        elif value not in (None, "", (), [], {}):
             values.append([name.replace("_", " ") + ":", show(value, units.get(name, ""))])
-    lines = _align(values)
+    lines = table_lines(values)
     for table in tables:
         rows = _rows(table.values(), list(table)) if isinstance(table, Mapping) else _rows(table)
         lines += [*([""] if lines else []), *table_lines(rows)]
-    return lines
+    print("\n".join(lines), flush=True)
 
 
 def _is_table(value: object) -> bool:
@@ -125,17 +125,13 @@ def show(value: Any, unit: str = "", *, bare: bool = False) -> str:
         places = _PLACES.get(unit.partition("/")[0])
         text = f"{value:.6g}" if places is None else f"{value:.{places}f}"
         return text if bare or not unit else f"{text} {unit}"
+    if isinstance(value, int) and unit and not bare:
+        return f"{value} {unit}"
     if isinstance(value, Mapping):
-        return ", ".join(f"{name} {show(one)}" for name, one in value.items())
+        return ", ".join(f"{name} {show(one) or 'unknown'}" for name, one in value.items())
     if isinstance(value, list | tuple):
         return ", ".join(show(one, unit) for one in value)
     return escape(str(value), None)
-
-
-def print_table(rows: Sequence[Sequence[str]]) -> None:
-    """Print rows in columns; the first row is the head."""
-    if rows:
-        print("\n".join(table_lines(rows)), flush=True)
 
 
 def table_lines(rows: Sequence[Sequence[str]]) -> list[str]:
@@ -143,7 +139,7 @@ def table_lines(rows: Sequence[Sequence[str]]) -> list[str]:
     import shutil
     import textwrap
 
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     indent = sum(widths[:-1]) + 2 * len(widths[:-1])
     room = max(shutil.get_terminal_size().columns - indent, 20) if sys.stdout.isatty() else 10_000
     lines = []
@@ -156,25 +152,17 @@ def table_lines(rows: Sequence[Sequence[str]]) -> list[str]:
     return lines
 
 
-def _align(pairs: Sequence[Sequence[str]]) -> list[str]:
-    return table_lines(pairs) if pairs else []
-
-
 # -- stderr --------------------------------------------------------------------------------------------------------
 
 
-def note(text: str) -> None:
-    """Print a note on stderr; a closed stderr is ignored."""
+def note(text: str, *, once: bool = False) -> None:
+    """Print a note on stderr; `once` in a command. A closed stderr is ignored."""
+    if once and text in _noted:
+        return
+    _noted.add(text)
     with suppress(OSError, ValueError):
         parts = [escape(part) for part in _PARTS.split(text)]
         print("\n".join(parts), file=sys.stderr, flush=True)
-
-
-def note_once(text: str) -> None:
-    """Print a note unless the same command has printed it."""
-    if text not in _noted:
-        _noted.add(text)
-        note(text)
 
 
 def escape(text: str, limit: int | None = LONGEST) -> str:
@@ -238,7 +226,7 @@ def print_error(error: BaseException, code: int, *, as_json: bool) -> None:
         }
         facts |= {"notes": [escape(text) for text in notes]} if notes else {}
         with suppress(OSError, ValueError):
-            print(_encode(facts), file=sys.stderr, flush=True)
+            print_json(facts, sys.stderr)
         return
     note("\n".join([f"error: {summary}", *(f"  {name}: {text}" for name, text in parts)]))
     for text in notes:

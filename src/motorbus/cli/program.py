@@ -165,7 +165,7 @@ def exit_code(error: BaseException) -> Exit | None:
 def _dispatch(words: list[str]) -> int:
     from motorbus.cli import output
 
-    output.begin()
+    output.begin(json="--json" in words)
     app = build()
     words = [_protect(word) for word in _common_last(words)]
     if "--help" in words or "-h" in words:

@@ -8,10 +8,9 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from motorbus.cli.common import Common, Writing
-from motorbus.cli.dryrun import FAR
-from motorbus.cli.motion import For, agree, axes_of, join_addresses, parse_time, report, until_enter
+from motorbus.cli.motion import For, agree, axes_of, far_moves, join_addresses, report, until_enter
 from motorbus.cli.output import note
-from motorbus.cli.target import load_machine, open_robot
+from motorbus.cli.target import need_machine, open_robot, parse_time
 from motorbus.errors import RequestError
 
 Rate = Annotated[float, Parameter(help="Cycles per s.")]
@@ -44,7 +43,7 @@ def teach(
     seconds = parse_time(for_)
     pressed = until_enter() if seconds is None else None
     with open_robot(common, axes) as robot:
-        names = tuple(name for word in axes for name in axes_of(robot, word)) or None
+        names = axes_of(robot, *axes) or None
         if not keep_torque:
             note("torque goes off now and stays off: hold what could sag")
         result = robot.carry_out(
@@ -78,19 +77,15 @@ def replay(
     """
     from motorbus.motion.trajectory import Trajectory
 
-    machine = load_machine(common)
-    if machine is None:
-        raise RequestError(f"no machine file {common.machine}", advice="`motorbus init NAME=BUS` writes one")
-    trajectory = Trajectory.load(file, machine.axes)
+    trajectory = Trajectory.load(file, need_machine(common).axes)
     with open_robot(common, tuple(trajectory.axes)) as robot:
         places = robot.positions()
-        far = [
-            f"{name} by {config.show(start - place)}"
-            for name, start in trajectory.positions(0.0).items()
-            for config, place in [(robot.config.axes[name], places[name])]
-            if place is not None and abs((start - place) * config.ratio) > FAR
-        ]
-        action = f"move {', '.join(far)} to the start" if far else f"play {trajectory.duration / speed:.2f} s"
+        starts = trajectory.positions(0.0)
+        far = far_moves(
+            robot,
+            {name: start - place for name, start in starts.items() if (place := places[name]) is not None},
+        )
+        action = f"move {far} to the start" if far else f"play {trajectory.duration / speed:.2f} s"
         if writing.dry_run:
             trajectory.check(robot.config.axes)
         if agree(action, writing, common, ask=bool(far)):

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
-from contextlib import ExitStack
-from functools import partial
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, suppress
 from math import inf
 from typing import Annotated, Any, Final
 
 from cyclopts import Parameter
 from msgspec import Struct
+from msgspec.structs import astuple
 
 from motorbus.cli.common import Common, Partial, Target, Writing
 from motorbus.cli.dryrun import carry_out
 from motorbus.cli.output import emit, escape, redraw, table_lines
-from motorbus.cli.target import bus_address, load_machine, open_bus, open_devices, parse_quantity
+from motorbus.cli.target import bus_address, load_machine, open_bus, open_devices, parse_quantity, parse_time
 from motorbus.core import units
 from motorbus.core.family import AxisDriver, Identity
 from motorbus.core.register import Register, RegisterMap, Storage
@@ -36,6 +36,9 @@ class Value(Struct, frozen=True):
 
 def map_of(target: Target) -> RegisterMap:
     """The register map of a device, by its firmware. Raises DeviceError if it is unknown."""
+    table: RegisterMap | None = getattr(target.device, "table", None)
+    if table is not None:
+        return table
     identity: Identity = target.device.identify()
     table = getattr(target.device, "table", None) or target.family.registers.get(identity.table)
     if table is None:
@@ -63,25 +66,60 @@ def read(
         motorbus read feetech:/dev/ttyACM0#1-6 present_position --json
     """
     with open_devices(common, (target,)) as devices:
-        emit([value for one in devices for value in read_values(one, registers, all=all, raw=raw)], common)
+        together = devices[0].family.sync_read
+        errors: dict[str, MotorbusError] = {}
+        values: list[Value] = []
+        if together is not None and registers and not raw and _is_one_bus(devices):
+            found = devices[0].bus.run(together(registers, [one.device for one in devices]))
+            for one in devices:
+                if one.node in found.errors:
+                    errors[one.name] = found.errors[one.node]
+                else:
+                    values += _values(one, found.values[one.node], raw=False)
+        else:
+            for one in devices:
+                try:
+                    values += read_values(one, registers, all=all, raw=raw)
+                except (NoReply, DeviceError) as error:
+                    errors[one.name] = error
+    if values:
+        emit(values, common)
+    raise_errors(errors, is_partial=bool(values))
+
+
+def _is_one_bus(devices: Sequence[Target]) -> bool:
+    return len(devices) > 1 and len({id(one.bus) for one in devices}) == 1
+
+
+def raise_errors(errors: Mapping[str, MotorbusError], *, is_partial: bool) -> None:
+    """Raise the errors of devices, by name: Partial if others answered."""
+    if errors and is_partial:
+        raise Partial("; ".join(f"{name}: {error.summary}" for name, error in errors.items()))
+    if errors:
+        raise next(iter(errors.values()))
 
 
 def read_values(target: Target, names: Sequence[str], *, all: bool = False, raw: bool = False) -> list[Value]:
     """The values of these registers of a device; () means its present values."""
-    table = map_of(target)
     if not names:
-        rows = [row for row in table.values() if row.readable]
-        present = [row for row in rows if row.name.startswith("present_")]
-        names = [row.name for row in (rows if all or not present else present)]
-    device = target.device
-    found = device.read_raw(*names) if raw else device.read(*names)
-    return [_value(target, table, name, value, raw=raw) for name, value in found.items()]
+        rows = [row.name for row in map_of(target).values() if row.readable]
+        present = [name for name in rows if name.startswith("present_")]
+        names = rows if all or not present else present
+    return _values(target, (target.device.read_raw if raw else target.device.read)(*names), raw=raw)
 
 
-def _value(target: Target, table: RegisterMap, name: str, value: Any, *, raw: bool) -> Value:
-    row = table[name]
-    meaning = "" if row.unit else row.choices.get(int(value), "")
-    return Value(target.name, name, value, "raw" if raw else row.unit, meaning)
+def _values(target: Target, found: Mapping[str, Any], *, raw: bool) -> list[Value]:
+    table = map_of(target)
+    return [
+        Value(
+            target.name,
+            name,
+            value,
+            "raw" if raw else table[name].unit,
+            "" if table[name].unit else table[name].choices.get(int(value), ""),
+        )
+        for name, value in found.items()
+    ]
 
 
 # -- write ---------------------------------------------------------------------------------------------------------
@@ -106,29 +144,25 @@ def write(
         raise RequestError("no register to write", expected="REGISTER=VALUE, as torque_limit=50%")
     pairs = assignments(values)
     with open_devices(common, (target,)) as devices:
-        orders = [(one, _parse_values(one, pairs)) for one in devices]
+        orders = [(one, {name: parse_value(one, name, text) for name, text in pairs}) for one in devices]
         rows = [map_of(devices[0])[name] for name, _ in pairs]
         question = _question(devices, rows)
         together = devices[0].family.sync_write
-        if together is not None and _may_sync(devices, rows):
+        is_goal = all(row.name.startswith("goal_") for row in rows)  # goals start together
+        if together is not None and is_goal and _is_one_bus(devices):
             by_node = {one.node: wanted for one, wanted in orders}
             carry_out(writing, devices[0].bus, lambda bus: bus.run(together(by_node)), question)
         else:
-            for number, (one, wanted) in enumerate(orders):
-                how = writing if number == 0 else Writing(yes=True, dry_run=writing.dry_run)
-                carry_out(how, one, partial(_write_one, wanted), question)
+            how = writing
+            for one, wanted in orders:
+                carry_out(how, one, lambda device: device.write(**wanted), question)  # noqa: B023
+                how = Writing(yes=True, dry_run=writing.dry_run)
         if not writing.dry_run:
-            emit([value for one, wanted in orders for value in _read_back(one, wanted)], common)
-
-
-def _write_one(values: dict[str, float | int], device: Any) -> None:
-    device.write(**values)
-
-
-def _may_sync(devices: Sequence[Target], rows: Sequence[Register]) -> bool:
-    """One request may write these rows of all devices."""
-    is_one_bus = len({id(one.bus) for one in devices}) == 1
-    return len(devices) > 1 and is_one_bus and all(row.storage is Storage.RAM for row in rows)
+            readable = [name for name, row in zip(dict(pairs), rows, strict=True) if row.readable]
+            emit(
+                [value for one in devices for value in (read_values(one, readable) if readable else [])],
+                common,
+            )
 
 
 def assignments(texts: Sequence[str]) -> list[tuple[str, str]]:
@@ -144,13 +178,9 @@ def assignments(texts: Sequence[str]) -> list[tuple[str, str]]:
     return found
 
 
-def _parse_values(target: Target, pairs: Sequence[tuple[str, str]]) -> dict[str, float | int]:
-    table = map_of(target)
-    return {name: parse_value(target, table[name], text) for name, text in pairs}
-
-
-def parse_value(target: Target, row: Register, text: str) -> float | int:
+def parse_value(target: Target, register: str, text: str) -> float | int:
     """`65°C`, `2048raw`, `1` of a row without unit -> the value in the unit of the row."""
+    row = map_of(target)[register]
     number = text.removesuffix("raw").strip()
     if number == text and row.unit in units.QUANTITIES:
         return parse_quantity(text, units.QUANTITIES[row.unit])
@@ -175,12 +205,6 @@ def _question(devices: Sequence[Target], rows: Sequence[Register]) -> str:
     if kept:
         return f"write {', '.join(kept)} to the EEPROM of {names}"
     return f"write {', '.join(moving)}, which may move {names}" if moving else ""
-
-
-def _read_back(target: Target, wanted: dict[str, float | int]) -> list[Value]:
-    table = map_of(target)
-    names = [name for name in wanted if table[name].readable]
-    return read_values(target, names) if names else []
 
 
 # -- monitor -------------------------------------------------------------------------------------------------------
@@ -237,35 +261,41 @@ def monitor(
     """
     if not (units.MIN_RATE <= rate <= units.MAX_RATE) or count < 0:
         raise RequestError("--rate must be above 0 and --count not below 0")
-    seconds = parse_quantity(for_, "time", "s") if for_ else inf
-    if not seconds > 0:
-        raise RequestError(f"--for {for_}: not above 0")
+    seconds = parse_time(for_) or inf
     if listen:
         _listen(targets[0] if targets else "", seconds, common)
         return
     answered: set[str] = set()
+    machine = load_machine(common)
+    axes = machine.axes if machine is not None else {}
     with ExitStack() as stack:
         devices = stack.enter_context(open_devices(common, targets))
-        machine = load_machine(common)
-        axes = machine.axes if machine is not None else {}
-        table = stack.enter_context(open(file, "w", encoding="utf-8", newline="")) if file else None
+        writer = (
+            csv.writer(stack.enter_context(open(file, "w", encoding="utf-8", newline=""))) if file else None
+        )
+        if writer is not None:
+            writer.writerow(["time", *Sample.__struct_fields__])
         bus = devices[0].bus
+        drivers: dict[int, AxisDriver] = {}
         start, number = bus.now(), 0
-        drivers: dict[str, AxisDriver] = {}
-        try:
+        with suppress(KeyboardInterrupt):
             while True:
                 samples = [_sample(one, axes, drivers) for one in devices]
                 answered |= {one.device for one in samples if not one.error}
                 at = bus.now() - start
-                _show_samples(Samples(at, samples), axes, common)
-                if table is not None:
-                    _write_rows(table, at, samples, head=number == 0)
+                if common.json:
+                    emit(Samples(at, samples), common)
+                else:
+                    redraw(table_lines(_rows(samples, axes)))
+                if writer is not None:
+                    values = [
+                        (*astuple(one)[:-3], " ".join(one.alarm), one.note, one.error) for one in samples
+                    ]
+                    writer.writerows((f"{at:.4f}", *row) for row in values)
                 number += 1
                 if number == count or number / rate > seconds:
                     break
                 bus.run(_sleep(start + number / rate - bus.now()))
-        except KeyboardInterrupt:
-            pass
     silent = ", ".join(one.name for one in devices if one.name not in answered)
     if silent:
         raise (Partial if answered else NoReply)(f"no answer from {silent}")
@@ -275,9 +305,9 @@ async def _sleep(seconds: float) -> None:
     await Sleep(max(0.0, seconds))
 
 
-def _sample(target: Target, axes: Any, drivers: dict[str, AxisDriver]) -> Sample:
+def _sample(target: Target, axes: Any, drivers: dict[int, AxisDriver]) -> Sample:
     """The state of a device, or its error."""
-    key = f"{id(target.bus)} {target.node}"
+    key = id(target.device)
     try:
         if key not in drivers:
             drivers[key] = target.bus.driver.axis(target.device.identify())
@@ -291,11 +321,11 @@ def _sample(target: Target, axes: Any, drivers: dict[str, AxisDriver]) -> Sample
     except MotorbusError as error:
         return Sample(target.name, error=error.summary)
     config, position = axes.get(target.name), state.position
-    of_axis = None if config is None or position is None else config.from_device(position)
+    is_known = config is not None and position is not None
     return Sample(
         target.name,
         position,
-        of_axis,
+        config.from_device(position) if is_known else None,
         state.velocity,
         state.load,
         state.current,
@@ -305,38 +335,20 @@ def _sample(target: Target, axes: Any, drivers: dict[str, AxisDriver]) -> Sample
     )
 
 
-def _show_samples(result: Samples, axes: Any, common: Common) -> None:
-    if common.json:
-        emit(result, common)
-        return
-    used = [one for one in COLUMNS if any(getattr(row, one[0]) is not None for row in result.samples)]
+def _rows(samples: Sequence[Sample], axes: Any) -> list[list[str]]:
+    """A head and a row for each device; a column without a value is left out."""
+    used = [one for one in COLUMNS if any(getattr(row, one[0]) is not None for row in samples)]
     rows = [["device", "position", *(head for _, head, _, _ in used), "alarm"]]
-    for one in result.samples:
-        values = [getattr(one, name) for name, _, _, _ in used]
-        cells = [
-            "" if value is None else f"{value * scale:.{places}f}"
-            for value, (_, _, scale, places) in zip(values, used, strict=True)
-        ]
-        alarm = ", ".join(one.alarm) or escape(one.error or one.note)
-        rows.append([one.device, _place(one, axes), *cells, alarm])
-    redraw(table_lines(rows))
-
-
-def _place(one: Sample, axes: Any) -> str:
-    if one.axis_position is not None:
-        return str(axes[one.device].show(one.axis_position))
-    return "" if one.position is None else f"{one.position / units.DEGREE:.1f} deg"
-
-
-def _write_rows(file: Any, at: float, samples: Sequence[Sample], *, head: bool) -> None:
-    writer = csv.writer(file)
-    if head:
-        writer.writerow(["time", *Sample.__struct_fields__])
     for one in samples:
-        values = [getattr(one, name) for name in Sample.__struct_fields__]
-        writer.writerow(
-            [f"{at:.4f}", *(" ".join(value) if isinstance(value, tuple) else value for value in values)]
-        )
+        place = "" if one.position is None else f"{one.position / units.DEGREE:.1f} deg"
+        if one.axis_position is not None:
+            place = axes[one.device].show(one.axis_position)
+        cells = [
+            "" if (value := getattr(one, name)) is None else f"{value * scale:.{places}f}"
+            for name, _, scale, places in used
+        ]
+        rows.append([one.device, place, *cells, ", ".join(one.alarm) or escape(one.error or one.note)])
+    return rows
 
 
 class Frame(Struct, frozen=True, tag="frame"):
@@ -355,7 +367,7 @@ def _listen(word: str, seconds: float, common: Common) -> None:
     with open_bus(common, address) as bus:
         records = bus.trace.subscribe(10_000)
         end = bus.now() + seconds
-        try:
+        with suppress(KeyboardInterrupt):
             while bus.now() < end:
                 bus.run(_sleep(min(0.05, end - bus.now())))
                 for record in records:
@@ -366,5 +378,3 @@ def _listen(word: str, seconds: float, common: Common) -> None:
                             emit(frame, common)
                         else:
                             print(f"{frame.time:10.3f}  {frame.frame}  {frame.meaning}", flush=True)
-        except KeyboardInterrupt:
-            pass

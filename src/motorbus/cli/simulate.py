@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
-import signal
-from collections.abc import Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -21,7 +19,7 @@ from motorbus.errors import RequestError
 if TYPE_CHECKING:
     from motorbus.core.family import Family
     from motorbus.simulation.faults import Script
-    from motorbus.simulation.server import Port, Server
+    from motorbus.simulation.server import Port
 
 SCRIPT_LIMIT: Final = 1 << 20  # bytes of a file of faults
 
@@ -46,7 +44,7 @@ def simulate(
     can: Annotated[str, Parameter(help="CAN bus, as socketcan/vcan0.")] = "",
     control: Annotated[Path | None, Parameter(help="Local socket for orders, as `unplug 3`.")] = None,
     pace: Annotated[bool, Parameter(help="Frames take their time on the wire.")] = False,
-    faults: Annotated[str, Parameter(help="Faults, a file of faults, or help.")] = "",
+    faults: Annotated[str, Parameter(help="Faults, as '1%: drop', or a file of faults.")] = "",
     common: Common = Common(),
 ) -> None:
     """Serve simulated devices until Ctrl-C. Quirks of the devices are -o NAME=VALUE.
@@ -63,9 +61,6 @@ def simulate(
     from motorbus.simulation.control import ControlSocket
     from motorbus.simulation.server import Server, faults_on_wire
 
-    if faults == "help":
-        emit(_fault_kinds(), common)
-        return
     found = families.load(family)
     script = _script(faults)
     if script.faults and can and may_have_wire(f"can://{can}"):
@@ -82,32 +77,19 @@ def simulate(
         server = Server(simulator, *(port for port, _ in served), rate=rate, slcan=is_can, pace=pace)
         stack.enter_context(closing(server))
         server.set_faults(script)
-        stack.enter_context(_stop_on_signals(server))
         if control:
             stack.enter_context(closing(ControlSocket(control, server)))
         buses = [f"{family}:{name}{suffix}" for _, name in served]
         gc.collect()  # a collection would delay replies
         gc.freeze()
-        if common.json:
-            emit(Simulated(buses[0], buses, sorted(simulator.nodes), os.getpid()), common)
-        else:
-            print(f"ready: {' and '.join(buses)} (simulated, ids {ids})", flush=True)
-        server.serve()
+        with suppress(KeyboardInterrupt):
+            if common.json:
+                emit(Simulated(buses[0], buses, sorted(simulator.nodes), os.getpid()), common)
+            else:
+                print(f"ready: {' and '.join(buses)} (simulated, ids {ids})", flush=True)
+            server.serve()
         if server.faults.count:
             note(f"faults: {server.faults.count} happened")
-
-
-class FaultKind(Struct, frozen=True):
-    """A kind of fault: its form, its effect."""
-
-    fault: str
-    effect: str
-
-
-def _fault_kinds() -> list[FaultKind]:
-    from motorbus.simulation.faults import KINDS
-
-    return [FaultKind(f"{name}{kind.form}", kind.help) for name, kind in KINDS.items()]
 
 
 def _script(text: str) -> Script:
@@ -168,15 +150,3 @@ def _open_ports(
         channel = CanChannel(f"can://{can}", family.link.rate, family.link.rate)
         found.append((stack.enter_context(closing(channel)), channel.name))
     return found
-
-
-@contextmanager
-def _stop_on_signals(server: Server) -> Iterator[None]:
-    """SIGINT and SIGTERM end the server."""
-    numbers = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.signal(number, lambda *_: server.stop()) for number in numbers]
-    try:
-        yield
-    finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)

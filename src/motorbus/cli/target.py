@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from motorbus.cli.common import FILE, Common, Target
-from motorbus.cli.output import note, note_once
+from motorbus.cli.output import note
 from motorbus.errors import NoReply, RequestError
 
 if TYPE_CHECKING:
@@ -32,16 +33,34 @@ def load_machine(common: Common) -> MachineConfig | None:
     return MachineConfig.load(common.machine)
 
 
+def need_machine(common: Common) -> MachineConfig:
+    """The machine file. Raises RequestError without one."""
+    machine = load_machine(common)
+    if machine is None:
+        raise RequestError(f"no machine file {common.machine}", advice="`motorbus init NAME=BUS` writes one")
+    return machine
+
+
+def edit_machine(path: Path, change: Mapping[str, object]) -> None:
+    """Change values of a machine file; its comments stay. A crash leaves the old file or the new one."""
+    from motorbus.motion.machine_edit import edit
+
+    new = path.with_name(f".{path.name}.new")
+    new.write_text(edit(path.read_text("utf-8"), change), "utf-8", newline="")
+    new.replace(path)
+
+
 def is_address(word: str) -> bool:
     """`FAMILY:PORT`, not a name of the machine file."""
     return ":" in word
 
 
 def _unknown(word: str, common: Common) -> RequestError:
+    what = f"{word!r} is no address" if word else "no bus and no device are named"
     return RequestError(
-        f"{word!r} is no address, and there is no machine file {common.machine}",
+        f"{what}, and there is no machine file {common.machine}",
         expected="FAMILY:PORT#ID, as feetech:/dev/ttyACM0#3",
-        advice="`motorbus init NAME=BUS` writes a machine file",
+        advice="`motorbus scan` lists the ports; `motorbus init NAME=BUS` writes a machine file",
     )
 
 
@@ -68,18 +87,12 @@ def bus_address(word: str, common: Common) -> str:
         return _with_options(word, common)
     machine = load_machine(common)
     if machine is None:
-        raise (
-            _unknown(word, common)
-            if word
-            else RequestError("no bus", expected="FAMILY:PORT, --bus, or a machine file with one bus")
-        )
-    if word in machine.buses:
-        return _with_options(machine.buses[word].address, common)
-    if not word and len(machine.buses) == 1:
-        return _with_options(next(iter(machine.buses.values())).address, common)
-    raise RequestError(
-        f"no bus {word!r}" if word else "several buses", expected=f"one of {', '.join(machine.buses)}"
-    )
+        raise _unknown(word, common)
+    names = [word] if word else list(machine.buses)
+    if len(names) != 1 or names[0] not in machine.buses:
+        what = f"no bus {word!r}" if word else "several buses"
+        raise RequestError(what, expected=f"one of {', '.join(machine.buses)}")
+    return _with_options(machine.buses[names[0]].address, common)
 
 
 # -- opening -------------------------------------------------------------------------------------------------------
@@ -104,7 +117,7 @@ def _report(event: object) -> None:
 
 def _notes(simulated: bool, warnings: Sequence[str], common: Common) -> None:
     if simulated and not common.json:
-        note_once("simulated")
+        note("simulated", once=True)
     for text in warnings:
         note(f"note: {text}")
 
@@ -140,7 +153,7 @@ def _addresses(common: Common, words: Sequence[str]) -> Iterator[tuple[str, str]
     words = words or ((common.bus,) if common.bus else ())
     machine = None if words and all(map(is_address, words)) else load_machine(common)
     if machine is None and not words:
-        raise RequestError("no device", expected="FAMILY:PORT#ID, --bus, or a machine file")
+        raise _unknown("", common)
     for word in words or (machine.buses if machine is not None else ()):
         if is_address(word):
             yield _with_options(word, common), ""
@@ -151,6 +164,17 @@ def _addresses(common: Common, words: Sequence[str]) -> Iterator[tuple[str, str]
                 config = machine.axes[axis]
                 address = machine.buses[config.bus].address
                 yield f"{_with_options(address, common)}#{config.node}", axis
+
+
+def bus_of(target: Target) -> str:
+    """The address of the bus of a device, without options."""
+    name, family = target.bus.link.name, target.family.name
+    return name if name.startswith(f"{family}:") else f"{family}:{name}"
+
+
+def address_of(target: Target) -> str:
+    """The axis, or the address of a device, as the user types it."""
+    return f"{bus_of(target)}{target.name}" if target.name.startswith("#") else target.name
 
 
 def _scan(bus: Bus) -> tuple[int, ...]:
@@ -222,6 +246,14 @@ def parse_quantity(text: str, kind: str, unit: str = "") -> float:
             raise RequestError(f"{kind} {text!r} has no unit", expected=f"a unit, as {text}{usual}")
         text += unit
     return units.parse(text, kind)
+
+
+def parse_time(text: str) -> float | None:
+    """A time (s); None for "". Raises RequestError."""
+    seconds = parse_quantity(text, "time", "s") if text else None
+    if seconds is not None and seconds <= 0:
+        raise RequestError(f"{text} is not a time", expected="a time above 0, as 2s")
+    return seconds
 
 
 # -- log -----------------------------------------------------------------------------------------------------------

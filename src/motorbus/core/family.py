@@ -409,6 +409,8 @@ class Family:
     """The commands of the manual: `function(device, …)` by name."""
     sync_write: Callable[[Mapping[Any, Mapping[str, float]]], Runnable[None]] | None = None
     """sync_write({device: {register: value}}) writes RAM registers of many devices with one request."""
+    sync_read: Callable[[Sequence[str], Sequence[Any]], Runnable[Any]] | None = None
+    """sync_read(registers, devices) reads many devices with few requests: `values` and `errors` by node."""
 
     def open(self, **settings: object) -> BusDriver:
         """The driver of one open bus. Raises RequestError for an unknown or invalid setting."""

@@ -76,4 +76,5 @@ FAMILY: Final = Family(
     recording_module="motorbus.families.feetech.decode",
     commands={name: getattr(Servo, name).function for name in _COMMANDS},
     sync_write=sync_write,
+    sync_read=sync_read,
 )

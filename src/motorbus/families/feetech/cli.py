@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 from cyclopts import App, Parameter
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from motorbus.cli.common import Common, Target, Writing
+from motorbus.cli.discover import in_shell
 from motorbus.cli.dryrun import carry_out
-from motorbus.cli.output import emit
+from motorbus.cli.output import emit, note
 from motorbus.cli.target import open_devices, parse_quantity
 from motorbus.errors import RequestError
 from motorbus.families.feetech.driver.servo import Servo
@@ -40,7 +41,7 @@ class Reset(Struct, frozen=True, tag="reset"):
 
     device: str
     node: int
-    rate: int
+    rate: Annotated[int, Meta(extra={"unit": "bit/s"})]
 
 
 def _servo(devices: list[Target]) -> Target:
@@ -62,7 +63,9 @@ def mode(
     turns: Annotated[
         bool | None, Parameter(help="More than one turn (position mode).", negative="--one-turn")
     ] = None,
-    low: Annotated[str, Parameter(help="Lowest position of an SCS that leaves pwm.")] = "",
+    low: Annotated[
+        str, Parameter(help="Lowest position, as 0deg; for --one-turn, and an SCS that leaves pwm.")
+    ] = "",
     high: Annotated[str, Parameter(help="Its highest position.")] = "",
     writing: Writing = Writing(),
     common: Common = Common(),
@@ -91,7 +94,7 @@ def mode(
             carry_out(writing, target, lambda servo: servo.set_multi_turn(many, limits), question)
         if not writing.dry_run:
             servo: Any = target.device
-            blocked = tuple(servo.why_not_moving())
+            blocked = tuple(in_shell(text, target) for text in servo.why_not_moving())
             known = servo.known_mode
             emit(ModeState(target.name, known.value if known else "not documented", blocked), common)
 
@@ -113,6 +116,8 @@ def recover_overload(device: str, /, *, writing: Writing = Writing(), common: Co
         found = carry_out(writing, target, lambda servo: servo.recover_overload())
         if found is not None:
             emit(Overload(target.name, tuple(found.tripped), tuple(found.remaining)), common)
+            if not found.tripped:
+                note("no alarm was set")
 
 
 @app.command
