@@ -18,9 +18,6 @@ class Check:
     def check(self, request: Request[Any], now: float) -> None:
         self._check(request)
 
-    def required_reads(self, request: Request[Any]) -> Sequence[Any]:
-        return ()
-
     def stopped(self, nodes: Sequence[int]) -> None:
         self.stops.append(tuple(nodes))
 

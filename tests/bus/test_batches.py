@@ -13,8 +13,7 @@ import pytest
 
 import motorbus
 from motorbus import feetech
-from motorbus.bus.blocking import Bus, exchange_on
-from motorbus.bus.running import run_on
+from motorbus.bus.blocking import Bus, exchange_on, run_on
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Request, Response
 from motorbus.errors import MotorbusError, RequestError

@@ -143,7 +143,7 @@ def test_a_lost_port_is_noted_where_its_error_is_tolerated(monkeypatch: pytest.M
         monkeypatch.setattr(bus.link, "read", lose)
         _, error = bus.exchange(batch, (MotorbusError,))
         assert isinstance(error, LinkLost)
-        assert bus.loss_count == 1
+        assert bus.engine.losses == 1
 
 
 def test_a_kept_request_waits_for_a_full_link_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -239,8 +239,5 @@ def test_an_error_of_one_call_ends_no_other_one(clock: str) -> None:
 
 class _Admit:
     def check(self, request: Request[Any], now: float) -> None: ...
-
-    def required_reads(self, request: Request[Any]) -> tuple[()]:
-        return ()
 
     def stopped(self, nodes: object) -> None: ...

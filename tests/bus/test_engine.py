@@ -903,6 +903,5 @@ def test_statistics_balance_for_every_node(engine: Engine) -> None:
     for node in (1, 2, 3):
         counts = engine.counts(node)
         assert counts.sent == counts.ok + sum(counts.errors.values()) > before[node]
-        assert sum(counts.latency) == counts.ok
     assert engine.counts(2).ok == 0
     assert engine.counts(3).errors["lost"] == 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import os
 import signal
 import threading
@@ -15,9 +16,8 @@ import pytest
 
 import motorbus
 from motorbus import feetech, stepper
-from motorbus.bus.blocking import exchange_on
-from motorbus.bus.running import run_on
-from motorbus.core.request import Request
+from motorbus.bus.blocking import exchange_on, run_on
+from motorbus.core.request import Effect, Request
 from motorbus.core.steps import Exclusive, Sleep, catch, gather
 from motorbus.errors import Interrupted, LinkLost
 from motorbus.families.feetech.driver.group import disable_torque_everyone
@@ -259,3 +259,118 @@ def test_an_emergency_stop_ends_the_calls_of_a_loop_that_is_closed() -> None:
         loop.close()
         assert bus.estop().acknowledged == (1,)
         bus._close_port()
+
+
+@pytest.mark.parametrize("fault", [SystemExit(3), ValueError("in the clean-up")])
+def test_a_clean_up_that_raises_leaves_no_call_of_a_worker_waiting(fault: BaseException) -> None:
+    async def stubborn() -> None:
+        try:
+            await Sleep(60.0)
+        finally:
+            raise fault
+
+    async def main() -> None:
+        with motorbus.simulate("feetech", clock="real") as sim:
+            async with motorbus.open_async(sim.url) as bus:
+                servo = feetech.AsyncServo(bus, 1)
+                raising = asyncio.create_task(bus.run(stubborn()))
+                other = asyncio.create_task(bus.run(Sleep(0.3)))
+                await asyncio.sleep(0.05)
+                raising.cancel()
+                with pytest.raises(asyncio.CancelledError):
+                    await asyncio.wait_for(raising, LIMIT)
+                await asyncio.wait_for(other, LIMIT)
+                assert await asyncio.wait_for(servo.ping(), LIMIT)
+
+    asyncio.run(main())
+
+
+@pytest.mark.parametrize("where", ["send", "receive", "link"])
+def test_a_fault_of_the_bus_ends_every_call_of_a_worker(where: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*given: Any, **named: Any) -> Any:
+        raise RuntimeError("a fault of the bus")
+
+    async def main() -> None:
+        with motorbus.simulate("feetech", clock="real") as sim:
+            async with motorbus.open_async(sim.url) as bus:
+                servo = feetech.AsyncServo(bus, 1)
+                await servo.position()
+                with monkeypatch.context() as patch:
+                    target: Any = bus.link if where == "link" else bus
+                    patch.setattr(target, "read" if where == "link" else where, fail)
+                    calls = [asyncio.create_task(servo.position()) for _ in range(3)]
+                    for call in calls:
+                        with pytest.raises(RuntimeError, match="a fault of the bus"):
+                            await asyncio.wait_for(call, LIMIT)
+                await asyncio.wait_for(servo.position(), LIMIT)
+
+    asyncio.run(main())
+
+
+def test_a_latch_counts_before_it_gets_the_turn(arms: list[Arm]) -> None:
+    arm = arms[0]
+    servo = feetech.Servo(arm.bus, 1)
+    assert arm.batch()[0].effect is Effect.MOTION
+    with arm.bus.turn:
+        latching = started(arm.bus.latch)
+        while not arm.bus.latched:
+            assert latching.is_alive()
+            time.sleep(0.001)
+        with pytest.raises(Interrupted, match="in this process"):
+            arm.bus.exchange(arm.batch())
+        assert latching.is_alive()
+    latching.join(LIMIT)
+    assert servo.position() is not None  # reads still work
+    arm.bus.reset()
+    arm.bus.exchange(arm.batch())
+
+
+def test_a_call_of_a_loop_that_is_closed_cleans_up_and_frees_the_bus() -> None:
+    with motorbus.simulate("feetech", ids="1", clock="real") as sim:
+        bus = motorbus.open_async(sim.url)
+        servo = feetech.AsyncServo(bus, 1)
+        cleaned = threading.Event()
+        pending: list[asyncio.Task[None]] = []
+
+        async def work() -> None:
+            try:
+                await Exclusive(Sleep(60.0))
+            finally:
+                cleaned.set()
+
+        async def begin() -> None:
+            pending.append(asyncio.get_running_loop().create_task(bus.run(work())))
+            await asyncio.sleep(0.05)
+
+        loop = asyncio.new_event_loop()
+        loop.run_until_complete(begin())
+        loop.close()
+        assert cleaned.wait(LIMIT)
+
+        async def again() -> bool:
+            async with bus:
+                return await asyncio.wait_for(servo.ping(), LIMIT) is not None
+
+        assert asyncio.run(again())
+
+
+@pytest.mark.parametrize("clock", ["virtual", "real"])
+def test_two_loops_in_two_threads_use_two_buses(clock: str) -> None:
+    right: list[int] = []
+
+    async def main(turn: int) -> None:
+        with motorbus.simulate("feetech", ids="1-3", clock=clock) as sim:
+            async with motorbus.open_async(sim.url) as bus:
+                servos = [feetech.AsyncServo(bus, node) for node in (1, 2, 3)]
+                for index in range(50):
+                    for node in (1, 2, 3):
+                        sim[node].raw_position = 1_000 * turn + 10 * index + node
+                    found = await asyncio.gather(*(servo.position() for servo in servos))
+                    counts = [round(place * 4096 / math.tau) for place in found]
+                    assert counts == [1_000 * turn + 10 * index + node for node in (1, 2, 3)]
+                right.append(turn)
+
+    threads = [started(lambda turn=turn: asyncio.run(main(turn))) for turn in (1, 2)]  # type: ignore[misc]
+    for thread in threads:
+        thread.join(2 * LIMIT)
+    assert sorted(right) == [1, 2]

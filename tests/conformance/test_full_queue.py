@@ -155,7 +155,7 @@ def test_a_repeated_read_waits_for_a_full_adapter(mover: Family) -> None:
                 assert await other.position() == pytest.approx(here, abs=1e-3)
 
         asyncio.run(read())
-        assert there.bus.loss_count == 0
+        assert there.bus.engine.losses == 0
 
 
 def test_an_adapter_that_stays_full_costs_each_request_its_own_time(mover: Family) -> None:
@@ -166,4 +166,4 @@ def test_an_adapter_that_stays_full_costs_each_request_its_own_time(mover: Famil
         assert there.bus.now() - begun < 1.0
         there.link.size = 1  # type: ignore[attr-defined]
         assert all(isinstance(value, float) for value in positions(there))
-        assert there.bus.loss_count == 0
+        assert there.bus.engine.losses == 0

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
+import pytest
+
 import motorbus
 from motorbus import feetech
 from tests.conftest import Rounds
@@ -16,6 +18,9 @@ TIMEOUT: Final = 0.03
 """s that a group with a silent member takes at most: its time-out, and not a probe of the silent one each time."""
 BACK_OFF: Final = 1.0
 """s after which a servo that is back is asked again."""
+
+LOOP_ENDS: Final = 0.3
+"""s without a position of an axis after which a control loop ends."""
 
 
 def turn(sim: Any, index: int) -> dict[int, float]:
@@ -53,6 +58,26 @@ def test_a_group_read_in_a_loop(rounds: Rounds) -> None:
             back = sim.now
             assert any(not read(cycles + more) for more in range(100))
             assert sim.now - back < BACK_OFF + TIMEOUT
+
+
+@pytest.mark.parametrize("silence", [0.05, 0.1, 0.2])
+def test_a_servo_that_was_silent_for_a_moment_is_asked_again_before_a_control_loop_gives_up(
+    silence: float,
+) -> None:
+    with motorbus.simulate("feetech", ids=IDS) as sim, motorbus.open(sim.url) as bus:
+        sim.pace = True
+        servos = [feetech.Servo(bus, node) for node in IDS]
+        for servo in servos:
+            servo.prepare()
+        group = feetech.ServoGroup(servos)
+        assert not bus.run(group.positions).missing
+        sim[DEAD].unplug()
+        begun = sim.now
+        while sim.now < begun + silence:
+            assert bus.run(group.positions).missing == (DEAD,)
+        sim[DEAD].plug()
+        while bus.run(group.positions).missing:
+            assert sim.now < begun + LOOP_ENDS
 
 
 def test_a_control_loop_survives_a_gap() -> None:

@@ -191,7 +191,7 @@ def test_a_simulator_that_is_killed_and_started_again(family: str, tmp_path: Pat
         assert isinstance(raised(lambda: read(bus)), motorbus.LinkLost)
         with simulator(tmp_path / "bus", family, "--ids", ids):
             assert until_back(lambda: read(bus)) == right
-        assert bus.loss_count >= 1
+        assert bus.engine.losses >= 1
 
 
 def test_tasks_whose_port_is_gone(before: Simulator) -> None:

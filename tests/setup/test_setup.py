@@ -6,14 +6,17 @@ from typing import Any
 
 import pytest
 
+import motorbus
 from motorbus import Robot, feetech
 from motorbus.errors import LimitExceeded, NoReply
 from motorbus.setup import machine, presets
 from motorbus.setup.calibrate import TURN, calibrate, read_calibration
-from motorbus.setup.engine import run
+from motorbus.setup.engine import Note, Step, run
 from motorbus.setup.number import number
+from motorbus.setup.port import find_port
 from motorbus.setup.replace import replace
 from motorbus.setup.verify import verify
+from motorbus.simulation import Simulation
 from tests.setup.arm import COUNT, User, arm, new_servos, run_until_interrupted, turn_to
 
 SO101 = presets.preset("so101")
@@ -161,3 +164,36 @@ def test_a_fresh_servo_takes_the_place_of_a_dead_one() -> None:
         one = run(replace(bus, SO101, "shoulder_lift", {"position_p": 20, "homing_offset": 1.0}), user)
         assert one.range_max - one.range_min == pytest.approx(1200, abs=4)
         assert feetech.Servo(bus, 2).read("position_p")["position_p"] == 20
+
+
+class Swinger:
+    """A `Face` of a user who turns the first joint of one arm to these counts, one for each look."""
+
+    def __init__(self, arm: Simulation, *counts: int) -> None:
+        self.arm = arm
+        self.counts = iter(counts)
+        self.notes: list[str] = []
+
+    def show(self, step: Step) -> str | None:
+        if isinstance(step, Note):
+            self.notes.append(step.text)
+        else:
+            turn_to(self.arm, 1, next(self.counts))
+        return None
+
+
+def test_the_port_is_that_of_the_arm_that_is_swung_to_both_sides() -> None:
+    with (
+        motorbus.simulate("feetech", ids="1-6") as other,
+        motorbus.simulate("feetech", ids="1-6") as mine,
+        motorbus.simulate("feetech", ids="9") as foreign,
+    ):
+        urls = [sim.url.removeprefix("feetech:") for sim in (other, mine, foreign)]
+        before = dict(mine[1].memory.values)
+        user = Swinger(mine, 2100, 2300, 2048, 1800)
+        assert run(find_port([*urls, "/dev/none"], SO101), user) == urls[1]
+        assert user.notes[0].startswith("/dev/none: ")
+        assert dict(mine[1].memory.values) == before | {"present_position": 1800}
+        assert run(find_port([urls[0], urls[2]], SO101), user) == urls[0]  # the only arm
+        with pytest.raises(NoReply, match="no servo with id 1 answers"):
+            run(find_port(urls[2:], SO101), user)

@@ -18,9 +18,9 @@ from typing import Any, Final, Self, TypeVar
 from weakref import WeakKeyDictionary
 
 from motorbus.bus.base import BaseBus, check_clocks
+from motorbus.bus.blocking import Part, wait_for
 from motorbus.bus.interrupts import DEFAULTS, SIGNALS
-from motorbus.bus.running import Part, wait_for
-from motorbus.bus.tasks import Notify, Tree, starting
+from motorbus.bus.tasks import Notify, Starting, Tree
 from motorbus.core.steps import Runnable, discard
 
 T = TypeVar("T")
@@ -41,18 +41,21 @@ class AsyncBus(BaseBus):
         return self._run(Owned(procedure), report)
 
     async def _run(self, owned: Owned, report: Notify | None) -> Any:
-        with starting(owned.procedure):
+        with Starting(owned.procedure):
             call = self.submit(owned.procedure, report)
         await _finish([call])
         return call.tree.result()
 
     def submit(self, procedure: Runnable[Any], report: Notify | None = None) -> Call:
-        """Let the worker of this bus run the procedure."""
+        """Let the worker of this bus run the procedure; in virtual time that of the loop."""
         if self.link.virtual:
             self.check_thread()
-            worker: _Worker | _LoopWorker = _LoopWorker.of_loop()
+            worker = _loop_worker(asyncio.get_running_loop())
+        elif self._worker is None:
+            worker = self._worker = _Worker()
+            Thread(target=worker.work, name="motorbus asyncio", daemon=True).start()
         else:
-            worker = self._worker = self._worker or _Worker()
+            worker = self._worker
         call = Call(self, procedure, report, worker.wake)
         worker.add(call)
         return call
@@ -84,10 +87,7 @@ class Owned:
 
 
 class Call:
-    """A procedure that a worker runs; `ended` is set in the loop.
-
-    `cancellations` are errors with which the worker cancels it, None to end it where it stands.
-    """
+    """A procedure that a worker runs; `ended` is set in the loop. The worker carries out `orders` with the turn."""
 
     def __init__(
         self, bus: AsyncBus, procedure: Runnable[Any], report: Notify | None, wake: Callable[[], None]
@@ -96,7 +96,7 @@ class Call:
         self.wake = wake
         self.loop = asyncio.get_running_loop()
         self.ended: asyncio.Future[None] = self.loop.create_future()
-        self.cancellations: deque[BaseException | None] = deque()
+        self.orders: deque[Callable[[], None]] = deque()
         observer = report or bus.report
         if observer is not None and not bus.link.virtual:
             observer = partial(_call_in, self.loop, observer)
@@ -104,21 +104,15 @@ class Call:
             bus.engine, procedure, now=bus.link.now, report=bus.event_sink(observer), wake=wake
         )
 
-    def request_end(self, request: BaseException | None) -> None:
-        """Cancel the procedure with this error; None: end it where it stands."""
-        self.cancellations.append(request)
+    def cancel(self, error: BaseException) -> None:
+        """Let the worker throw this into the procedure, which cleans up."""
+        self.orders.append(partial(self.tree.cancel, error))
         self.wake()
 
-    def end_as_requested(self) -> None:
-        """Carry out what was asked; the caller has the turn."""
-        if self.loop.is_closed() and self.tree.cancellation is None:
-            self.tree.cancel(asyncio.CancelledError())
-        while self.cancellations:
-            error = self.cancellations.popleft()
-            if error is not None:
-                self.tree.cancel(error)
-            elif not self.tree.finished:
-                self.tree.drop()
+    def drop(self) -> None:
+        """Let the worker end the procedure where it stands."""
+        self.orders.append(self.tree.drop)
+        self.wake()
 
 
 async def _finish(calls: Iterable[Call]) -> None:
@@ -138,10 +132,10 @@ async def _finish(calls: Iterable[Call]) -> None:
                     error = next(filter(None, (call.tree.foreign_error() for call in ended)), None)
             if error is not None:
                 for call in calls:
-                    call.request_end(error)
+                    call.cancel(error)
     except BaseException:  # the coroutine was closed: nothing is sent any more
         for call in calls:
-            call.request_end(None)
+            call.drop()
         raise
     if cancellation is not None and all(call.tree.cancellation is None for call in calls):
         raise cancellation  # all had ended before
@@ -152,7 +146,7 @@ async def run_on(procedures: Mapping[AsyncBus, Runnable[Any]]) -> dict[AsyncBus,
 
     Any other error of one of them, and a cancellation, cancels all; it is raised when all have cleaned up.
     """
-    with starting(*procedures.values()):
+    with Starting(*procedures.values()):
         check_clocks(procedures)
         calls = {bus: bus.submit(procedure) for bus, procedure in procedures.items()}
     await _finish(calls.values())
@@ -160,13 +154,18 @@ async def run_on(procedures: Mapping[AsyncBus, Runnable[Any]]) -> dict[AsyncBus,
 
 
 class _Worker:
-    """A thread that runs the procedures of one bus, which it keeps alive only while it has some."""
+    """Steps the procedures of calls: in a thread those of one bus, in a task of the loop those of all virtual buses.
+
+    It keeps a bus alive only while it has a call of it.
+    """
 
     def __init__(self) -> None:
-        self._wakes: SimpleQueue[None] = SimpleQueue()
         self._inbox: deque[Call] = deque()
+        self._wakes: SimpleQueue[None] = SimpleQueue()
+        self._calls: list[Call] = []
+        self._parts: dict[BaseBus, Part] = {}
         self._ended = False
-        Thread(target=self._work, name="motorbus asyncio", daemon=True).start()
+        self.task: asyncio.Task[None] | None = None  # of the loop
 
     def add(self, call: Call) -> None:
         """Run this procedure, beside those that run."""
@@ -183,111 +182,81 @@ class _Worker:
         self._ended = True
         self.wake()
 
-    def _work(self) -> None:
+    def work(self) -> None:
+        """Run what is added until `end`; for a thread."""
         while True:
             while not (self._inbox or self._ended):
                 self._wakes.get()
             if not self._inbox:
                 return
-            _serve(self._inbox, self._wakes)
+            while self._inbox or self._calls:
+                for loop, future in self._step():
+                    _call_in(loop, _set_result, future)
+
+    async def work_in_loop(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Run what has been added."""
+        try:
+            while self._inbox or self._calls:
+                for _, future in self._step():
+                    _set_result(future)
+                with contextlib.suppress(asyncio.CancelledError):  # the loop ends: what runs cleans up first
+                    await asyncio.sleep(0)
+        finally:
+            del _LOOP_WORKERS[loop]
+
+    def _step(self) -> list[tuple[asyncio.AbstractEventLoop, asyncio.Future[None]]]:
+        """Wait, then step all procedures; the loops and futures of calls that have ended."""
+        try:
+            if going := [part for part in self._parts.values() if not part.finished]:
+                wait_for(going)
+            self._take_calls()
+            for part in self._parts.values():
+                part.advance(-1.0)
+        except BaseException as error:  # a fault of the bus: no call waits for ever
+            for call in self._calls:
+                call.tree.drop()
+                call.tree.cancellation = error
+        ended = [call for call in self._calls if call.tree.finished]
+        self._calls = [call for call in self._calls if not call.tree.finished]
+        for part in self._parts.values():
+            part.trees = [tree for tree in part.trees if not tree.finished]
+            part.finished = not part.trees
+            if part.finished or not part.bus.link.virtual:
+                part.release_turn()
+        if not self._calls:
+            self._parts.clear()
+        return [(call.loop, call.ended) for call in ended]
+
+    def _take_calls(self) -> None:
+        while self._inbox:
+            call = self._inbox.popleft()
+            self._calls.append(call)
+            if call.bus not in self._parts:
+                self._parts[call.bus] = Part(call.bus, self._wakes)
+            self._parts[call.bus].trees.append(call.tree)
+        for call in self._calls:
+            if call.loop.is_closed() and call.tree.cancellation is None:
+                call.cancel(asyncio.CancelledError())
+            while call.orders:
+                self._parts[call.bus].orders.append(call.orders.popleft())
 
 
-def _serve(inbox: deque[Call], wakes: SimpleQueue[None]) -> None:
-    """Run procedures of one bus until all have ended; the last of them is reported when nothing here holds the bus."""
-    part: Part | None = Part(inbox[0].bus, inbox, wakes)
-    calls: list[Call] = []
-    while part is not None:
-        ended = _advance(part, inbox, calls)
-        if not calls and not inbox:
-            part = None
-        for loop, future in ended:
-            _call_in(loop, _set_result, future)
+_LOOP_WORKERS: Final[WeakKeyDictionary[asyncio.AbstractEventLoop, _Worker]] = WeakKeyDictionary()
+"""By loop, what runs its calls in virtual time."""
 
 
-def _advance(
-    part: Part, inbox: deque[Call], calls: list[Call]
-) -> list[tuple[asyncio.AbstractEventLoop, asyncio.Future[None]]]:
-    """Wait, then step these procedures and those of the inbox; remove those that have ended and give their futures."""
-    try:
-        if calls:
-            part.wait()
-        while inbox:
-            calls.append(inbox.popleft())
-        part.calls, part.trees = calls, [call.tree for call in calls]
-        part.advance(-1.0)
-    except BaseException as error:  # a fault of the bus: no call waits for ever
-        for call in calls:
-            call.tree.drop()
-            call.tree.cancellation = error
-        part.finished = True
-    ended = [call for call in calls if call.tree.finished]
-    calls[:] = [call for call in calls if not call.tree.finished]
-    part.trees = [call.tree for call in calls]
-    part.release_turn()
-    return [(call.loop, call.ended) for call in ended]
+def _loop_worker(loop: asyncio.AbstractEventLoop) -> _Worker:
+    """What runs the calls of this loop in virtual time."""
+    worker = _LOOP_WORKERS.get(loop)
+    if worker is None:
+        worker = _LOOP_WORKERS[loop] = _Worker()
+        worker.task = loop.create_task(worker.work_in_loop(loop))
+    return worker
 
 
 def _set_result(future: asyncio.Future[None]) -> None:
     if not future.done():
         future.set_result(None)
-
-
-class _LoopWorker:
-    """A task of the loop that runs the procedures of all its buses in virtual time."""
-
-    _of: Final[WeakKeyDictionary[asyncio.AbstractEventLoop, _LoopWorker]] = WeakKeyDictionary()
-
-    def __init__(self) -> None:
-        self._calls: list[Call] = []
-        self._task: asyncio.Task[None] | None = None
-
-    @classmethod
-    def of_loop(cls) -> _LoopWorker:
-        """That of the running loop."""
-        return cls._of.setdefault(asyncio.get_running_loop(), cls())
-
-    def add(self, call: Call) -> None:
-        """Run this procedure, beside those that run."""
-        self._calls.append(call)
-        if self._task is None:
-            self._task = call.loop.create_task(self._work())
-
-    def wake(self) -> None:
-        """It looks at its procedures in every turn of the loop."""
-
-    async def _work(self) -> None:
-        parts: dict[BaseBus, Part] = {}
-        failure: BaseException | None = None
-        try:
-            while self._calls:
-                self._step(parts)
-                with contextlib.suppress(asyncio.CancelledError):  # the loop ends: what runs cleans up first
-                    await asyncio.sleep(0)
-        except BaseException as error:  # a fault of a bus: no call waits for ever
-            failure = error
-        finally:
-            self._task = None
-            for call in self._calls:
-                call.tree.drop()
-                call.tree.cancellation = failure
-                _set_result(call.ended)
-            self._calls.clear()
-            for part in parts.values():
-                part.finished = True
-                part.release_turn()
-
-    def _step(self, parts: dict[BaseBus, Part]) -> None:
-        for bus in {call.bus: None for call in self._calls}:
-            part = parts.setdefault(bus, Part(bus))
-            part.calls = [call for call in self._calls if call.bus is bus]
-            part.trees = [call.tree for call in part.calls]
-            part.advance(-1.0)
-        for call in tuple(self._calls):
-            if call.tree.finished:
-                self._calls.remove(call)
-                _set_result(call.ended)
-        if going := [part for part in parts.values() if not part.finished]:
-            wait_for(going)
 
 
 def _call_in(loop: asyncio.AbstractEventLoop, function: Callable[..., object], *given: object) -> None:

@@ -16,113 +16,64 @@ NOISE_KEPT: Final = 16
 class Attempt(Step["Attempt | None"]):
     """A request on the wire. A policy awaits it and gets it back when it has ended.
 
-    A kept request has one attempt for each bus, which is used again, so what depends on the request alone is computed
-    once.
+    The attempt of a request with `decode_exact` is kept and used again. A group does not wait for `excluded` nodes.
     """
 
-    __slots__ = (
-        "accepted",
-        "air",
-        "answer",
-        "at",
-        "budget",
-        "complete",
-        "data",
-        "deadline",
-        "direct",
-        "error",
-        "excluded",
-        "expected",
-        "fault",
-        "in_flight",
-        "is_probe",
-        "is_probed",
-        "is_used",
-        "nodes",
-        "noise",
-        "orders",
-        "replies",
-        "request",
-        "sent_at",
-        "shared",
-        "since",
-        "size",
-        "stop_since",
-        "surplus",
-        "task",
-        "timing",
-        "write_until",
-    )
-
     def __init__(
-        self,
-        request: Request[Any],
-        *,
-        is_probe: bool = False,
-        is_probed: bool = False,
-        excluded: tuple[int, ...] = (),
+        self, request: Request[Any], *, is_probe: bool = False, excluded: tuple[int, ...] = ()
     ) -> None:
         self.request = request
+        self.priority = request.priority
         self.is_probe = is_probe
-        self.is_probed = (
-            is_probed  # a probe has shown that there is no echo, so a reply may equal what was sent
-        )
+        self.is_probed = False  # a probe was answered, so a reply may equal what was sent
+        self.excluded = excluded
         self.expected: tuple[Expected, ...] = () if request.expected is ANY else request.expected
         self.nodes = tuple([due.node for due in self.expected])
         self.size = sum([due.length for due in self.expected])  # bytes of all replies
         self.timing: object = None
-        """Identifies the rate and latency for which `air` and `budget` hold."""
-        self.air = 0.0  # s on the wire
-        self.budget = 0.0  # s from the start to the deadline
+        """Rate and latency for which `air` (s on the wire) and `budget` (s to the deadline) hold."""
+        self.air = self.budget = 0.0
         self.task: Any = None
         """The task that waits for it; None: its caller no longer waits."""
         self.direct = True  # the task awaits the request itself, not its policy this attempt
         self.since = self.stop_since = -1
         """Epochs when its caller decided; -1: a stop does not withdraw it."""
-        self.excluded = excluded
-        """Nodes of a group that it does not wait for, or whose reply was damaged."""
         self.in_flight = False
-        self.is_used = False  # `reset` is needed before it is sent again
         self.sent_at = 0.0
         self.deadline = inf
         self.shared = 0  # attempts on other lanes that the deadline allows for
         self.write_until = 0.0
         """When it fails (s) if the link is still full; 0 while the link was not."""
-        self.replies: dict[int, Reply] = {}
-        self.noise: list[tuple[str, bytes]] = []
-        self.fault = ""
-        self.surplus = False  # more came than was expected
-        self.complete = False
+        self.data: Data = b""
+        """The last reply accepted as a whole, and below when (s), after how many orders, and split."""
+        self.at = -inf
+        self.orders = 0
+        self.answer: Response | None = None
+        self.reset()
+
+    def reset(self) -> None:
+        """Nothing has come for it."""
+        self.is_used = False
         self.error: BaseException | None = None
         """What ended it before its time: a lost link, a stop."""
         self.accepted: Response | None = None
         """What its caller gets; None if it failed."""
-        self.data: Data = b""
-        """The last reply accepted as a whole, and below when (s), and after how many orders."""
-        self.at = -inf
-        self.orders = 0
-        self.answer: Response | None = None
-
-    def reset(self) -> None:
-        """It is sent: nothing has come for it. `excluded` stays."""
-        self.is_used = False
-        self.error = self.accepted = None
-        self.replies, self.noise, self.fault = {}, [], ""
+        self.replies: dict[int, Reply] = {}
+        self.noise: list[tuple[str, bytes]] = []
+        self.fault = ""
         self.surplus = self.complete = False
 
     def reading(self) -> tuple[Request[Any], Response]:
         """The request and its last accepted reply, split into the replies of the nodes."""
         if self.answer is None:
-            self.answer = Response(self._split(), (), self.at)
+            content = self.data.data if isinstance(self.data, CanFrame) else self.data
+            replies, start = [], 0
+            for due in self.expected:
+                end = start + due.length
+                replies.append(Reply(self.request.lane, due.key, content[start:end]))
+                start = end
+            self.answer = Response(tuple(replies), (), self.at)
         return self.request, self.answer
-
-    def _split(self) -> tuple[Reply, ...]:
-        content = self.data.data if isinstance(self.data, CanFrame) else self.data
-        replies, start = [], 0
-        for due in self.expected:
-            replies.append(Reply(self.request.lane, due.key, content[start : start + due.length]))
-            start += due.length
-        return tuple(replies)
 
     # -- what comes in -----------------------------------------------------------------------------------------
 
@@ -134,13 +85,12 @@ class Attempt(Step["Attempt | None"]):
         for index, due in enumerate(self.expected):
             if due.accepts(reply.key, len(reply.data)) and index not in self.replies:
                 self.replies[index] = reply
-                self.check_complete()
+                self._check_complete()
                 return True
         return False
 
-    def check_complete(self) -> None:
-        """A group does not wait for excluded nodes."""
-        self.complete = self.request.expected is not ANY and all(
+    def _check_complete(self) -> None:
+        self.complete = all(
             index in self.replies or due.node in self.excluded for index, due in enumerate(self.expected)
         )
 
@@ -162,7 +112,7 @@ class Attempt(Step["Attempt | None"]):
         """The node of this reply sent something unexpected: a group loses that node, a single request fails."""
         if len(self.expected) > 1:
             self.excluded += tuple(due.node for due in self.expected if due.key == reply.key)
-            self.check_complete()
+            self._check_complete()
         else:
             self.fault = self.fault or "unexpected"
 
@@ -181,14 +131,13 @@ class Attempt(Step["Attempt | None"]):
         """The replies in the order expected; excluded nodes count as missing."""
         if self.request.expected is ANY:
             return Response(tuple(self.replies.values()), (), at)
-        taken = [
-            i for i, due in enumerate(self.expected) if i in self.replies and due.node not in self.excluded
-        ]
-        missing = () if len(taken) == len(self.expected) else self._missing(taken)
-        return Response(tuple([self.replies[index] for index in taken]), missing, at)
-
-    def _missing(self, taken: list[int]) -> tuple[int, ...]:
-        return tuple(due.node for index, due in enumerate(self.expected) if index not in taken)
+        replies, missing = [], []
+        for index, due in enumerate(self.expected):
+            if index in self.replies and due.node not in self.excluded:
+                replies.append(self.replies[index])
+            else:
+                missing.append(due.node)
+        return Response(tuple(replies), tuple(missing), at)
 
     def received(self) -> bytes:
         """All that came, for the error message."""

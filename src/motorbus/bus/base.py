@@ -16,19 +16,17 @@ from motorbus.bus.interlock import Interlock
 from motorbus.bus.nodes import Reading
 from motorbus.bus.stop import EmergencyStop
 from motorbus.bus.stop_socket import StopOutcome, asked_by
-from motorbus.bus.tasks import Notify, Pause, Tree, in_order
+from motorbus.bus.tasks import PRIORITY, Notify, Pause, Tree
 from motorbus.bus.turn import Turn
 from motorbus.core.family import BusDriver, Family, IdChanged
 from motorbus.core.request import Priority, Request
-from motorbus.core.steps import JournalEntry, Runnable
+from motorbus.core.steps import JournalEntry
 from motorbus.errors import LinkError, LinkLost, MotorbusError, RequestError
 from motorbus.link.base import Link, Renewable
 from motorbus.link.memory import MemoryLink
 
 IDLE = 0.25
 """s; the longest wait for data before the caller looks at its procedure again."""
-
-
 DRAIN: Final = 32
 """Reads by which a late host takes what is there before it takes the rest for late."""
 
@@ -38,7 +36,8 @@ class BaseBus:
 
     `interlock` judges requests that move a motor or switch torque; without it they are refused. `report` gets the
     events of procedures. `journal` gets the journal entries first. `stop_socket` is where another process can request
-    an emergency stop. `warnings` are for the user. `on_id_change` is called before a device gets another id.
+    an emergency stop. `warnings` are for the user. `on_id_change` is called before a device gets another id,
+    `on_reconnect` when the lost port was opened again, before anything is sent.
     """
 
     _open = False
@@ -82,9 +81,7 @@ class BaseBus:
         self.engine.before_motion = self._start_stopper
         self.reconnects = isinstance(link, Renewable)
         """A lost port is opened again by the next request. May be set to False only."""
-        self.watches: list[Tree[Any]] = []
-        """Procedures that are stepped whenever the bus is used; for virtual time, which passes only then."""
-        self._on_reconnect: list[Callable[[], None]] = []
+        self.on_reconnect: Callable[[], None] | None = None
         self._open = True
         if stop_socket is not None:
             self.stopper.start()
@@ -126,11 +123,6 @@ class BaseBus:
         """s on the clock of the link."""
         return self.link.now()
 
-    @property
-    def waits_for_stop(self) -> bool:
-        """An emergency stop in another thread needs the turn, and nothing is in flight."""
-        return self.engine.stopping and not self.engine.in_flight
-
     def check_thread(self) -> None:
         """Raise RequestError for a second thread on a simulated bus in virtual time; an emergency stop may."""
         if isinstance(self.link, MemoryLink) and self.link.virtual:
@@ -150,60 +142,59 @@ class BaseBus:
         moment = inf
         try:
             now = link.now()
-            if any(tree.sending for tree in trees) and (stale := link.read(now)):
+            waiting = [one for tree in trees for one in tree.sending]
+            if waiting and (stale := link.read(now)):
                 engine.feed(stale, now)  # it cannot answer what has not left
-            while (moment := self._send_next(trees, now)) == 0.0:
-                pass
+            while waiting and (moment := self._send_next(waiting, now)) == 0.0:
+                waiting = [one for tree in trees for one in tree.sending]
         except LinkError as error:
-            self._fail(self._lost(error), trees)
+            self._fail(self.lost(error), trees)
         self.hand_over()
         return moment
 
-    def _send_next(self, trees: Sequence[Tree[Any]], now: float) -> float:
+    def _send_next(self, waiting: list[Attempt | Pause], now: float) -> float:
         """Send the first that may leave and return 0; else the moment (s) from which one may, inf if unknown."""
         engine, moment = self.engine, inf
-        waiting = trees[0].sending if len(trees) == 1 else in_order(trees)
-        for one in waiting:
-            tree = one.task.tree
+        for one in sorted(waiting, key=PRIORITY):
             if not self._may_use_bus(one):
                 continue
             if isinstance(one, Pause):
                 if engine.in_flight:  # what is behind it waits, too
                     break
-                tree.sending.remove(one)
+                one.task.tree.sending.remove(one)
                 self._end_pause(one)
                 return 0.0
             if len(engine.in_flight) >= engine.window:
                 break
-            if blocked := engine.is_blocked(one, now):
+            if blocked := engine.blocked_until(one, now):
                 moment = min(moment, blocked)
                 continue
-            tree.sending.remove(one)
-            try:
-                if engine.needs_sync(one):
-                    engine.check_stops(one.request, one.since, one.stop_since)
-                    tree.send_back(one)
-                    return 0.0
-                engine.check(one.request, one.since, one.stop_since, now)
-            except Exception as error:  # also of the gate or of the driver
-                one.error = error
-                tree.end(one)
-            else:
-                self._write(tree, one, now)
+            one.task.tree.sending.remove(one)
+            self._send(one, now)
             return 0.0
         return moment
 
     def _may_use_bus(self, one: Attempt | Pause) -> bool:
-        if isinstance(one, Attempt) and one.request.priority is Priority.STOP:
+        if one.priority is Priority.STOP:
             return True
         owner = self.engine.exclusive
         return not self.engine.stopping and (owner is None or owner is one.task.owner)
 
-    def _write(self, tree: Tree[Any], attempt: Attempt, now: float) -> None:
-        engine = self.engine
+    def _send(self, attempt: Attempt, now: float) -> None:
+        engine, tree, request = self.engine, attempt.task.tree, attempt.request
+        try:
+            if engine.needs_sync(attempt):
+                engine.check_stops(request, attempt.since, attempt.stop_since)
+                tree.send_back(attempt)
+                return
+            engine.check(request, attempt.since, attempt.stop_since, now)
+        except Exception as error:  # also of the gate or of the driver
+            attempt.error = error
+            tree.end(attempt)
+            return
         engine.begin(attempt, now)
         try:
-            self.link.write(attempt.request.wire)
+            self.link.write(request.wire)
         except LinkLost as error:
             if not attempt.in_flight:
                 attempt.error = error
@@ -218,21 +209,20 @@ class BaseBus:
     def _end_pause(self, pause: Pause) -> None:
         """Nothing is in flight: set the rate, or give the bus to the task of this pause."""
         engine, task, tune = self.engine, pause.task, pause.tune
+        before, failure = engine.rate, None
         if tune is None:
             engine.exclusive = task
             task.tree.ready.append((task, None, None))
             return
-        before, failure = engine.rate, None
         try:
             if tune.rate:
                 self.link.tune(tune.rate)
                 engine.set_rate(tune.rate)
-        except LinkLost as error:
-            task.tree.ready.append((task, None, error))
-            raise
         except MotorbusError as error:
             failure = error
         task.tree.ready.append((task, before, failure))
+        if isinstance(failure, LinkLost):
+            raise failure
 
     def hand_over(self) -> None:
         """Give every attempt that has ended to the task that waits for it."""
@@ -254,22 +244,20 @@ class BaseBus:
         """
         engine, link = self.engine, self.link
         if engine.gone is not None:
-            self._wait_without_link(until)
+            if isinstance(link, Renewable) and self.reconnects:
+                link.rest(min(until, link.now() + IDLE))
             return
         try:
             looked = link.now()
             deadline = engine.next_deadline()
-            overdue = looked >= deadline
             chunks = link.read(min(until, deadline, looked + IDLE))
-            reads = (
-                0 if not overdue else DRAIN if engine.latency < DIRECT else 1
-            )  # an adapter gives all at once
-            while reads and chunks and (more := link.read(-inf)):
+            reads = DRAIN if engine.latency < DIRECT else 1  # an adapter gives all at once
+            while reads and chunks and looked >= deadline and (more := link.read(-inf)):
                 chunks = [*chunks, *more]
                 reads -= 1
             engine.feed(chunks, link.now(), looked)
         except LinkError as error:
-            self._fail(self._lost(error), trees)
+            self._fail(self.lost(error), trees)
         self.hand_over()
 
     def next_event(self, moment: float) -> float:
@@ -277,9 +265,10 @@ class BaseBus:
         due = self.link.due() if isinstance(self.link, MemoryLink) else inf
         return max(min(moment, self.engine.next_deadline(), due), self.now())
 
-    def _lost(self, error: LinkError) -> LinkError:
+    def lost(self, error: LinkError) -> LinkError:
+        """The link failed: all that waits fails with this error."""
         if isinstance(error, LinkLost):
-            error = failures.reconnecting(error) if self.reconnects else failures.final(error)
+            error = failures.lost(error, reconnects=self.reconnects)
         self.engine.lost(error)
         return error
 
@@ -292,19 +281,15 @@ class BaseBus:
         try:
             link.renew(engine.losses)
         except LinkError as error:
-            self._lost(error)
+            self.lost(error)
             return False
         engine.reconnected(link.now(), link.latency)
-        for function in self._on_reconnect:
-            function()
+        if self.on_reconnect is not None:
+            self.on_reconnect()
         if link.rate != engine.rate:
             with contextlib.suppress(MotorbusError):
                 link.tune(engine.rate)
         return True
-
-    def _wait_without_link(self, until: float) -> None:
-        if isinstance(self.link, Renewable) and self.reconnects:
-            self.link.rest(min(until, self.link.now() + IDLE))
 
     # -- observers ---------------------------------------------------------------------------------------------
 
@@ -347,30 +332,6 @@ class BaseBus:
         """A number that a stop of this node changes; None: of any node, an emergency stop or a lost port as well."""
         return self.engine.nodes.epoch if node is None else self.engine.nodes.last_stop(node)
 
-    @property
-    def loss_count(self) -> int:
-        """Number of times the port was lost."""
-        return self.engine.losses
-
-    def on_reconnect(self, function: Callable[[], None]) -> None:
-        """Call this function each time the lost port was opened again, before anything is sent."""
-        self._on_reconnect.append(function)
-
-    def required_reads(self, request: Request[Any]) -> Sequence[Runnable[Any]]:
-        """The reads that the interlock needs before it can check this request."""
-        return () if self.interlock is None else self.interlock.required_reads(request)
-
-    def watch(self, procedure: Runnable[Any]) -> Tree[Any]:
-        """Step this procedure whenever the bus is used, in virtual time, until `unwatch`."""
-        tree: Tree[Any] = Tree(self.engine, procedure, now=self.now, report=self.event_sink(None))
-        self.watches.append(tree)
-        return tree
-
-    def unwatch(self, tree: Tree[Any]) -> None:
-        """End what `watch` began."""
-        self.watches.remove(tree)
-        tree.drop()
-
     def expect_echo(self, test: Request[Any]) -> None:
         """Let the next reply to this request show whether the adapter echoes."""
         self.engine.echo.test = test
@@ -397,7 +358,9 @@ class BaseBus:
         Motion and torque are refused with Interrupted until `reset()`. May be called from any thread, but not from a
         signal handler (see `trigger_estop`). Raises LinkLost when the bus is closed.
         """
-        return self.stopper.estop()
+        if not self._open:
+            raise LinkLost("the bus is closed: no stop was sent", advice="open it again, or cut the power")
+        return self.stopper.stop()
 
     def trigger_estop(self) -> None:
         """Request an emergency stop and return at once; for signal handlers.

@@ -19,15 +19,13 @@ from motorbus.bus.attempt import Attempt
 from motorbus.bus.echo import Echo
 from motorbus.bus.interlock import Interlock
 from motorbus.bus.nodes import GATED, Nodes, addressed, is_refusal, moves
-from motorbus.bus.statistics import Statistics
-from motorbus.bus.sync import SyncTable
-from motorbus.bus.trace import Feed, TraceRecord
+from motorbus.bus.sync import SyncTable, is_read, must_sync
+from motorbus.bus.trace import Feed, Statistics, TraceRecord
 from motorbus.core.family import BusDriver
 from motorbus.core.request import (
     ANY,
     EVERY_LANE,
     Data,
-    Effect,
     Event,
     Expected,
     Noise,
@@ -71,8 +69,10 @@ class Engine:
         interlock: Interlock | None = None,
     ) -> None:
         self.driver = driver
-        self.window = min(driver.window, queue or driver.window)
+        self.rate = rate
+        self.latency = latency
         self.paced = paced
+        self.window = min(driver.window, queue or driver.window)
         self.interlock = interlock
         self.before_motion: Callable[[], None] | None = None
         """Called when the interlock has passed a request; the bus sets it to None after the first."""
@@ -83,18 +83,16 @@ class Engine:
         self.statistics = Statistics()
         self.sync = SyncTable(driver)
         self.echo = Echo(possible=driver.family.link.kind == "bytes")
-        self.receiver = driver.receiver()
-        self.holds_data = False
-        """The receiver holds a part of a frame."""
         self.nodes = Nodes(driver, rate)
+        self.receiver = driver.receiver()
+        self.holds_data = False  # the receiver holds a part of a frame
         self.in_flight: dict[int, Attempt] = {}
         self.done: deque[Attempt] = deque()
         """Attempts that have ended, in order, for the scheduler of their tasks."""
         self.notification_handlers: list[Callable[[Notification], None]] = []
         self.end_sleeps: list[Callable[[BaseException], None]] = []
         """Called with the error when an emergency stop is latched or the port is lost: procedures that sleep end."""
-        self.exclusive: object = None
-        """The task that has the bus alone."""
+        self.exclusive: object = None  # the task that has the bus alone
         self.latched = self.stopping = False
         self.latched_by = ""
         self.latched_at = self.lost_at = 0
@@ -105,62 +103,38 @@ class Engine:
         self.free_at = 0.0
         self.full_until = 0.0
         """s; the link was full, and nothing is written before."""
-        self._rate = rate
-        self._latency = latency
-        self._timing = object()
         self._recent: deque[Attempt] = deque(maxlen=RECENT)
-        self._wires: deque[bytes] = deque(maxlen=8)
+        self._wires: deque[Data] = deque(maxlen=8)
         """What was sent last: an echo of it is no reply."""
         self._repeats: dict[int, tuple[tuple[Expected, ...], int]] = {}
         """By lane, the last replies expected, and how often in a row."""
         self._last: Attempt | None = None
-        """The last accepted attempt that read positions."""
+        """The last accepted attempt that read positions, if all its nodes answered."""
 
     # -- time --------------------------------------------------------------------------------------------------
 
     @property
-    def rate(self) -> int:
-        """bit/s"""
-        return self._rate
-
-    @rate.setter
-    def rate(self, rate: int) -> None:
-        self._rate, self._timing = rate, object()
-
-    @property
-    def latency(self) -> float:
-        """s that the adapter may hold data back; part of every deadline."""
-        return self._latency
-
-    @latency.setter
-    def latency(self, seconds: float) -> None:
-        self._latency, self._timing = seconds, object()
-
-    @property
     def quiet_time(self) -> float:
         """s of silence before a node out of sync is probed."""
-        return self.driver.quiet_time(self._rate)
+        return self.driver.quiet_time(self.rate)
 
     def air_time(self, request: Request[Any]) -> float:
         """s on the wire of this request and its replies."""
-        return self.driver.air_time(request, self._rate)
+        return self.driver.air_time(request, self.rate)
 
     def reply_timeout(self, request: Request[Any]) -> float:
         """s from the end of the air time to the deadline.
 
         For a scan on a link that holds nothing back: the shorter of the normal and the scan turnaround, no margin.
         """
-        if request.reply_within is TimeoutClass.SCAN and self._latency < DIRECT:
+        if request.reply_within is TimeoutClass.SCAN and self.latency < DIRECT:
             plain: Request[Response] = Request(request.wire, request.expected)
-            return min(self.driver.turnaround(plain), self.driver.turnaround(request)) + self._latency
-        return self.driver.turnaround(request) + self._latency + MARGIN[request.reply_within]
+            return min(self.driver.turnaround(plain), self.driver.turnaround(request)) + self.latency
+        return self.driver.turnaround(request) + self.latency + MARGIN[request.reply_within]
 
     def next_deadline(self) -> float:
         """The next moment (s) at which an attempt in flight ends; inf when there is none."""
-        deadline = inf
-        for attempt in self.in_flight.values():
-            deadline = min(deadline, attempt.deadline)
-        return deadline
+        return min([attempt.deadline for attempt in self.in_flight.values()], default=inf)
 
     # -- what may leave ----------------------------------------------------------------------------------------
 
@@ -177,10 +151,9 @@ class Engine:
             or now < (self.free_at if self.paced else self.full_until)
         )
 
-    def is_blocked(self, attempt: Attempt, now: float) -> float:
+    def blocked_until(self, attempt: Attempt, now: float) -> float:
         """The moment (s) from which this attempt may leave, inf if another one must end first; 0: at once."""
-        lane = attempt.request.lane
-        if lane in self.in_flight:
+        if attempt.request.lane in self.in_flight:
             return inf
         free = max(self.full_until, self.free_at if self.paced else 0.0)
         if attempt.is_probe:
@@ -191,17 +164,15 @@ class Engine:
         """A node of this attempt, which is no probe, is out of sync: it must be probed first."""
         if not self.sync.out_of_sync or attempt.is_probe or not must_sync(attempt.request):
             return False
-        return any(node not in attempt.excluded for node in self.sync.doubtful(attempt.request))
+        return not set(self.sync.doubtful(attempt.request)) <= set(attempt.excluded)
 
     def put_off(self, request: Request[Any], now: float) -> tuple[int, ...] | None:
         """The nodes out of sync for which a group does not wait now; None if one must be probed first."""
-        if not must_sync(request):
+        nodes = tuple(self.sync.doubtful(request)) if must_sync(request) else ()
+        if not nodes:
             return ()
-        nodes = tuple(self.sync.doubtful(request))
-        put_off = request.expected is not ANY and len(nodes) < len(request.expected)
-        if nodes and not (put_off and all(self.sync.is_put_off(node, now) for node in nodes)):
-            return None
-        return nodes
+        others = request.expected is not ANY and len(nodes) < len(request.expected)
+        return nodes if others and all(self.sync.is_put_off(node, now) for node in nodes) else None
 
     def check(self, request: Request[Any], since: int, stop_since: int, now: float) -> None:
         """Raise the error that forbids sending this request now.
@@ -252,28 +223,23 @@ class Engine:
         if request.decode_exact is None:
             return Attempt(request)
         attempt: Attempt | None = request.attempt
-        if attempt is not None and (attempt.in_flight or attempt.task is not None):
-            return Attempt(request)  # another caller has sent it, or waits to send it
-        if attempt is None or attempt.timing is not self._timing:
+        if attempt is None:
             attempt = request.attempt = Attempt(request)
-            self.measure(attempt)
+        elif attempt.in_flight or attempt.task is not None:
+            return Attempt(request)  # another caller has sent it, or waits to send it
         return attempt
-
-    def measure(self, attempt: Attempt) -> None:
-        """Compute its times for the present rate and latency."""
-        attempt.air = self.air_time(attempt.request)
-        attempt.budget = attempt.air + self.reply_timeout(attempt.request)
-        attempt.timing = self._timing
-        for node in attempt.nodes:
-            self.sync.of(node)
 
     def begin(self, attempt: Attempt, now: float) -> None:
         """Record an attempt before its request is written; `written` or `not_written` follows."""
         request = attempt.request
         if self.holds_data:  # bytes from before the request are no part of its reply
             self._flush(now)
-        if attempt.timing is not self._timing:
-            self.measure(attempt)
+        if attempt.timing != (self.rate, self.latency):
+            attempt.timing = self.rate, self.latency
+            attempt.air = self.air_time(request)
+            attempt.budget = attempt.air + self.reply_timeout(request)
+            for node in attempt.nodes:
+                self.sync.of(node)
         if attempt.is_used:
             attempt.reset()
         attempt.sent_at = now
@@ -285,25 +251,11 @@ class Engine:
                 self._recent.append(attempt)
         if (request.effect or request.setpoints) and request.priority is not Priority.STOP:
             self.nodes.ordered(request)
-        if type(request.wire) is bytes:
-            self._wires.append(request.wire)
-            if self.echo.present is not False:
-                self.echo.sent(request.wire)
+        self._wires.append(request.wire)
+        if self.echo.present is not False and isinstance(request.wire, bytes):
+            self.echo.sent(request.wire)
         if self.trace.subscriptions:
             self.trace.put(TraceRecord(now, "tx", request.wire))
-
-    def begin_order(self, order: Request[Any], now: float) -> None:
-        """Record an order without replies that is written in front of the next request."""
-        if order.priority is Priority.STOP:
-            self.note_stop(order)
-        else:
-            self.nodes.ordered(order)
-        self.free_at = max(now, self.free_at) + self.air_time(order)
-        self.statistics.other["sent"] += 1
-        if type(order.wire) is bytes:
-            self._wires.append(order.wire)
-        if self.trace.subscriptions:
-            self.trace.put(TraceRecord(now, "tx", order.wire))
 
     def written(self, attempt: Attempt) -> None:
         """Its data was written. A request without replies has ended."""
@@ -363,16 +315,14 @@ class Engine:
         """
         at = min(at, attempt.deadline)  # the host was late
         value = attempt.request.decode_exact(data, at)  # type: ignore[misc]  # the caller has looked
-        if value is None or attempt.excluded:
+        if value is None:
             return PENDING
         if self.trace.subscriptions:
             self.trace.put(TraceRecord(at, "rx", data))
         del self.in_flight[attempt.request.lane]
         attempt.in_flight = False
         attempt.data, attempt.answer = data, None
-        self._note(attempt, at)
-        if self.sync.out_of_sync:
-            self._confirm(attempt, attempt.nodes)
+        self._note(attempt, at, attempt.nodes, True)
         return value
 
     def feed(self, chunks: Sequence[Data], now: float, looked: float | None = None) -> None:
@@ -396,19 +346,16 @@ class Engine:
 
     def _take_all(self, events: Sequence[Event], now: float) -> None:
         for event in events:
-            if type(event) is Reply:
+            if isinstance(event, Reply):
                 self._take_reply(event, now)
-            elif type(event) is Notification:
-                self._take_notice(event, now)
-            elif type(event) is Noise:
+            elif isinstance(event, Noise):
                 self._take_noise(event, now)
-
-    def _take_notice(self, event: Notification, now: float) -> None:
-        self.statistics.other["notices"] += 1
-        notice = event._replace(at=now)
-        self.notices.put(notice)
-        for handle in tuple(self.notification_handlers):
-            handle(notice)
+            else:
+                self.statistics.other["notices"] += 1
+                notice = event._replace(at=now)
+                self.notices.put(notice)
+                for handle in tuple(self.notification_handlers):
+                    handle(notice)
 
     def _take_reply(self, reply: Reply, now: float) -> None:
         attempt = self.in_flight.get(reply.lane)
@@ -443,11 +390,8 @@ class Engine:
     def _take_unexpected(self, attempt: Attempt | None, reply: Reply, now: float) -> None:
         if self._settle_late(reply) or self._take_for_all(reply):
             return
-        if (
-            attempt is not None
-            and not attempt.is_probe
-            and any(due.key == reply.key for due in attempt.expected)
-        ):
+        keys = [] if attempt is None or attempt.is_probe else [due.key for due in attempt.expected]
+        if attempt is not None and reply.key in keys:
             attempt.exclude(reply)
             self.statistics.other["unexpected"] += 1
         else:
@@ -499,8 +443,7 @@ class Engine:
             if held:
                 self._take_all(self.receiver.feed(held), now)
             self._flush(now)
-            if attempt.in_flight:  # what was held has not completed it
-                self._end(attempt, now)
+            self._end(attempt, now)
 
     def _end(self, attempt: Attempt, now: float) -> None:
         """End an attempt: accept its replies (of a group, those that came) or set its fault."""
@@ -512,11 +455,9 @@ class Engine:
             attempt.fault = "unexpected"
         del self.in_flight[request.lane]
         attempt.in_flight, attempt.is_used = False, True
-        missing = expected if attempt.fault else ()
-        if answer.missing and not attempt.fault:
-            missing = tuple(due for due in expected if due.node in answer.missing)
-        for due in missing:
-            self._miss(attempt, due, now)
+        for due in expected:
+            if attempt.fault or due.node in answer.missing:
+                self._miss(attempt, due, now)
         if not attempt.fault or not expected:
             attempt.accepted = answer
             self._accept_response(attempt, answer)
@@ -544,44 +485,36 @@ class Engine:
             nodes = tuple([node for node in nodes if node not in answer.missing])
             for node in answer.missing if request.reports_position else ():
                 self.nodes.sources.pop(node, None)  # its source may be this attempt, which has no reply of it
-        if request.priority is not Priority.STOP and self.sync.out_of_sync:
-            self._confirm(attempt, nodes)  # an earlier reply may follow a stop, which puts no node in sync
-        reads = request.reports_position and not is_refusal(request, answer)
+        reads = bool(request.reports_position) and not is_refusal(request, answer)
         if reads:
             attempt.answer = answer
-        self._note(attempt, answer.at, nodes, reads=bool(reads))
+        self._note(attempt, answer.at, nodes, reads)
 
-    def _confirm(self, attempt: Attempt, nodes: Sequence[int]) -> None:
-        for node in nodes:
-            self.sync.confirm(node, probe=attempt.is_probe)
-
-    def _note(
-        self, attempt: Attempt, at: float, nodes: tuple[int, ...] | None = None, *, reads: bool = True
-    ) -> None:
-        """Note an accepted reply: its position, its time, and how often in a row an equal one was expected."""
+    def _note(self, attempt: Attempt, at: float, nodes: tuple[int, ...], reads: bool) -> None:
+        """Note an accepted reply: who is in sync, the position, how often in a row an equal one was expected."""
         request, known = attempt.request, self.nodes
-        nodes = attempt.nodes if nodes is None else nodes
         attempt.at = at
+        if self.sync.out_of_sync and request.priority is not Priority.STOP:
+            for node in nodes:  # an earlier reply may follow that to a stop, which puts no node in sync
+                self.sync.confirm(node, probe=attempt.is_probe)
         if reads and request.reports_position:
             attempt.orders = known.orders
             if self._last is not attempt or nodes is not attempt.nodes:
                 known.sources.update(dict.fromkeys(nodes, attempt))
                 self._last = attempt if nodes is attempt.nodes else None
-        known.rate = self._rate
+        known.rate = self.rate
         if not known.known.issuperset(nodes):
             known.add(nodes)
-        self.statistics.answered(nodes, at - attempt.sent_at)
+        for node in nodes:
+            (self.statistics.nodes.get(node) or self.statistics.of(node)).ok += 1
         expected, count = self._repeats.get(request.lane, ((), 0))
-        if attempt.expected != expected or not self.driver.probe_after:
-            self._repeats[request.lane] = attempt.expected, 1
-        elif count < self.driver.probe_after:
-            self._repeats[request.lane] = expected, count + 1
-        else:
-            self._repeats[request.lane] = expected, 1
-            for due in attempt.expected:
+        if attempt.expected == expected and 0 < self.driver.probe_after <= count:
+            count = 0
+            for due in attempt.expected:  # a reply may have been copied: a probe of one node shows that
                 if due.node not in self.sync.out_of_sync:
                     self.sync.mark_owed(request.lane, due, 0.0)
                     break
+        self._repeats[request.lane] = attempt.expected, count + 1 if attempt.expected == expected else 1
 
     # -- loss, stop --------------------------------------------------------------------------------------------
 
@@ -607,7 +540,7 @@ class Engine:
         for end in tuple(self.end_sleeps):
             end(error)
         for attempt in self.in_flight.values():
-            attempt.deadline = min(attempt.deadline, now + self._remaining(attempt, now) + self._latency)
+            attempt.deadline = min(attempt.deadline, now + self._remaining(attempt, now) + self.latency)
             if self.window == 1 or not is_read(attempt.request):
                 attempt.error = error
 
@@ -644,8 +577,12 @@ class Engine:
                 for end in tuple(self.end_sleeps):
                     end(error)
             self.gone = error
-            self.nodes.forget()
-            self._last = None
+            self._forget_positions()
+
+    def _forget_positions(self) -> None:
+        """The devices may have restarted."""
+        self.nodes.sources.clear()
+        self._last = None
 
     def reconnected(self, now: float, latency: float) -> None:
         """The port is open again: all nodes are out of sync and their positions unknown; the nodes stay known."""
@@ -653,21 +590,10 @@ class Engine:
         self.receiver, self.holds_data = self.driver.receiver(), False
         self.echo.reset()
         self.sync.mark_all(now + self.quiet_time)
-        self.nodes.forget()
-        self._last = None
+        self._forget_positions()
         self.gone = None
 
     def set_rate(self, rate: int) -> None:
         """The link has this rate (bit/s) now."""
         self.rate = rate
         self.receiver, self.holds_data = self.driver.receiver(), False
-
-
-def must_sync(request: Request[Any]) -> bool:
-    """The nodes of this request must be in sync: not of a stop, nor of a scan, whose usual answer is silence."""
-    return request.priority is not Priority.STOP and request.reply_within is not TimeoutClass.SCAN
-
-
-def is_read(request: Request[Any]) -> bool:
-    """Sending it again changes nothing."""
-    return request.repeatable and request.effect is Effect.NONE

@@ -58,7 +58,7 @@ FAULTS: Final[dict[str, tuple[type[MotorbusError], str, str]]] = {
 """Faults of an attempt: the error, its likely cause and what to do."""
 REOPEN: Final = ", then open the bus again"
 RECONNECTING: Final = (
-    "the next request looks for the port again; requests of before the loss are not repeated"
+    "; the next request looks for the port again; requests of before the loss are not repeated"
 )
 
 
@@ -141,17 +141,11 @@ def outlived(request: Request[Any] | None = None) -> LinkLost:
     )
 
 
-def reconnecting(error: LinkLost) -> LinkLost:
-    """The same error, saying that the port is looked for again."""
-    if RECONNECTING not in error.advice:
-        error.advice = f"{error.advice or 'check the cable'}; {RECONNECTING}"
-    return error
-
-
-def final(error: LinkLost) -> LinkLost:
-    """The same error, saying that this bus does not look for the port."""
-    if REOPEN not in error.advice:
-        error.advice = f"{error.advice or 'check the cable'}{REOPEN}"
+def lost(error: LinkLost, *, reconnects: bool) -> LinkLost:
+    """The same error, saying whether this bus looks for the port."""
+    advice = RECONNECTING if reconnects else REOPEN
+    if advice not in error.advice:
+        error.advice = f"{error.advice or 'check the cable'}{advice}"
     return error
 
 

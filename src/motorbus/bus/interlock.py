@@ -8,7 +8,6 @@ from typing import Any, Final, Protocol
 
 from motorbus.core.request import Effect, Priority, Request
 from motorbus.core.setpoint import Setpoint
-from motorbus.core.steps import Runnable
 from motorbus.errors import LimitExceeded
 
 ROUNDING: Final = 1e-9
@@ -24,9 +23,6 @@ class Interlock(Protocol):
 
         Called at every attempt, never for a stop.
         """
-
-    def required_reads(self, request: Request[Any], /) -> Sequence[Runnable[Any]]:
-        """The reads that must be carried out before this request can be checked."""
 
     def stopped(self, nodes: Sequence[int], /) -> None:
         """A stop for these nodes (empty: all) was requested and will be sent. May be called from any thread."""
@@ -48,9 +44,6 @@ class DeviceLimits:
             )
         for setpoint in request.setpoints:
             check_limits(setpoint)
-
-    def required_reads(self, request: Request[Any], /) -> Sequence[Runnable[Any]]:
-        return ()
 
     def stopped(self, nodes: Sequence[int], /) -> None:
         return

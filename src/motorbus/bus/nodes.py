@@ -7,8 +7,9 @@ node has left since: a goal at an old position would be an order to move back.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
+from motorbus.bus.attempt import Attempt
 from motorbus.core.family import BusDriver, Stop
 from motorbus.core.request import ANY, Effect, Priority, Request, Response
 from motorbus.core.setpoint import Setpoint, Stays
@@ -21,14 +22,6 @@ ENDLESS: Final = ("velocity", "load", "current")
 """Quantities that a device obeys until another order comes."""
 
 Reading = tuple[Request[Any], Response]
-
-
-class Source(Protocol):
-    """An accepted request whose reply begins with a position. `orders`: how many orders had left before it."""
-
-    orders: int
-
-    def reading(self) -> Reading: ...
 
 
 class Nodes(Mapping[int, Reading]):
@@ -46,7 +39,8 @@ class Nodes(Mapping[int, Reading]):
         self.epoch = self.stopped_all = 0
         self.stops: dict[int, int] = {}
         """By node, the epoch of its last stop; `stopped_all` is that of the last stop of all."""
-        self.sources: dict[int, Source] = {}
+        self.sources: dict[int, Attempt] = {}
+        """By node, the last accepted attempt that read its position."""
         self._ordered: dict[tuple[int, ...], int] = {}  # by the nodes that an order was for (empty: all)
 
     # -- positions ---------------------------------------------------------------------------------------------
@@ -109,10 +103,6 @@ class Nodes(Mapping[int, Reading]):
         """A node of this request, which moves something, was stopped after this epoch."""
         nodes = addressed(request) or self.stops.keys()
         return self.stopped_all > since or any(self.stops.get(node, 0) > since for node in nodes)
-
-    def forget(self) -> None:
-        """The devices may have restarted: no position counts any more."""
-        self.sources.clear()
 
     def stop_requests(self, now: float, nodes: Iterable[int]) -> Stop:
         """Requests that stop these nodes; without positions where the family fails to use them."""

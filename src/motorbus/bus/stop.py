@@ -19,18 +19,16 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from threading import Lock, Thread, current_thread
-from typing import Any, Final, Protocol
+from typing import Any, Final
 from weakref import ref
 
 from motorbus.bus.engine import Engine
 from motorbus.bus.nodes import GATED
 from motorbus.bus.stop_socket import LONGEST, STOP_TIMEOUT, StopOutcome, asked_by, client_name, open_socket
 from motorbus.bus.tasks import Tree
-from motorbus.bus.turn import Turn
 from motorbus.core.request import ANY, Priority, Request
 from motorbus.core.steps import Sleep, catch, gather
-from motorbus.errors import LinkError, LinkFull, LinkLost
-from motorbus.link.base import Link
+from motorbus.errors import LinkError, LinkFull
 
 ROUNDS_TIME: Final = 3.0
 """s for all rounds of a stop, less than `STOP_TIMEOUT`."""
@@ -88,25 +86,13 @@ async def _stop_node(
 
 def node_of(request: Request[Any]) -> int:
     """The node that answers this request, -1 for none."""
-    return -1 if not request.expected or request.expected is ANY else request.expected[0].node
-
-
-class StoppableBus(Protocol):
-    """What the stop needs of a bus."""
-
-    link: Link
-    engine: Engine
-    turn: Turn
-
-    def now(self) -> float: ...
-    def send(self, trees: Sequence[Tree[Any]]) -> float: ...
-    def receive(self, until: float, trees: Sequence[Tree[Any]]) -> None: ...
+    return -1 if request.expected is ANY or not request.expected else request.expected[0].node
 
 
 class EmergencyStop:
-    """The emergency stop of one bus, which it keeps alive only while it stops."""
+    """The emergency stop of one bus (a `BaseBus`), which it keeps alive only while it stops."""
 
-    def __init__(self, bus: StoppableBus, socket_path: Path | None = None) -> None:
+    def __init__(self, bus: Any, socket_path: Path | None = None) -> None:
         self._bus = ref(bus)
         self.socket_path = socket_path
         self._sockets: tuple[socket.socket, socket.socket] | None = None
@@ -116,12 +102,9 @@ class EmergencyStop:
         self._closed = False
 
     @property
-    def bus(self) -> StoppableBus:
-        """The bus. Raises LinkLost when it was dropped."""
-        bus = self._bus()
-        if bus is None:
-            raise LinkLost("the bus was dropped: no stop was sent", advice="open it again, or cut the power")
-        return bus
+    def bus(self) -> Any:
+        """The bus; None when it was dropped, which ends the thread."""
+        return self._bus()
 
     def start(self) -> None:
         """Start the thread, unless it runs or time is virtual.
@@ -131,19 +114,20 @@ class EmergencyStop:
         if self._thread is not None or self.bus.link.virtual:
             return
         with self._starting:
-            if self._thread is None and not self._closed:
-                self._sockets = self._sockets or open_socket(self.socket_path)
-                self._sockets[1].setblocking(False)
-                thread = Thread(target=self._serve, args=self._sockets[:1], name="motorbus stop", daemon=True)
-                try:
-                    thread.start()
-                except RuntimeError as error:
-                    raise LinkError(
-                        "the system gives no more threads, and what moves needs one that can stop it",
-                        advice="end processes that hold many threads; nothing was sent",
-                    ) from error
-                self._thread = thread
-                atexit.register(self.close)
+            if self._thread is not None or self._closed:
+                return
+            self._sockets = self._sockets or open_socket(self.socket_path)
+            self._sockets[1].setblocking(False)
+            thread = Thread(target=self._serve, args=self._sockets[:1], name="motorbus stop", daemon=True)
+            try:
+                thread.start()
+            except RuntimeError as error:
+                raise LinkError(
+                    "the system gives no more threads, and what moves needs one that can stop it",
+                    advice="end processes that hold many threads; nothing was sent",
+                ) from error
+            self._thread = thread
+            atexit.register(self.close)
 
     def move(self, path: Path | None) -> None:
         """Serve this path from now on; None: a hidden one, for the old path belongs to another process now."""
@@ -154,43 +138,31 @@ class EmergencyStop:
         with contextlib.suppress(OSError):
             before.replace(self.socket_path)
 
-    def trigger(self) -> None:
+    def trigger(self, word: bytes = STOP) -> None:
         """Request a stop and return at once; for signal handlers. Does nothing before `start`."""
-        self._wake(STOP)
-
-    def _wake(self, word: bytes) -> None:
         if self._sockets is not None:
             with contextlib.suppress(OSError):
                 self._sockets[1].send(word)
 
-    def estop(self) -> StopOutcome:
-        """Stop, in the calling thread, and give the outcome. Raises LinkLost when the bus is closed."""
-        if self._closed:
-            raise LinkLost("the bus is closed: no stop was sent", advice="open it again, or cut the power")
-        return self.stop()
-
     def stop(self, client: str = "") -> StopOutcome:
         """Latch the engine and send the stop frames, in the calling thread. Raises what the driver raises."""
-        engine, by = self.bus.engine, asked_by(client)
+        bus, engine, by = self.bus, self.bus.engine, asked_by(client)
         engine.announce_stop(by)
         try:
-            return self._stop(by)
+            if bus.turn.acquire(Priority.STOP, engine.stop_delay(bus.now())):
+                return self._stop_with_turn(by)
+            stop = engine.nodes.stop_requests(bus.now(), engine.nodes.known)
+            disturbs_no_reply = [request for request in stop.requests if not request.expected]
+            for request in disturbs_no_reply or stop.requests:
+                engine.note_stop(request)
+                self._write_blind(request)
+            if bus.turn.acquire(Priority.STOP, STOP_TIMEOUT):
+                return self._stop_with_turn(by)
+            silent = tuple(sorted(engine.nodes.known))
+            promise = f"{stop.promise}; sent once, no acknowledgement could be read"
+            return StopOutcome((), silent, 1, promise)
         finally:
             engine.stop_sent()
-
-    def _stop(self, by: str) -> StopOutcome:
-        bus, engine = self.bus, self.bus.engine
-        if bus.turn.acquire(Priority.STOP, engine.stop_delay(bus.now())):
-            return self._stop_with_turn(by)
-        stop = engine.nodes.stop_requests(bus.now(), engine.nodes.known)
-        disturbs_no_reply = [request for request in stop.requests if not request.expected]
-        for request in disturbs_no_reply or stop.requests:
-            engine.note_stop(request)
-            self._write_blind(request)
-        if bus.turn.acquire(Priority.STOP, STOP_TIMEOUT):
-            return self._stop_with_turn(by)
-        silent = tuple(sorted(engine.nodes.known))
-        return StopOutcome((), silent, 1, f"{stop.promise}; sent once, no acknowledgement could be read")
 
     def _write_blind(self, request: Request[Any]) -> None:
         """Write a frame of a stop without the turn; while the link is full, again and again until its deadline."""
@@ -234,36 +206,28 @@ class EmergencyStop:
     # -- the thread --------------------------------------------------------------------------------------------
 
     def _serve(self, server: socket.socket) -> None:
+        """Stop whenever a datagram asks for it: once for all that ask now."""
         while True:
-            try:
-                self._serve_all(server, _receive(server))
-                if self._closed:
-                    return
-            except OSError:  # the client is gone, or the socket was closed
-                if self._closed:
-                    return
+            with contextlib.suppress(OSError):  # the socket was closed
+                received = [server.recvfrom(LONGEST)]
+                while received[-1][0] and select.select((server,), (), (), 0.0)[0]:
+                    received.append(server.recvfrom(LONGEST))
+                clients = [one for one in received if one[0].startswith(b"estop")]
+                if clients or any(STOP in data and not data.strip(STOP + END) for data, _ in received):
+                    self._stop_for(server, clients)
+            if self._closed:
+                return
 
-    def _serve_all(self, server: socket.socket, received: list[tuple[bytes, Any]]) -> None:
-        """One stop for all who ask now."""
-        clients = [
-            (about, address)
-            for word, _, about, address in (
-                (*data.strip().partition(b" "), address) for data, address in received
-            )
-            if word == b"estop"
-        ]
-        if clients or any(STOP in data and not data.strip(STOP + END) for data, _ in received):
-            outcome = self._outcome(client_name(clients[0][0]) if clients else "")
-            for _, address in clients:
-                if address:
-                    with contextlib.suppress(OSError):  # the client is gone
-                        server.sendto(json.dumps(outcome._asdict()).encode(), address)
-
-    def _outcome(self, client: str = "") -> StopOutcome:
+    def _stop_for(self, server: socket.socket, clients: Sequence[tuple[bytes, Any]]) -> None:
+        client = client_name(clients[0][0].removeprefix(b"estop")) if clients else ""
         try:
-            return self.stop(client)
+            outcome = self.stop(client)
         except Exception as error:  # the thread must serve the next request
-            return StopOutcome((), (), 0, f"nothing: {error}")
+            outcome = StopOutcome((), (), 0, f"nothing: {error}")
+        for _, address in clients:
+            if address:
+                with contextlib.suppress(OSError):  # the client is gone
+                    server.sendto(json.dumps(outcome._asdict()).encode(), address)
 
     def close(self) -> None:
         """End the thread when a stop that has begun is over. Nothing else is sent."""
@@ -271,7 +235,7 @@ class EmergencyStop:
         if self._starting.acquire(timeout=STOP_TIMEOUT):
             self._starting.release()
         atexit.unregister(self.close)
-        self._wake(END)
+        self.trigger(END)
         if self._thread is not None and self._thread is not current_thread():
             self._thread.join(STOP_TIMEOUT)
         for end in self._sockets or ():
@@ -279,11 +243,3 @@ class EmergencyStop:
         if self._sockets and self.socket_path is not None:
             self.socket_path.unlink(missing_ok=True)
         self._sockets = None
-
-
-def _receive(server: socket.socket) -> list[tuple[bytes, Any]]:
-    """Wait for a datagram; all that are there, with their senders."""
-    received = [server.recvfrom(LONGEST)]
-    while received[-1][0] and select.select((server,), (), (), 0.0)[0]:
-        received.append(server.recvfrom(LONGEST))
-    return received

@@ -1,4 +1,4 @@
-"""Which nodes are in sync. A node changes its state in `SyncTable._fire` and nowhere else.
+"""Which nodes are in sync, and what is done for a request in trouble. A state changes in `SyncTable._fire` only.
 
 A node whose reply did not come in time owes it. Before the next request to it the bus is silent for a quiet time, then
 sends a probe: a request whose reply differs in key or length from every reply that the node owes. A link is first in,
@@ -8,13 +8,26 @@ first out, so when the probe is answered no older reply can follow. Decision rec
 from __future__ import annotations
 
 from enum import Enum
-from typing import Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
+from motorbus.bus import failures
+from motorbus.bus.attempt import Attempt
 from motorbus.core.family import BusDriver
-from motorbus.core.request import ANY, Expected, Key, Request
+from motorbus.core.request import ANY, Effect, Expected, Key, Priority, Request, Response, TimeoutClass
+from motorbus.core.steps import Sleep
+from motorbus.errors import MotorbusError
+
+if TYPE_CHECKING:
+    from motorbus.bus.engine import Engine
+
+RETRIES: Final = 2
+"""Attempts of a repeatable request after the first."""
 
 PROBES: Final = 64
 """Probes compared with what a node owes, to find one that differs."""
+BACK_OFF: Final = 0.25
+"""A silent node of a group is probed again after this part of its silence: twice at least before a control loop, which
+ends after 0.3 s without a position, gives it up."""
 LONGEST_BACK_OFF: Final = 1.0
 """s between probes of a silent node of a group."""
 
@@ -51,17 +64,13 @@ MOVES: Final = {
 class NodeSync:
     """One node: what it owes (the oldest first), and when (s) it may be asked.
 
-    `silences` are probes in a row without an answer; a group does not wait for the node before `probe_at`.
+    Its first probe without an answer was at `silent_since`; a group does not wait for it before `probe_at`.
     """
-
-    __slots__ = ("owed", "probe_at", "probes", "quiet_until", "silences", "state")
 
     def __init__(self) -> None:
         self.state = IN_SYNC
         self.owed: dict[Kind, None] = {}
-        self.quiet_until = 0.0
-        self.silences = 0
-        self.probe_at = 0.0
+        self.quiet_until = self.silent_since = self.probe_at = 0.0
         self.probes = 0
 
 
@@ -91,7 +100,7 @@ class SyncTable:
         if node.state is IN_SYNC:
             self.out_of_sync.discard(number)
             node.owed.clear()
-            node.silences = 0
+            node.silent_since = node.probe_at = 0.0
         else:
             self.out_of_sync.add(number)
         return node
@@ -114,7 +123,7 @@ class SyncTable:
         """The port was lost and is back: what any node owes may still come."""
         for number in self.nodes:
             node = self._fire(number, "doubted")
-            node.quiet_until, node.silences = quiet_until, 0
+            node.quiet_until, node.silent_since, node.probe_at = quiet_until, 0.0, 0.0
 
     def confirm(self, number: int, *, probe: bool) -> None:
         """A reply of this node was accepted. A node that owes others is in sync again only after a probe."""
@@ -134,31 +143,30 @@ class SyncTable:
         """A probe of this node whose reply it does not owe; where it owes all of them, the longest owed."""
         node = self.of(number)
         owed: dict[Kind, Request[bool]] = {}
-        first: Request[bool] | None = None
-        for _ in range(PROBES):
+        wires: set[object] = set()
+        while len(wires) < PROBES:
             probe = self.driver.probe(number, node.probes)
-            first = first or probe
-            if owed and probe.wire == first.wire:  # all probes of the family were compared
+            if probe.wire in wires:  # all probes of the family were compared
                 break
+            wires.add(probe.wire)
             node.probes += 1
             kind = kind_of(probe)
             if kind not in node.owed:
                 return probe
-            if kind not in owed:
-                owed[kind] = probe
+            owed[kind] = probe
         return next(owed[kind] for kind in node.owed if kind in owed)
 
     def back_off(self, number: int, now: float, quiet: float) -> None:
         """A probe was not answered: probe this node less often while groups are read."""
         node = self.of(number)
-        node.silences += 1
         node.quiet_until = now
-        node.probe_at = now + min(quiet * 2.0 ** min(node.silences, 10), LONGEST_BACK_OFF)
+        node.silent_since = node.silent_since or now
+        pause = max(quiet, BACK_OFF * (now - node.silent_since))
+        node.probe_at = now + min(pause, LONGEST_BACK_OFF)
 
     def is_put_off(self, number: int, now: float) -> bool:
         """A group does not wait for this node now: it was silent lately."""
-        node = self.nodes[number]
-        return bool(node.silences) and now < node.probe_at
+        return now < self.nodes[number].probe_at
 
 
 def kind_of(probe: Request[bool]) -> Kind:
@@ -166,3 +174,89 @@ def kind_of(probe: Request[bool]) -> Kind:
     (due,) = probe.expected  # type: ignore[misc]  # a probe has one reply
     assert not due.refusal, "a probe accepts no refusal"
     return probe.lane, due.key, due.length
+
+
+def must_sync(request: Request[Any]) -> bool:
+    """The nodes of this request must be in sync: not of a stop, nor of a scan, whose usual answer is silence."""
+    return request.priority is not Priority.STOP and request.reply_within is not TimeoutClass.SCAN
+
+
+def is_read(request: Request[Any]) -> bool:
+    """Sending it again changes nothing."""
+    return request.repeatable and request.effect is Effect.NONE
+
+
+async def carry_out(engine: Engine, request: Request[Any], attempt: Attempt | None = None) -> Response:
+    """The reply to this request; `attempt` is its first one, which has failed. Raises when the last one fails."""
+    tries, sent = 0, False
+    while True:
+        if attempt is not None:
+            sent = True
+            if attempt.accepted is not None:
+                return attempt.accepted
+            if engine.stopping and not is_read(request) and request.priority is not Priority.STOP:
+                raise failures.latched(engine.latched_by)
+            tries += 1
+            if not _may_repeat(request) or tries > RETRIES:
+                raise _error(engine, request, attempt, tries, sent)
+            for node in attempt.nodes:
+                engine.statistics.of(node).retries += 1
+        excluded: tuple[int, ...] = ()
+        is_probed = False
+        for node in engine.sync.doubtful(request) if must_sync(request) else ():
+            if len(request.expected) > 1 and engine.sync.is_put_off(node, await Sleep(0)):  # type: ignore[arg-type]
+                excluded += (node,)  # a group does not wait for a node that was silent lately
+                continue
+            failed, probes = await _resync(engine, node)
+            is_probed = is_probed or failed is None
+            if failed is None:
+                continue
+            tries += probes
+            if len(request.expected) == 1:  # type: ignore[arg-type]  # never ANY here
+                raise _error(engine, request, failed, tries, sent)
+            excluded += (node,)
+        if excluded and len(excluded) == len(request.expected):  # type: ignore[arg-type]
+            return Response((), excluded, await Sleep(0))
+        step = Attempt(request, excluded=excluded)
+        step.is_probed = is_probed
+        attempt = await step
+        if attempt is None:  # a node came out of sync before it left
+            tries += 1
+            if tries > RETRIES:
+                step.fault = "surplus"  # data that were not expected came before it, each time
+                raise _error(engine, request, step, tries, sent)
+
+
+def _may_repeat(request: Request[Any]) -> bool:
+    """A scan is not repeated, for silence is its usual answer; nor is a stop, which has rounds of its own."""
+    return (
+        request.repeatable
+        and request.priority is not Priority.STOP
+        and request.expected is not ANY
+        and request.reply_within is not TimeoutClass.SCAN
+    )
+
+
+async def _resync(engine: Engine, node: int) -> tuple[Attempt | None, int]:
+    """Wait for the quiet time and probe this node: the probe that failed, None when it is in sync, and how many."""
+    state, tries = engine.sync.of(node), 0
+    for tries in range(1, RETRIES + 2):
+        # Another request may have moved the quiet time, or probed the node, while this one slept.
+        while (pause := state.quiet_until - await Sleep(0)) > 0:
+            await Sleep(pause)
+        if node not in engine.sync.out_of_sync:
+            return None, tries
+        attempt = await Attempt(engine.sync.next_probe(node), is_probe=True)
+        assert attempt is not None
+        if not attempt.fault:
+            return None, tries
+        if attempt.fault == "silence":
+            break
+    engine.sync.back_off(node, await Sleep(0), engine.quiet_time)
+    return attempt, tries
+
+
+def _error(engine: Engine, request: Request[Any], attempt: Attempt, tries: int, sent: bool) -> MotorbusError:
+    return failures.no_answer(
+        request, attempt.failure(), attempt.received(), tries=tries, sent=sent, diagnosis=engine.diagnosis()
+    )

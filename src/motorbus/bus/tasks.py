@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from bisect import bisect_left, insort
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from math import inf
+from operator import attrgetter
 from threading import local
 from types import CoroutineType
 from typing import Any, Final, Generic, TypeVar
@@ -19,7 +20,7 @@ from motorbus.bus import failures
 from motorbus.bus.attempt import Attempt
 from motorbus.bus.engine import Engine
 from motorbus.bus.nodes import GATED
-from motorbus.bus.policy import carry_out
+from motorbus.bus.sync import carry_out
 from motorbus.core.request import Notification, Priority, Request, Response, Step
 from motorbus.core.steps import (
     Emit,
@@ -31,12 +32,12 @@ from motorbus.core.steps import (
     Shielded,
     Sleep,
     WaitFor,
-    catch,
     discard,
 )
 from motorbus.errors import MotorbusError, RequestError
 
 T = TypeVar("T")
+PRIORITY: Final = attrgetter("priority")
 Notify = Callable[[object], None]
 
 CLEANUP_TIMEOUT: Final = 2.0
@@ -47,8 +48,6 @@ LONG_SLEEP: Final = 0.5
 """s; a sleep of a clean-up from here on waits for a device to come to rest, and extends the timeout."""
 LONGEST_EXTENSION: Final = 30.0
 """s by which such sleeps extend it."""
-READS: Final = 2
-"""Rounds of the reads that the interlock requires; the second where the first was doubtful."""
 
 
 class _Stepping(local):
@@ -70,22 +69,25 @@ def check_outside() -> None:
         )
 
 
-@contextmanager
-def starting(*runnables: object) -> Iterator[None]:
-    """Close these procedures if they are refused. Raises RequestError inside of another procedure."""
-    try:
-        check_outside()
-        yield
-    except BaseException:
-        for one in runnables:
-            discard(one)
-        raise
+class Starting:
+    """Closes these procedures if they are refused. Raises RequestError inside of another procedure."""
+
+    def __init__(self, *runnables: object) -> None:
+        self._runnables = runnables
+        if STEPPING.active:
+            discard(runnables)
+            check_outside()
+
+    def __enter__(self) -> None:
+        return
+
+    def __exit__(self, kind: object, *rest: object) -> None:
+        if kind is not None:
+            discard(self._runnables)
 
 
 class Timer:
     """A task sleeps until this moment (s), or until a notification that `listener` takes."""
-
-    __slots__ = ("listener", "task", "until")
 
     def __init__(self, task: Task, until: float) -> None:
         self.task = task
@@ -96,8 +98,6 @@ class Timer:
 class Pause:
     """A task waits until nothing is in flight: to set the rate, or to have the bus alone (`tune` is None)."""
 
-    __slots__ = ("priority", "task", "tune")
-
     def __init__(self, task: Task, tune: SetBitrate | None = None) -> None:
         self.task = task
         self.tune = tune
@@ -106,25 +106,6 @@ class Pause:
 
 class Task:
     """One procedure of a tree, and the one thing that it waits for."""
-
-    __slots__ = (
-        "checked",
-        "children",
-        "claims",
-        "entered",
-        "error",
-        "exempt",
-        "finished",
-        "joins_one",
-        "owner",
-        "parent",
-        "procedure",
-        "stack",
-        "stop_since",
-        "tree",
-        "value",
-        "waits_for",
-    )
 
     def __init__(self, tree: Tree[Any], procedure: Runnable[Any], parent: Task | None = None) -> None:
         if not isinstance(procedure, Step | CoroutineType):
@@ -147,7 +128,6 @@ class Task:
         """Epoch from which a stop of its nodes withdraws its present request."""
         self.claims = False  # its end releases exclusive use
         self.joins_one = False  # the value of its only child is its value, not a tuple
-        self.checked = False  # the reads that the interlock requires precede its request
         self.entered = False  # its code has begun
         self.finished = False
         self.exempt: bool = parent is not None and parent.exempt
@@ -221,12 +201,9 @@ class Tree(Generic[T]):
 
     def next_moment(self) -> float:
         """The moment (s) at which `advance` has something to do by itself; inf when there is none."""
-        if self.finished:
-            return inf
-        moment = self.deadline
-        for timer in self.timers:
-            moment = min(moment, timer.until)
-        return moment
+        if self.finished or not self.timers:
+            return inf if self.finished else self.deadline
+        return min(self.deadline, *[timer.until for timer in self.timers])
 
     def result(self) -> T:
         """What the procedure returned; raises its error, or the cancellation."""
@@ -237,10 +214,17 @@ class Tree(Generic[T]):
 
     def outcome(self) -> Any:
         """What the procedure returned, or its MotorbusError; raises any other error."""
-        error = self.error()
-        if error is None or isinstance(error, MotorbusError):
-            return self.root.value if error is None else error
-        raise error
+        try:
+            return self.result()
+        except MotorbusError as error:
+            return error
+
+    def error(self) -> BaseException | None:
+        """What `result` raises. Errors of the clean-up are notes of the cancellation."""
+        if self.cancellation is None:
+            return self.root.error
+        _add_note(self.cancellation, self.root.error)
+        return self.cancellation
 
     def foreign_error(self) -> BaseException | None:
         """The error that ended the procedure, once, if it is no MotorbusError: it ends other procedures, too."""
@@ -249,13 +233,6 @@ class Tree(Generic[T]):
             return None
         self.cancellation = error
         return error
-
-    def error(self) -> BaseException | None:
-        """What `result` raises. Errors of the clean-up are notes of the cancellation."""
-        if self.cancellation is None:
-            return self.root.error
-        _add_note(self.cancellation, self.root.error)
-        return self.cancellation
 
     def _step(self, task: Task, value: Any, error: BaseException | None) -> None:
         if task.finished:
@@ -267,47 +244,48 @@ class Tree(Generic[T]):
         try:
             step = coroutine.send(value) if error is None else coroutine.throw(error)
         except StopIteration as end:
-            STEPPING.active = outer
             task.stack.pop()
             if request is None:
                 self._finish(task, end.value)
             else:
                 self._decode(task, request, end.value)
+            return
         except BaseException as failure:
-            STEPPING.active = outer
             task.stack.pop()
             if request is None:
                 self._finish(task, error=failure)
             else:
                 self.ready.append((task, None, failure))
-        else:
+            return
+        finally:
             STEPPING.active = outer
-            try:
-                self._begin(task, step)
-            except Exception as failure:  # of the gate or of the driver
-                self.ready.append((task, None, failure))
+        try:
+            self._begin(task, step)
+        except Exception as failure:  # of the gate or of the driver
+            self.ready.append((task, None, failure))
 
     def _decode(self, task: Task, request: Request[Any], answer: Response) -> None:
         try:
-            value = decode(request, answer)
+            self.ready.append((task, decode(request, answer), None))
         except Exception as error:  # a refusal of the device, or an error of the driver
             self.ready.append((task, None, error))
-        else:
-            self.ready.append((task, value, None))
 
     def _finish(self, task: Task, value: Any = None, error: BaseException | None = None) -> None:
         task.value, task.error, task.finished = value, error, True
         if error is not None and not isinstance(error, Exception) and task is not self.root:
             self.interruption = error
-        if task.claims and self.engine.exclusive is task.owner:
-            self.engine.exclusive = None
+        self._release(task)
         if task is self.root:
-            self.finished = True
-            self._forget()
+            self._end_tree()
         elif task.parent is not None and all(child.finished for child in task.parent.children):
             self._join(task.parent)
 
-    def _forget(self) -> None:
+    def _release(self, task: Task) -> None:
+        if task.claims and self.engine.exclusive is task.owner:
+            self.engine.exclusive = None
+
+    def _end_tree(self) -> None:
+        self.finished = True
         if self.end_sleeps in self.engine.end_sleeps:
             self.engine.end_sleeps.remove(self.end_sleeps)
 
@@ -321,15 +299,12 @@ class Tree(Generic[T]):
             self.ready.append((task, None, self.cancellation))
             return
         errors = [child.error for child in children if child.error is not None]
-        if errors:
-            errors.sort(key=lambda error: isinstance(error, Exception))  # an interrupt is raised first
-            for other in errors[1:]:
-                if str(other) != str(errors[0]):
-                    errors[0].add_note(f"also: {str(other) or type(other).__name__}")
-            self.ready.append((task, None, errors[0]))
-        else:
-            values = tuple(child.value for child in children)
-            self.ready.append((task, values[0] if task.joins_one else values, None))
+        errors.sort(key=lambda error: isinstance(error, Exception))  # an interrupt is raised first
+        for other in errors[1:]:
+            if str(other) != str(errors[0]):
+                errors[0].add_note(f"also: {str(other) or type(other).__name__}")
+        values = tuple(child.value for child in children)
+        self.ready.append((task, values[0] if task.joins_one else values, errors[0] if errors else None))
 
     # -- steps -------------------------------------------------------------------------------------------------
 
@@ -344,24 +319,27 @@ class Tree(Generic[T]):
         elif isinstance(step, Exclusive | Shielded):
             self._start(task, step, (step.runnable,))
         elif isinstance(step, Emit):
-            self._report(task, step.event)
+            self._emit(task, step.event)
         elif isinstance(step, Sleep | WaitFor):
             self._sleep(task, step, self.now())
         elif isinstance(step, SetBitrate):
             task.waits_for = pause = Pause(task, step)
             self.sending.append(pause)
         else:
-            self.ready.append((task, None, _not_a_step(step)))
+            raise RequestError(
+                f"a procedure awaited {type(step).__name__}, which is no step",
+                cause="asyncio.sleep(), futures and tasks need an event loop; a procedure runs without one",
+                advice="await steps of motorbus only, such as Sleep(seconds)",
+            )
 
     def _start(self, task: Task, step: Step[Any], runnables: Sequence[Runnable[Any]]) -> None:
         """Start the children of a task."""
         task.joins_one = not isinstance(step, Gather)
         try:
             task.children = [Task(self, one, task) for one in runnables]
-        except RequestError as error:
+        except RequestError:
             discard(step)
-            self.ready.append((task, None, error))
-            return
+            raise
         if not task.children:
             self.ready.append((task, (), None))
         for child in task.children:
@@ -376,18 +354,11 @@ class Tree(Generic[T]):
     def _begin_request(self, task: Task, request: Request[Any]) -> None:
         engine = self.engine
         if request.effect in GATED:
-            if self._reads_first(task, request):
-                return
             task.stop_since = engine.nodes.epoch if self.has_ordered else self.since
             self.has_ordered = True
-            try:
-                engine.check_stops(request, self.since, task.stop_since)
-            except MotorbusError as error:
-                self.ready.append((task, None, error))
-                return
+            engine.check_stops(request, self.since, task.stop_since)
         if self.deadline < inf and self.now() >= self.deadline:
-            self.ready.append((task, None, failures.abandoned()))
-            return
+            raise failures.abandoned()
         if request.priority is Priority.STOP:
             engine.note_stop(request)
         excluded = engine.put_off(request, self.now()) if engine.sync.out_of_sync else ()
@@ -404,49 +375,33 @@ class Tree(Generic[T]):
         self._enqueue(attempt)
 
     def _enqueue(self, one: Attempt | Pause) -> None:
-        if not self.sending or _priority(one) >= _priority(self.sending[-1]):
-            self.sending.append(one)
-        else:
-            insort(self.sending, one, key=_priority)
+        insort(self.sending, one, key=PRIORITY)
 
     def put_back(self, attempt: Attempt) -> None:
         """The link was full: this attempt leaves before others of its priority."""
-        self.sending.insert(bisect_left(self.sending, _priority(attempt), key=_priority), attempt)
+        self.sending.insert(bisect_left(self.sending, attempt.priority, key=PRIORITY), attempt)
 
     def _push(self, task: Task, request: Request[Any], attempt: Attempt | None) -> None:
         """Let the policy carry out the request that this task awaits."""
         task.stack.append((carry_out(self.engine, request, attempt), request))
         self.ready.append((task, None, None))
 
-    def _reads_first(self, task: Task, request: Request[Any]) -> bool:
-        """Whether the interlock requires reads before this request; they are carried out, then the request."""
-        interlock = self.engine.interlock
-        if interlock is None or task.checked or request.effect not in GATED:
-            return False
-        if request.priority is Priority.STOP or not (reads := interlock.required_reads(request)):
-            return False
-        child = Task(self, _read_first(interlock.required_reads, reads, request), task)
-        child.checked = True
-        task.children, task.joins_one = [child], True
-        self.ready.append((child, None, None))
-        return True
-
-    def _report(self, task: Task, event: object) -> None:
+    def _emit(self, task: Task, event: object) -> None:
         """The report has been handed over before the next step; what it raises is raised in the task."""
-        error: Exception | None = None
-        try:
-            if self.report is not None:
-                self.report(event)
-            elif isinstance(event, JournalEntry):
-                raise _no_journal(event)
-        except Exception as raised:
-            error = raised
-        self.ready.append((task, None, error))
+        if self.report is not None:
+            self.report(event)
+        elif isinstance(event, JournalEntry):
+            raise RequestError(
+                f"this bus keeps no journal, so it refuses {event.change}()",
+                cause="a guarded change is recorded before it begins, so that a crash can be repaired",
+                advice="open the bus with motorbus.open(), or give it a `report`; nothing was sent",
+            )
+        self.ready.append((task, None, None))
 
     def _sleep(self, task: Task, step: Sleep | WaitFor, now: float) -> None:
         if now >= self.deadline:
-            self.ready.append((task, None, failures.abandoned()))
-        elif isinstance(step, WaitFor):
+            raise failures.abandoned()
+        if isinstance(step, WaitFor):
             self._listen(Timer(task, now + step.until), step)
         elif step.seconds <= 0.0:
             self.ready.append((task, now, None))
@@ -486,15 +441,14 @@ class Tree(Generic[T]):
     def end(self, attempt: Attempt) -> None:
         """An attempt of one of these tasks has ended."""
         task, attempt.task = attempt.task, None
-        request = attempt.request
         if attempt.error is not None:
             self.ready.append((task, None, attempt.error))
         elif not attempt.direct:
             self.ready.append((task, attempt, None))
         elif attempt.accepted is None:
-            self._push(task, request, attempt)
+            self._push(task, attempt.request, attempt)
         else:
-            self._decode(task, request, attempt.accepted)
+            self._decode(task, attempt.request, attempt.accepted)
 
     def continue_from(self, attempt: Attempt) -> None:
         """The procedure is a request whose first attempt is on the wire, or has failed."""
@@ -540,17 +494,15 @@ class Tree(Generic[T]):
 
     def drop(self) -> None:
         """End the procedure where it stands; nothing that its clean-up asks for is carried out."""
-        self.finished = True
-        self._forget()
+        self._end_tree()
         for task in self._waiting(self.root):
             self._drop_wait(task)
-            if task.claims and self.engine.exclusive is task.owner:
-                self.engine.exclusive = None
+            self._release(task)
             task.finished = True
-            with suppress(Exception):
+            with suppress(BaseException):
                 discard(task.procedure)
             for coroutine, _ in reversed(task.stack):
-                with suppress(Exception):  # it raises, or awaits a step, where it is closed
+                with suppress(BaseException):  # it raises, or awaits a step, where it is closed
                     coroutine.close()
 
     def _cancel(self, task: Task) -> None:
@@ -591,50 +543,11 @@ def decode(request: Request[Any], answer: Response) -> Any:
     return answer if request.decode is None else request.decode(answer)
 
 
-def in_order(trees: Sequence[Tree[Any]]) -> list[Attempt | Pause]:
-    """What these trees are to send, by priority."""
-    return sorted([one for tree in trees for one in tree.sending], key=_priority)
-
-
-def _priority(one: Attempt | Pause) -> int:
-    return one.request.priority if isinstance(one, Attempt) else one.priority
-
-
-async def _read_first(required: Callable[[Request[Any]], Any], reads: Any, request: Request[T]) -> T:
-    """Carry out the reads that the interlock requires, again where they were doubtful, then the request."""
-    try:
-        for _ in range(READS):
-            for read in reads:
-                await catch(read)
-            reads = required(request)
-    finally:
-        for read in reads:
-            discard(read)  # those that never started
-    return await request
-
-
 def _add_note(error: BaseException, other: BaseException | None) -> None:
     if other is None or other is error:
         return
     lines = [getattr(other, "summary", "") or str(other) or type(other).__name__]
     lines += getattr(other, "__notes__", ())
-    known = getattr(error, "__notes__", ())
     for line in lines:
-        if line not in known:
+        if line not in getattr(error, "__notes__", ()):
             error.add_note(line)
-
-
-def _not_a_step(step: object) -> RequestError:
-    return RequestError(
-        f"a procedure awaited {type(step).__name__}, which is no step",
-        cause="asyncio.sleep(), futures and tasks need an event loop; a procedure runs without one",
-        advice="await steps of motorbus only, such as Sleep(seconds)",
-    )
-
-
-def _no_journal(event: JournalEntry) -> RequestError:
-    return RequestError(
-        f"this bus keeps no journal, so it refuses {event.change}()",
-        cause="a guarded change is recorded before it begins, so that a crash can be repaired",
-        advice="open the bus with motorbus.open(), or give it a `report`; nothing was sent",
-    )

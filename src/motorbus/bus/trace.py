@@ -1,4 +1,4 @@
-"""Records of what went over the wire, for subscribers.
+"""What a bus shows of itself: records of what went over the wire, for subscribers, and counters.
 
 A subscription is a bounded queue: when it is full, the oldest record is dropped and counted, so a slow reader never
 holds up the bus. A subscription whose `put` raises gets no more records.
@@ -6,8 +6,9 @@ holds up the bus. A subscription whose `put` raises gets no more records.
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from typing import Generic, NamedTuple, TypeVar
 
 from motorbus.core.request import Data
@@ -75,3 +76,32 @@ class Feed(Generic[R]):
             except Exception as error:
                 subscription.failure = error
                 self.unsubscribe(subscription)
+
+
+@dataclass(slots=True)
+class NodeStatistics:
+    """Counters of one node: accepted replies, requests sent again, failed replies by kind."""
+
+    ok: int = 0
+    retries: int = 0
+    errors: Counter[str] = field(default_factory=Counter)
+
+    @property
+    def sent(self) -> int:
+        """Requests that have ended; a retry counts as sent again."""
+        return self.ok + self.errors.total()
+
+
+class Statistics:
+    """The counters of all nodes; `other` counts what belongs to none: noise, foreign frames, notices, echoes."""
+
+    def __init__(self) -> None:
+        self.nodes: dict[int, NodeStatistics] = {}
+        self.other: Counter[str] = Counter()
+
+    def of(self, node: int) -> NodeStatistics:
+        """The counters of this node."""
+        counters = self.nodes.get(node)
+        if counters is None:
+            counters = self.nodes[node] = NodeStatistics()
+        return counters

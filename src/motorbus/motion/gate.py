@@ -160,7 +160,7 @@ class SafetyGate:
         self._deferred: dict[int, int] = {}  # node: number of its stops when its deferred write was sent
         bus.interlock = self
         bus.on_id_change = self.rename
-        bus.on_reconnect(self.forget)
+        bus.on_reconnect = self.forget
 
     def check(self, request: Request[Any], now: float) -> None:
         """Raise MotorbusError if this request must not leave at `now` (s)."""
@@ -223,10 +223,6 @@ class SafetyGate:
                 reason="stale",
                 advice="write the goals again",
             )
-
-    def required_reads(self, request: Request[Any]) -> tuple[()]:
-        """Nothing: who moves reads first, and a goal without a fresh position is refused."""
-        return ()
 
     def update(self, axis: AxisStatus) -> None:
         """Take the last position that the bus has read, once."""

@@ -10,7 +10,7 @@ from threading import Event, Thread
 from typing import Final
 
 from motorbus.bus.base import BaseBus
-from motorbus.bus.running import run_on
+from motorbus.bus.blocking import run_on
 from motorbus.core.steps import Procedure
 from motorbus.errors import Refused
 

@@ -11,9 +11,8 @@ from time import monotonic
 from typing import Any, Final, TypeAlias, TypeVar
 
 from motorbus.bus.base import BaseBus
-from motorbus.bus.blocking import carry_out_batch, exchange_on
+from motorbus.bus.blocking import carry_out_batch, exchange_on, run_on
 from motorbus.bus.interrupts import interrupts
-from motorbus.bus.running import run_on
 from motorbus.core.request import Request, Step
 from motorbus.core.steps import Runnable, Shielded, Sleep, discard
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown, WireError

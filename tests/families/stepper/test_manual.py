@@ -207,9 +207,6 @@ class Limits:
         self.asked += request.setpoints
         raise LimitExceeded("beyond the end of the rail")
 
-    def required_reads(self, request: Any) -> tuple[()]:
-        return ()
-
     def stopped(self, nodes: Any) -> None:
         """Not asked."""
 
