@@ -98,7 +98,7 @@ class Bus(BaseBus):
             self.hand_over()
             return None
         wire: Any = request.wire
-        if request.effect:
+        if request.effect or engine.read_only:
             if self._reads_first(request):
                 return None
             engine.check(request, since, since, now)

@@ -77,6 +77,8 @@ class Engine:
         self.before_motion: Callable[[], None] | None = None
         """Called when the interlock has passed a request; the bus sets it to None after the first."""
         self.listening = listen_only
+        self.read_only = False
+        """Only reads may leave; an emergency stop may as well."""
         self.diagnosis: Callable[[], str] = str
         self.trace: Feed[TraceRecord] = Feed()
         self.notices: Feed[Notification] = Feed()
@@ -210,6 +212,8 @@ class Engine:
         """
         if self.listening:
             raise failures.listen_only(request)
+        if self.read_only and not (is_poll(request) or self.stopping or self.latched):
+            raise failures.read_only(request)
         if request.priority is Priority.STOP:
             return
         self.check_stops(request, since, stop_since)
@@ -666,6 +670,12 @@ class Engine:
 def must_sync(request: Request[Any]) -> bool:
     """The nodes of this request must be in sync: not of a stop, nor of a scan, whose usual answer is silence."""
     return request.priority is not Priority.STOP and request.reply_within is not TimeoutClass.SCAN
+
+
+def is_poll(request: Request[Any]) -> bool:
+    """It changes nothing: a poll or a scan without effect. A write without a listed effect has another priority."""
+    polls = request.priority is Priority.POLL or request.reply_within is TimeoutClass.SCAN
+    return polls and request.effect is Effect.NONE and request.deferred is None
 
 
 def is_read(request: Request[Any]) -> bool:

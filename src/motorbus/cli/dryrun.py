@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from msgspec import Meta, Struct
 
+from motorbus.bus.engine import is_poll
 from motorbus.cli.output import confirm, note
 from motorbus.core.can_frame import CanFrame
-from motorbus.core.request import ANY, Effect, Priority, Request, Step, TimeoutClass
+from motorbus.core.request import ANY, Effect, Request, Step
 from motorbus.core.steps import Exclusive, Gather, SetBitrate, Shielded, Sleep, discard
 from motorbus.errors import MotorbusError
 
@@ -99,7 +100,7 @@ class Overlay:
 
     def _request(self, request: Request[Any]) -> Any:
         nodes = set() if request.expected is ANY else {one.node for one in request.expected}
-        if _only_reads(request):
+        if is_poll(request):
             if self._written and (nodes | {-1}) & self._written:
                 return _AsWritten()
             return self._bus.run(request)
@@ -110,11 +111,6 @@ class Overlay:
             self._written.add(-1)
         self.withheld.append(request.wire.flat() if isinstance(request.wire, CanFrame) else request.wire)
         return None
-
-
-def _only_reads(request: Request[Any]) -> bool:
-    is_polled = request.priority is Priority.POLL or request.reply_within is TimeoutClass.SCAN
-    return request.effect is Effect.NONE and is_polled
 
 
 def carry_out(
