@@ -14,7 +14,7 @@ from msgspec import structs
 from motorbus.bus.blocking import Bus
 from motorbus.bus.trace import TraceRecord
 from motorbus.core.can_frame import ERROR_FLAG, CanFrame
-from motorbus.core.family import Found
+from motorbus.core.family import Found, Identity
 from motorbus.core.findings import Finding, Severity, Subject
 from motorbus.core.request import Request
 from motorbus.core.steps import Sleep, catch
@@ -25,8 +25,12 @@ from motorbus.errors import LinkError, MotorbusError
 FIRST_IDS: Final = tuple(range(21))  # asked on a serial bus whose ids are not known
 READS: Final = 120  # of all devices of a bus together
 FEWEST: Final = 20  # of one device
-SLOW_READS: Final = 3  # of a device without a position
+SLOW_READS: Final = 10  # of a device without a position
 SLOW: Final = 0.008  # s that a read may take beyond its air time
+SLOWEST: Final = 0.1  # s of latency with which a bus is tried whose replies come too late
+SLOW_CAUSE: Final = "the latency timer of the adapter (FTDI: 16 ms), a USB hub, or a network"
+SLOW_FIX: Final = "set the latency timer to 1 ms, connect the adapter without a hub"
+TRIES: Final = 3  # for a device that the scan missed
 LOST: Final = 0.02  # share of reads that may fail
 LISTEN: Final = 0.3  # s
 TRACED: Final = 20_000  # records
@@ -65,9 +69,14 @@ class BusDoctor:
             if self._is_can:
                 self.bus.run(Sleep(LISTEN))
             present = self._scan(self._wanted())
+            if not present and self._received():
+                present = self._scan_slowly()
             if not present:
                 self._explain_silence()
                 return
+            present += self._ask_again(
+                [node for node in self.ids if node not in [one.node for one in present]]
+            )
             self._check_missing([one.node for one in present])
             self._check_ids(present)
             self._check_line([one.node for one in present])
@@ -84,16 +93,37 @@ class BusDoctor:
 
     def _scan(self, ids: Sequence[int], rates: Sequence[int] = ()) -> list[Found]:
         if (only := self.bus.family.link.only) is not None:
-            identity = self.bus.run(catch(self.bus.driver.identify(only)))
-            if isinstance(identity, LinkError):
-                raise identity
-            return [] if isinstance(identity, MotorbusError) else [Found(only, self.bus.rate, identity)]
+            return self._ask_again([only])
 
         def report(event: Any) -> None:
             if "two servos" in getattr(event, "what", ""):
                 self.suspects[event.node] = event.what
 
         found: list[Found] = self.bus.run(self.bus.driver.scan(tuple(ids), tuple(rates)), report)
+        return found
+
+    def _scan_slowly(self) -> list[Found]:
+        """Scan with longer time-outs: replies came, and may have been late."""
+        before, self.bus.latency = self.bus.latency, SLOWEST
+        found = self._scan(self._wanted())
+        if found:
+            evidence = f"replies come later than {1000 * before:.0f} ms, within {1000 * SLOWEST:.0f} ms"
+            self.add("error", "latency-timer", self.where, evidence, SLOW_CAUSE, SLOW_FIX)
+        else:
+            self.bus.latency = before
+        return found
+
+    def _ask_again(self, silent: Sequence[int]) -> list[Found]:
+        """A device with a loose plug may have missed the scan."""
+        found = []
+        for node in silent:
+            for _ in range(TRIES):
+                identity = self.bus.run(catch(self.bus.driver.identify(node)))
+                if isinstance(identity, LinkError):
+                    raise identity
+                if isinstance(identity, Identity):
+                    found.append(Found(node, self.bus.rate, identity))
+                    break
         return found
 
     # -- adapter -----------------------------------------------------------------------------------------------
@@ -253,9 +283,7 @@ class BusDoctor:
                 excess.append(median(times) - self.bus.engine.air_time(request))
         if excess and min(excess) > SLOW and not any(one.code == "latency-timer" for one in self.found):
             evidence = f"each read takes {1000 * min(excess):.0f} ms longer than its bytes, limit {1000 * SLOW:.0f} ms"
-            cause = "the latency timer of the adapter (FTDI: 16 ms), a USB hub, or a network"
-            fix = "set the latency timer to 1 ms, connect the adapter without a hub"
-            self.add("warning", "latency-timer", self.where, evidence, cause, fix)
+            self.add("warning", "latency-timer", self.where, evidence, SLOW_CAUSE, SLOW_FIX)
 
     def _read_request(self, node: int, devices: int) -> tuple[Request[Any], int]:
         probe = self.bus.driver.probe(node, 0)

@@ -81,10 +81,11 @@ def _examine(
 
 def _other_settings(address: str, silent: BusDoctor) -> Finding | None:
     """Open a silent bus with the other settings of its family that a device may need."""
+    spot = parse_address(address)
     for settings in getattr(silent.checks, "OTHER_SETTINGS", ()):
         option = ",".join(f"{name}={value}" for name, value in settings.items())
-        other = host.open_port(f"{address},{option}", silent.where) if option not in address else None
-        if other is None or isinstance(other, Finding):
+        other = host.open_port(spot._replace(options={**spot.options, **settings}).bus, silent.where)
+        if isinstance(other, Finding):
             continue
         with other:
             found = other.run(other.driver.scan())

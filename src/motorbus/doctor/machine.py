@@ -139,7 +139,7 @@ def _check_limits(subject: Subject, axis: AxisConfig, driver: AxisDriver, doctor
 
 
 def _homing_offset(doctor: BusDoctor, subject: Subject) -> int | None:
-    table = doctor.bus.family.registers.get(subject.identity.table, {})
+    table: Mapping[str, Any] = doctor.bus.family.registers.get(subject.identity.table, {})
     if "homing_offset" not in table:
         return None
     try:

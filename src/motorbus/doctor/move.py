@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 from motorbus.core.findings import Finding
 from motorbus.core.units import DEGREE
@@ -19,7 +19,8 @@ def move_axes(robot: Robot) -> list[Finding]:
     for name, axis in robot.axes.items():
         if axis.config.is_wheel or "position" not in axis.driver:
             continue
-        is_limp = "health" in axis.driver and axis.bus.run(axis.driver.health(axis.device)).torque is False
+        bus: Any = axis.bus
+        is_limp = "health" in axis.driver and bus.run(axis.driver.health(axis.device)).torque is False
         try:
             here = robot.positions(name)[name]
             low, high = axis.config.low, axis.config.high

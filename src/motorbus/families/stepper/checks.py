@@ -7,11 +7,12 @@ from typing import Final
 from motorbus.core.findings import Check, Subject
 from motorbus.errors import DeviceError, WireError
 from motorbus.families.stepper.driver import io, projects
-from motorbus.families.stepper.parameters import HOME_INPUT, PROJECTS
+from motorbus.families.stepper.parameters import HOME_INPUT, PROJECTS, Project
 from motorbus.families.stepper.program.lint import lint
 from motorbus.families.stepper.protocol import ONLY
 
 FACTORY_ID: Final = ONLY
+FEWEST: Final = 3  # numbers that show the byte order of a dump
 
 
 async def check(subject: Subject) -> None:
@@ -26,6 +27,12 @@ async def check(subject: Subject) -> None:
             return
         if project.is_cleared:
             continue
+        if _is_reversed(project):
+            cause = "the controller sends the other byte of a number first"
+            other = "big" if node.order == "little" else "little"
+            evidence = f"project {number}: every number is a multiple of 256"
+            subject.error("stepper-foreign", evidence, cause, f"open the bus with dump_order={other}")
+            return
         for one in lint(project):
             if one.level == "error":
                 where = f"project {number}" + (f", step {one.step}" if one.step else "")
@@ -38,6 +45,14 @@ async def check(subject: Subject) -> None:
                 cause = "it still searches, the switch is not connected, or the motor has moved since"
                 fix = f"move onto the switch and look at `motorbus stepper io {subject.where}`"
                 subject.inform("homing-not-seen", evidence, cause, fix)
+
+
+def _is_reversed(project: Project) -> bool:
+    """All numbers of several bytes would be small in the other byte order."""
+    step = project.steps[0]
+    numbers = [project.microsteps, project.turn_distance, step.distance, step.start_frequency, step.speed]
+    used = [number for number in numbers if number]
+    return len(used) >= FEWEST and all(number % 256 == 0 for number in used)
 
 
 CHECKS: Final[tuple[Check, ...]] = (check,)
