@@ -15,7 +15,8 @@ from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Effect
 from motorbus.core.steps import INTENT, JournalEntry
 from motorbus.doctor import examine
-from motorbus.doctor.findings import ORDER, Report
+from motorbus.doctor.codes import CODES
+from motorbus.doctor.findings import Report
 from motorbus.families.stepper.protocol import decode_request
 from motorbus.journal import BusJournal
 from motorbus.simulation import Simulation
@@ -111,10 +112,10 @@ def examined(scenario: Scenario, sim: Simulation, folder: Path) -> Report:
         address = sim.url.partition(",")[0]
     if not scenario.machine:
         ids = f"#{scenario.expect.replace(',', '+')}" if scenario.expect else ""
-        return examine.examine_bus(address + ids, rate=scenario.rate)
+        return examine.examine_bus(address + ids, {}, scenario.rate)
     file = folder / "machine.toml"
     file.write_text(f'format = 1\n[bus.arm]\naddress = "{address}"\n{scenario.machine}')
-    return examine.examine_machine(str(file), rate=scenario.rate)
+    return examine.examine_machine(str(file), {}, scenario.rate)
 
 
 @pytest.fixture(autouse=True)
@@ -144,4 +145,4 @@ def test_the_first_finding_names_the_fault(
 
 
 def test_the_codes() -> None:
-    assert all(one.code in ORDER for one in SCENARIOS)
+    assert all(one.code in CODES for one in SCENARIOS)

@@ -70,11 +70,11 @@ def doctor(
 
 def _examine(target: str, rate: float, common: Common, trace: examine.Trace) -> Report:
     if target.endswith(".toml"):
-        return examine.examine_machine(target, rate=rate, trace=trace)
+        return examine.examine_machine(target, trace, rate)
     if target or common.bus:
-        return examine.examine_bus(bus_address(target, common), rate=rate, trace=trace)
+        return examine.examine_bus(bus_address(target, common), trace, rate)
     if Path(common.machine).exists():
-        return examine.examine_machine(common.machine, rate=rate, trace=trace)
+        return examine.examine_machine(common.machine, trace, rate)
     found = [f"{one.device} ({one.guess})" if one.guess else one.device for one in ports()]
     advice = f"ports: {', '.join(found)}" if found else "no serial port is there: plug the adapter in"
     raise RequestError("no bus", expected="FAMILY:PORT, or a machine file", advice=advice)

@@ -17,15 +17,16 @@ Severity: TypeAlias = Literal["error", "warning", "info"]
 class Finding(Struct, frozen=True, omit_defaults=True):
     """One finding: a stable `code`, what was measured against which limit, why, and one fix.
 
-    `because` is the code of an earlier finding that may be the cause of this one.
+    What a check leaves out comes from the table of codes in `doctor`. `because` is the code of an earlier finding that
+    may be the cause of this one.
     """
 
     code: str
-    severity: Severity
     where: str
     evidence: str
-    cause: str
-    action: str
+    cause: str = ""
+    action: str = ""
+    severity: Severity | None = None
     because: str = ""
 
 
@@ -38,17 +39,11 @@ class Subject:
     where: str
     found: list[Finding] = field(default_factory=list)
 
-    def error(self, code: str, evidence: str, cause: str, action: str) -> None:
-        """Add an error: it does not work before this is fixed."""
-        self.found.append(Finding(code, "error", self.where, evidence, cause, action))
-
-    def warn(self, code: str, evidence: str, cause: str, action: str) -> None:
-        """Add a warning: it works now, or in this program only."""
-        self.found.append(Finding(code, "warning", self.where, evidence, cause, action))
-
-    def inform(self, code: str, evidence: str, cause: str, action: str) -> None:
-        """Add a fact that is right in most machines."""
-        self.found.append(Finding(code, "info", self.where, evidence, cause, action))
+    def add(
+        self, code: str, evidence: str, cause: str = "", action: str = "", severity: Severity | None = None
+    ) -> None:
+        """Add a finding about this device."""
+        self.found.append(Finding(code, self.where, evidence, cause, action, severity))
 
 
 Check: TypeAlias = "Callable[[Subject], Runnable[None]]"

@@ -1,40 +1,17 @@
-"""The codes of findings in the order of the chain, and the report of an examination."""
+"""The report of an examination, and the order of its findings."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Annotated, Final
 
 from msgspec import Meta, Struct, structs
 
 from motorbus.core.findings import Finding
+from motorbus.doctor.codes import CODES
 
-CHAIN: Final[Mapping[str, tuple[str, ...]]] = {
-    "host": (
-        *("port-missing", "port-permission", "port-busy", "brltty", "rate-refused", "port-refused"),
-        "port-lost",
-    ),
-    "adapter": ("adapter-menu", "adapter-echo", "adapter-no-ack", "latency-timer"),
-    "power": ("supply-out-of-range", "supply-sag"),
-    "chain": (
-        *("bus-silent", "can-silent", "wrong-rate", "can-wrong-bitrate", "can-mute-node"),
-        *("stepper-foreign", "device-missing", "line-noise", "replies-lost"),
-    ),
-    "ids": ("duplicate-id", "factory-id", "can-id-pending", "device-unnamed"),
-    "model": ("model-unknown", "firmware-mixed"),
-    "settings": (
-        *("change-unfinished", "overload-latched", "too-hot", "alarm", "load-high", "mode-differs"),
-        *("calibration-other", "calibration-wrap", "motion-blocked", "settings-left"),
-        *("no-acknowledgement", "return-delay", "eeprom-open", "project-error", "homing-not-seen"),
-    ),
-    "machine": (
-        *("machine-file", "axis-mismatch", "calibration-differs", "outside-limits"),
-        *("exit-falls", "estop-falls", "loop-too-fast", "loop-rate", "check-failed"),
-    ),
-}
-"""All codes, by the part of the chain: what stands first may be the cause of what stands later."""
-ORDER: Final = {code: number for number, code in enumerate(sum(CHAIN.values(), ()))}
 SEVERITIES: Final = ("error", "warning", "info")
+ORDER: Final = list(CODES)
 
 
 class DeviceHealth(Struct, frozen=True):
@@ -63,27 +40,37 @@ class Report(Struct, frozen=True, tag="doctor"):
         return sum(one.severity == severity for one in self.findings)
 
 
+def complete(one: Finding, bus: str) -> Finding:
+    """The finding with what the table of codes says where it says nothing itself."""
+    code = CODES[one.code]
+    cause, action = one.cause or code.cause, one.action or code.action
+    action = action.replace("{where}", one.where).replace("{bus}", bus)
+    return structs.replace(one, cause=cause, action=action, severity=one.severity or code.severity)
+
+
 def arrange(found: Iterable[Finding], bus: str) -> list[Finding]:
-    """The findings of one bus in order: errors, warnings, facts; in each by the chain. Equal ones become one.
+    """The findings of one bus in order, complete; equal ones at several places become one.
 
     An error of the bus explains its later findings, one of a device those of that device.
     """
     explained: list[Finding] = []
-    for one in sort(_merge(found)):
+    for one in sort(_merge(complete(one, bus) for one in found)):
         causes = [first.code for first in explained if _explains(first, one, bus)]
         explained.append(structs.replace(one, because=causes[0]) if causes else one)
     return explained
 
 
 def sort(found: Iterable[Finding]) -> list[Finding]:
-    """By severity, then by the chain."""
-    return sorted(found, key=lambda one: (SEVERITIES.index(one.severity), ORDER[one.code], one.where))
+    """Errors, warnings, facts; in each by the chain."""
+    return sorted(
+        found, key=lambda one: (SEVERITIES.index(one.severity or "error"), ORDER.index(one.code), one.where)
+    )
 
 
 def _merge(found: Iterable[Finding]) -> list[Finding]:
     groups: dict[tuple[str, ...], list[Finding]] = {}
     for one in found:
-        groups.setdefault((one.code, one.severity, one.cause), []).append(one)
+        groups.setdefault((one.code, one.severity or "", one.cause), []).append(one)
     return [
         structs.replace(
             group[0],
@@ -95,8 +82,7 @@ def _merge(found: Iterable[Finding]) -> list[Finding]:
 
 
 def _explains(first: Finding, later: Finding, bus: str) -> bool:
-    is_earlier = ORDER[first.code] < ORDER[later.code] and not first.because
-    if first.severity != "error" or later.severity == "info" or not is_earlier:
+    is_earlier = ORDER.index(first.code) < ORDER.index(later.code)
+    if first.severity != "error" or first.because or later.severity == "info" or not is_earlier:
         return False
-    same = set(first.where.split(", ")) & set(later.where.split(", "))
-    return first.where == bus or bool(same)
+    return first.where == bus or bool(set(first.where.split(", ")) & set(later.where.split(", ")))

@@ -14,7 +14,7 @@ CH340: Final = ("1a86", "7523")  # the adapter that brltty takes for a Braille d
 
 
 def open_port(address: str, where: str) -> Bus | Finding:
-    """The open bus of this address, or the finding that prevents it. Raises RequestError for a bad address."""
+    """The open read-only bus of this address, or what prevents it. Raises RequestError for a bad address."""
     try:
         bus = session.open(address)
     except LinkError as error:
@@ -25,33 +25,26 @@ def open_port(address: str, where: str) -> Bus | Finding:
 
 def explain(error: LinkError, where: str) -> Finding:
     """The finding of an error of a port."""
-    code, cause = "port-refused", error.cause or "the system refuses the port"
+    code, text = "port-refused", error.summary
+    if "brltty" in text or (isinstance(error, PortNotFound) and has_brltty()):
+        return Finding("brltty", where, text)
     if isinstance(error, PortNotFound):
-        code, cause = "port-missing", error.cause or "the adapter is not plugged in, or has another name now"
-        if brltty_took_it():
-            code, cause = "brltty", "brltty takes CH340 adapters for Braille displays"
-            return Finding(
-                code, "error", where, error.summary, cause, "`sudo apt remove brltty`, plug it in again"
-            )
+        code = "port-missing"
     elif isinstance(error, PortBusy):
-        code, cause = "port-busy", "a bus has one owner at a time"
-        if "brltty" in error.summary:
-            code, cause = "brltty", "brltty takes CH340 adapters for Braille displays"
+        code = "port-busy"
     elif isinstance(error, LinkLost):
-        code, cause = "port-lost", "a loose plug, a hub without supply, or a supply that dips"
-    elif "no permission" in error.summary:
+        code = "port-lost"
+    elif "no permission" in text:
         code = "port-permission"
-    elif "bit/s" in error.summary:
-        code, cause = "rate-refused", "the adapter or its driver does not have this rate"
-    return Finding(code, "error", where, error.summary, cause, error.advice or "plug the adapter in again")
+    elif "bit/s" in text:
+        code = "rate-refused"
+    return Finding(code, where, text, error.cause, error.advice)
 
 
-def brltty_took_it(sysfs: Path = Path("/sys"), proc: Path = Path("/proc")) -> bool:
-    """A CH340 is plugged in, and brltty runs: the port vanished when it was plugged in."""
-    adapters = [
-        (_text(device / "idVendor"), _text(device / "idProduct"))
-        for device in (sysfs / "bus/usb/devices").glob("*")
-    ]
+def has_brltty(sysfs: Path = Path("/sys"), proc: Path = Path("/proc")) -> bool:
+    """A CH340 is plugged in, and brltty runs: it took the port when the adapter was plugged in."""
+    devices = list((sysfs / "bus/usb/devices").glob("*"))
+    adapters = [(_text(one / "idVendor"), _text(one / "idProduct")) for one in devices]
     return CH340 in adapters and any(_text(one) == "brltty" for one in proc.glob("[1-9]*/comm"))
 
 

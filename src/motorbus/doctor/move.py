@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from motorbus.core.findings import Finding
 from motorbus.core.units import DEGREE
+from motorbus.doctor.findings import complete
 from motorbus.errors import MotorbusError
 from motorbus.motion.robot import Robot
 
@@ -32,17 +33,12 @@ def move_axes(robot: Robot) -> list[Finding]:
             robot.move({name: here}, speed=SPEED)
         except MotorbusError as error:
             cause = error.cause or "it is blocked, overloaded, or lost its torque"
-            found.append(
-                Finding("motion-blocked", "error", name, error.summary, cause, error.advice or "free it")
-            )
+            found.append(Finding("motion-blocked", name, error.summary, cause, error.advice))
             continue
         finally:
             if is_limp:
                 robot.disable_torque(name)
         if "voltage" in state.alarm:
-            evidence = f"supply {state.voltage or 0:.1f} V in motion, its voltage alarm is set"
-            cause = "the supply dips while it moves"
-            found.append(
-                Finding("supply-sag", "error", name, evidence, cause, "use a supply with more current")
-            )
-    return found
+            evidence = f"supply {state.voltage or 0:.1f} V after a move, its voltage alarm is set"
+            found.append(Finding("supply-sag", name, evidence))
+    return [complete(one, one.where) for one in found]
