@@ -123,7 +123,11 @@ class BusDoctor:
             if "two servos" in getattr(event, "what", ""):
                 self._suspects[event.node] = event.what
 
-        return self.bus.run(self.bus.driver.scan(tuple(ids), tuple(rates)), report)
+        found = self.bus.run(self.bus.driver.scan(tuple(ids), tuple(rates)), report)
+        if len(found) > 1 and not any(one.identity for one in found):  # something else answers everything
+            self._suspects.clear()
+            return []
+        return found
 
     def _ask_again(self, silent: Sequence[int]) -> list[Found]:
         """Those of these ids that answer one of several reads, as with a loose plug."""
