@@ -37,7 +37,7 @@ def measure(doctor: BusDoctor, rate: float) -> None:
         f"{rate:g} Hz is {1000 * period:.2g} ms; reads take {1000 * points[49]:.2g} ms, p99 {1000 * points[98]:.2g} ms;"
         f" goals and reads are {1000 * wire:.2g} ms on the wire; {late} of {len(times)} cycles late"
     )
-    reachable = f"about {SHARE / max(points[98], wire):.0f} Hz are possible now"
+    reachable = f"about {SHARE / max(points[49], wire):.0f} Hz are possible"
     if wire > SHARE * period:
         fix = f"a higher baud rate, or fewer devices on this bus; {reachable}"
         doctor.add("loop-too-fast", doctor.where, evidence, "the bytes take too long on the wire", fix)

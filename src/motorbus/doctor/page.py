@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from html import escape
-from typing import Any, Final
+from typing import Final
 
-from motorbus.doctor.findings import DeviceHealth, Report
+from motorbus import __version__
+from motorbus.core.findings import Finding
+from motorbus.doctor.findings import Report
 
 PARTS: Final = (("measured", "evidence"), ("why", "cause"), ("fix", "action"), ("because of", "because"))
 COLUMNS: Final = {
@@ -41,19 +43,30 @@ def lines(report: Report) -> list[str]:
     """The findings as text, the first cause first."""
     found = []
     for one in report.findings:
-        found.append(f"{one.severity:<8} {one.code}  {one.where}")
-        found += [f"  {title}: {getattr(one, name)}" for title, name in PARTS if getattr(one, name)]
+        found.append(f"{one.severity:<8} {one.code}  {short(one.where, report)}")
+        found += [f"  {title}: {text}" for title, text in _parts(one, report)]
     return [*found, summary(report)]
+
+
+def short(text: str, report: Report) -> str:
+    """The text with devices of the only bus as #3."""
+    return text.replace(f"{report.target}#", "#")
+
+
+def _parts(one: Finding, report: Report) -> list[tuple[str, str]]:
+    """Title and text of each part; the fix has whole addresses, which can be copied."""
+    texts = [(title, getattr(one, name), name) for title, name in PARTS]
+    return [(title, text if name == "action" else short(text, report)) for title, text, name in texts if text]
 
 
 def summary(report: Report) -> str:
     """The number of findings in one line."""
     counts = [(report.count(severity), severity) for severity in ("error", "warning")]
     shown = [f"{count} {word}{'s' if count > 1 else ''}" for count, word in counts if count]
-    return f"{', '.join(shown) or 'nothing wrong found'}; {len(report.devices)} devices answer"
+    return ", ".join([*shown, f"{len(report.devices)} devices answer"]) if shown else "nothing wrong found"
 
 
-def html(report: Report, *, made: str, version: str) -> str:
+def html(report: Report, *, made: str) -> str:
     """The report as an HTML document. `made` is its time."""
     title = f"motorbus doctor: {report.target}"
     simulated = ", simulated" if report.simulated else ""
@@ -63,34 +76,29 @@ def html(report: Report, *, made: str, version: str) -> str:
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
             f"<title>{escape(title)}</title><style>{STYLE}</style></head><body>",
             f"<h1>{escape(title)}</h1>",
-            f"<p>{escape(summary(report))}{simulated}. {escape(made)}, motorbus {escape(version)}.</p>",
-            *[_article(one) for one in report.findings],
-            _table(report.devices),
+            f"<p>{escape(summary(report))}{simulated}. {escape(made)}, motorbus {__version__}.</p>",
+            *[_article(one, report) for one in report.findings],
+            _table(report),
             "</body></html>",
         ]
     )
 
 
-def _article(one: Any) -> str:
-    rows = [
-        f"<dt>{title}</dt><dd>{escape(getattr(one, name))}</dd>"
-        for title, name in PARTS
-        if getattr(one, name)
-    ]
-    head = f"<b>{one.severity}</b> <code>{one.code}</code> {escape(one.where)}"
-    return f'<article class="{one.severity}">{head}<dl>{"".join(rows)}</dl></article>'
+def _article(one: Finding, report: Report) -> str:
+    rows = "".join(f"<dt>{title}</dt><dd>{escape(text)}</dd>" for title, text in _parts(one, report))
+    head = f"<b>{one.severity}</b> <code>{one.code}</code> {escape(short(one.where, report))}"
+    return f'<article class="{one.severity}">{head}<dl>{rows}</dl></article>'
 
 
-def _table(devices: dict[str, DeviceHealth]) -> str:
-    if not devices:
+def _table(report: Report) -> str:
+    if not report.devices:
         return ""
+    rows = [
+        [short(name, report), one.model, one.firmware, *(_number(getattr(one, field)) for field in COLUMNS)]
+        for name, one in report.devices.items()
+    ]
     head = "".join(f"<th>{title}</th>" for title in ("device", "model", "firmware", *COLUMNS.values()))
-    body = "".join(
-        f"<tr><td>{escape(name)}</td><td>{escape(one.model)}</td><td>{escape(one.firmware)}</td>"
-        + "".join(f"<td>{_number(getattr(one, field))}</td>" for field in COLUMNS)
-        + "</tr>"
-        for name, one in devices.items()
-    )
+    body = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
     return f'<h2>Devices</h2><div class="scroll"><table><tr>{head}</tr>{body}</table></div>'
 
 
