@@ -22,9 +22,8 @@ from motorbus.core.request import Effect
 from motorbus.core.steps import INTENT, JournalEntry
 from motorbus.doctor import examine, host
 from motorbus.doctor.bus import BusDoctor
-from motorbus.doctor.codes import CODES
 from motorbus.doctor.explain import explain
-from motorbus.doctor.findings import Report
+from motorbus.doctor.findings import CODES, Report
 from motorbus.doctor.move import move_axes
 from motorbus.errors import LinkError, RequestError
 from motorbus.families.stepper.protocol import decode_request

@@ -18,7 +18,6 @@ from motorbus.core.family import Found, Identity, State
 from motorbus.core.findings import Finding, Subject
 from motorbus.core.request import Request
 from motorbus.core.steps import Runnable, Sleep, catch
-from motorbus.doctor import host
 from motorbus.doctor.findings import DeviceHealth
 from motorbus.errors import LinkError, MotorbusError
 
@@ -47,8 +46,7 @@ class BusDoctor:
         self.found: list[Finding] = []
         self.subjects: dict[int, Subject] = {}
         self.health: dict[str, DeviceHealth] = {}
-        self.trace: list[TraceRecord] = []
-        """What went over the wire, for the bundle."""
+        self._trace: list[TraceRecord] = []
         self._records = bus.trace.subscribe(TRACED)
         self._suspects: dict[int, str] = {}
         """Ids that two devices seem to have, and the evidence."""
@@ -62,6 +60,12 @@ class BusDoctor:
         """How a device is named: its axis, else its address."""
         return self.names.get(node) or f"{self.where}#{f'{node:#x}' if self._is_can else node}"
 
+    @property
+    def trace(self) -> list[TraceRecord]:
+        """What went over the wire."""
+        self._trace += self._records
+        return self._trace
+
     def read(self, runnable: Runnable[T]) -> T | MotorbusError:
         """The value, or the error as a value; a lost port is raised."""
         value = self.bus.run(catch(runnable))
@@ -70,22 +74,17 @@ class BusDoctor:
         return value
 
     def examine(self) -> None:
-        """Find what is wrong with the bus, then with each device. A lost port ends it."""
-        try:
-            self._check_adapter()
-            present = self._search()
-            if not present:
-                self._explain_silence()
-                return
-            answering = [one.node for one in present]
-            self._check_missing(answering)
-            self._check_ids(answering)
-            self._check_line(answering)
-            self._check_devices(present)
-        except LinkError as error:
-            self.found.append(host.explain(error, self.where))
-        finally:
-            self.trace += self._records
+        """Find what is wrong with the bus, then with each device. Raises LinkError for a lost port."""
+        self._check_adapter()
+        present = self._search()
+        if not present:
+            self._explain_silence()
+            return
+        answering = [one.node for one in present]
+        self._check_missing(answering)
+        self._check_ids(answering)
+        self._check_line(answering)
+        self._check_devices(present)
 
     def _check_adapter(self) -> None:
         if self.bus.echoes:
@@ -142,9 +141,9 @@ class BusDoctor:
 
     def _received(self) -> list[Any]:
         """What came in, without the echo of what was sent."""
-        self.trace += self._records
-        sent = [one.data for one in self.trace if one.direction == "tx"]
-        return [one.data for one in self.trace if one.direction == "rx" and one.data not in sent]
+        records = self.trace
+        sent = {one.data for one in records if one.direction == "tx"}
+        return [one.data for one in records if one.direction == "rx" and one.data not in sent]
 
     def _scan_other_rates(self, ids: Sequence[int]) -> list[Found]:
         others = [rate for rate in self.bus.family.link.rates if rate != self.bus.rate]
@@ -227,9 +226,11 @@ class BusDoctor:
             errors = statistics.errors - before
             self._judge_line(node, errors, reads)
             lost = 100 * errors.total() / (reads + errors.total())
-            points = [round(1000 * time, 2) for time in quantiles(times or [0.0, 0.0], n=100)]
-            self.health[self.name(node)] = DeviceHealth("", "", lost=lost, p50=points[49], p99=points[98])
-            if times:
+            self.health[self.name(node)] = DeviceHealth("", "", lost=round(lost, 1))
+            if len(times) > 1:
+                points = [round(1000 * time, 2) for time in quantiles(times, n=100)]
+                line = {"p50": points[49], "p99": points[98]}
+                self.health[self.name(node)] = structs.replace(self.health[self.name(node)], **line)
                 excess.append(median(times) - self.bus.engine.air_time(request))
         if excess and min(excess) > SLOW and not any(one.code == "latency-timer" for one in self.found):
             measured, limit = 1000 * min(excess), 1000 * SLOW

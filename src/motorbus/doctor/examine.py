@@ -58,9 +58,8 @@ def _examine(
         return Report(where, (complete(bus, where),))
     with bus:
         doctor = BusDoctor(bus, where, names, ids)
-        doctor.examine()
-        trace[where] = doctor.trace
         try:
+            doctor.examine()
             machine.check_journal(doctor)
             if config is not None:
                 machine.check_axes(doctor, config)
@@ -68,6 +67,7 @@ def _examine(
                 loop.measure(doctor, rate)
         except LinkError as error:
             doctor.found.append(host.explain(error, where))
+        trace[where] = doctor.trace
     if not doctor.subjects:
         doctor.found = _other_settings(address, doctor) or doctor.found
     return Report(where, tuple(arrange(doctor.found, where)), doctor.health, bus.simulated)

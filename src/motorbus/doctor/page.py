@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from html import escape
+from itertools import cycle
 from typing import Final
 
 from motorbus import __version__
@@ -49,14 +50,17 @@ def lines(report: Report) -> list[str]:
 
 
 def short(text: str, report: Report) -> str:
-    """The text with devices of the only bus as #3."""
-    return text.replace(f"{report.target}#", "#")
+    """The text with devices of the only bus as #3, but in commands, which can be copied."""
+    parts = text.split("`")
+    return "`".join(
+        part if is_command else part.replace(f"{report.target}#", "#")
+        for part, is_command in zip(parts, cycle((False, True)), strict=False)
+    )
 
 
 def _parts(one: Finding, report: Report) -> list[tuple[str, str]]:
-    """Title and text of each part; the fix has whole addresses, which can be copied."""
-    texts = [(title, getattr(one, name), name) for title, name in PARTS]
-    return [(title, text if name == "action" else short(text, report)) for title, text, name in texts if text]
+    """Title and text of each part."""
+    return [(title, short(text, report)) for title, name in PARTS if (text := getattr(one, name))]
 
 
 def summary(report: Report) -> str:
