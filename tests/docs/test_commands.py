@@ -59,6 +59,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The working folder, with the files that the pages name."""
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     (tmp_path / "feed.toml").write_text(FEED, encoding="utf-8")
+    (tmp_path / "traceback.txt").write_text("There is no status packet!", encoding="utf-8")
     (tmp_path / "wave.csv").write_text(WAVE, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))

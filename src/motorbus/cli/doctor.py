@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 from cyclopts import Parameter
 from msgspec import Struct, structs
@@ -18,13 +19,22 @@ from motorbus.doctor import examine, page
 from motorbus.doctor.explain import explain as explain_text
 from motorbus.doctor.findings import DeviceHealth, Report, sort
 from motorbus.doctor.move import move_axes
-from motorbus.errors import MotorbusError, RequestError
+from motorbus.errors import LinkLost, MotorbusError, NoReply, PortBusy, PortNotFound, RequestError
 from motorbus.link.serial import ports
 from motorbus.motion.robot import Robot
 
 
-class FoundErrors(MotorbusError):
-    """The doctor has found errors."""
+ERRORS: Final[Mapping[str, type[MotorbusError]]] = {
+    "port-missing": PortNotFound,
+    "port-lost": LinkLost,
+    "port-busy": PortBusy,
+    "brltty": PortBusy,
+    "bus-silent": NoReply,
+    "can-silent": NoReply,
+    "device-missing": NoReply,
+    "machine-file": RequestError,
+}
+"""The error at the end by the code of the first finding, for the exit code of the other commands."""
 
 
 class Devices(Struct, frozen=True):
@@ -80,7 +90,8 @@ def doctor(
         if report.simulated and report.devices:
             note("simulated")
     if report.count("error") and not explain:
-        raise FoundErrors(page.summary(report), advice=f"first: {report.findings[0].action}")
+        first = report.findings[0]
+        raise ERRORS.get(first.code, MotorbusError)(page.summary(report), advice=f"first: {first.action}")
 
 
 def _examine(target: str, rate: float, common: Common, trace: examine.Trace) -> Report:
