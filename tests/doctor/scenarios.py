@@ -170,7 +170,7 @@ SCENARIOS = (
     kst("one KST is unplugged", "device-missing", "0x26 unplug", "#0x26"),
     kst("no KST answers", "can-silent", "all unplug"),
     kst("another bit rate", "can-wrong-bitrate", options={"bit_rate": 125_000}),
-    kst("29-bit identifiers", "can-mute-node", options={"id_format": "ext"}, bus=",id_format=std"),
+    kst("29-bit identifiers", "can-silent", options={"id_format": "ext"}, bus=",id_format=std"),
     kst("another node sends reports only", "can-mute-node", "all mute"),
     kst("an id that waits for a restart", "can-id-pending", "0x25 value node_id 0x30", "#0x25"),
     kst("two KST with one id", "duplicate-id", "", "#0x26", options={"duplicate": "0x26"}),

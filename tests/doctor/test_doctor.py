@@ -20,11 +20,11 @@ from motorbus.cli import main
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Effect
 from motorbus.core.steps import INTENT, JournalEntry
-from motorbus.doctor import examine, host
+from motorbus.doctor import examine
 from motorbus.doctor.bus import BusDoctor
 from motorbus.doctor.explain import explain
 from motorbus.doctor.findings import CODES, Report
-from motorbus.doctor.move import move_axes
+from motorbus.doctor.trial import move_axes
 from motorbus.errors import LinkError, RequestError
 from motorbus.families.stepper.protocol import decode_request
 from motorbus.journal import BusJournal
@@ -282,7 +282,7 @@ def test_a_missing_and_a_busy_port(monkeypatch: pytest.MonkeyPatch) -> None:
     assert examine.examine_bus("feetech:/dev/ttyNONE", {}).findings[0].code == "port-missing"
     with motorbus.simulate("feetech") as sim, motorbus.open(sim.url):
         assert examine.examine_bus(sim.url, {}).findings[0].code == "port-busy"
-    monkeypatch.setattr("motorbus.doctor.host.has_brltty", lambda: True)
+    monkeypatch.setattr("motorbus.doctor.examine.has_brltty", lambda: True)
     assert examine.examine_bus("feetech:/dev/ttyNONE", {}).findings[0].code == "brltty"
 
 
@@ -295,8 +295,8 @@ def test_brltty_is_found_by_its_process_and_the_adapter(tmp_path: Path) -> None:
     for name, text in files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
-    assert host.has_brltty(tmp_path / "sys", tmp_path / "proc")
-    assert not host.has_brltty(tmp_path / "sys", tmp_path)
+    assert examine.has_brltty(tmp_path / "sys", tmp_path / "proc")
+    assert not examine.has_brltty(tmp_path / "sys", tmp_path)
 
 
 def test_a_failed_check_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:

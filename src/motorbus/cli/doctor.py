@@ -18,11 +18,10 @@ from motorbus.doctor import bundle as bundles
 from motorbus.doctor import examine, page
 from motorbus.doctor.explain import explain as explain_text
 from motorbus.doctor.findings import DeviceHealth, Report, sort
-from motorbus.doctor.move import move_axes
+from motorbus.doctor.trial import move_axes
 from motorbus.errors import LinkLost, MotorbusError, NoReply, PortBusy, PortNotFound, RequestError
 from motorbus.link.serial import ports
 from motorbus.motion.robot import Robot
-
 
 ERRORS: Final[Mapping[str, type[MotorbusError]]] = {
     "port-missing": PortNotFound,
@@ -91,7 +90,8 @@ def doctor(
             note("simulated")
     if report.count("error") and not explain:
         first = report.findings[0]
-        raise ERRORS.get(first.code, MotorbusError)(page.summary(report), advice=f"first: {first.action}")
+        kind, summary = ERRORS.get(first.code, MotorbusError), f"{first.where}: {first.evidence}"
+        raise kind(summary, cause=first.cause, advice=first.action)
 
 
 def _examine(target: str, rate: float, common: Common, trace: examine.Trace) -> Report:

@@ -178,7 +178,7 @@ class BusDoctor:
             evidence = f"{len(stray)} bytes that are no reply, as {stray[:8].hex(' ').upper()}"
             self.add(code, self.where, evidence)
         else:
-            self.add("bus-silent", self.where, f"no reply at {len(self.bus.family.link.rates)} rate(s)")
+            self.add("bus-silent", self.where, f"no reply, rates tried: {len(self.bus.family.link.rates)}")
 
     def _check_missing(self, answering: Sequence[int]) -> None:
         missing = [node for node in self.chain if node not in answering]

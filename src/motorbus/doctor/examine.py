@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TypeAlias
+from pathlib import Path
+from typing import Final, TypeAlias
 
+from motorbus import session
+from motorbus.bus.blocking import Bus
 from motorbus.bus.trace import TraceRecord
 from motorbus.core.findings import Finding
-from motorbus.doctor import host, loop, machine
+from motorbus.doctor import machine, trial
 from motorbus.doctor.bus import BusDoctor
 from motorbus.doctor.findings import DeviceHealth, Report, arrange, complete, sort
-from motorbus.errors import LinkError, RequestError
+from motorbus.errors import LinkError, LinkLost, PortBusy, PortNotFound, RequestError
 from motorbus.motion.machine import MachineConfig
 from motorbus.session.address import parse_address
 
 Trace: TypeAlias = "dict[str, list[TraceRecord]]"
 """What went over the wire, by bus."""
+CH340: Final = ("1a86", "7523")  # the adapter that brltty takes for a Braille display
 
 
 def examine_machine(path: str, trace: Trace, rate: float = 0.0) -> Report:
@@ -53,7 +57,7 @@ def _examine(
     ids: Sequence[int] = (),
     config: MachineConfig | None = None,
 ) -> Report:
-    bus = host.open_port(address, where)
+    bus = _open(address, where)
     if isinstance(bus, Finding):
         return Report(where, (complete(bus, where),))
     with bus:
@@ -64,27 +68,53 @@ def _examine(
             if config is not None:
                 machine.check_axes(doctor, config)
             if rate:
-                loop.measure(doctor, rate)
+                trial.measure_loop(doctor, rate)
         except LinkError as error:
-            doctor.found.append(host.explain(error, where))
+            doctor.found.append(_of_port(error, where))
         trace[where] = doctor.trace
-    if not doctor.subjects:
-        doctor.found = _other_settings(address, doctor) or doctor.found
     return Report(where, tuple(arrange(doctor.found, where)), doctor.health, bus.simulated)
 
 
-def _other_settings(address: str, silent: BusDoctor) -> list[Finding]:
-    """Open a silent bus with the other settings of its family that a device may need."""
-    spot = parse_address(address)
-    for settings in getattr(silent.checks, "OTHER_SETTINGS", ()):
-        other = host.open_port(spot._replace(options={**spot.options, **settings}).bus, silent.where)
-        if isinstance(other, Finding):
-            continue
-        with other:
-            found = other.run(other.driver.scan())
-        if found:
-            ids = ", ".join(f"{one.node:#x}" for one in found)
-            option = ",".join(f"{name}={value}" for name, value in settings.items())
-            evidence, fix = f"{ids} answer with {option} only", f"open the bus with {option}"
-            return [Finding("can-mute-node", silent.where, evidence, action=fix)]
-    return []
+# -- host -----------------------------------------------------------------------------------------------------
+
+
+def _open(address: str, where: str) -> Bus | Finding:
+    """The open read-only bus of this address, or what prevents it. Raises RequestError for a bad address."""
+    try:
+        bus = session.open(address)
+    except LinkError as error:
+        return _of_port(error, where)
+    bus.read_only = True
+    return bus
+
+
+def _of_port(error: LinkError, where: str) -> Finding:
+    """The finding of an error of a port."""
+    code, text = "port-refused", error.summary
+    if "brltty" in text or (isinstance(error, PortNotFound) and has_brltty()):
+        return Finding("brltty", where, text)
+    if isinstance(error, PortNotFound):
+        code = "port-missing"
+    elif isinstance(error, PortBusy):
+        code = "port-busy"
+    elif isinstance(error, LinkLost):
+        code = "port-lost"
+    elif "no permission" in text:
+        code = "port-permission"
+    elif "bit/s" in text:
+        code = "rate-refused"
+    return Finding(code, where, text, error.cause, error.advice)
+
+
+def has_brltty(sysfs: Path = Path("/sys"), proc: Path = Path("/proc")) -> bool:
+    """A CH340 is plugged in, and brltty runs: it took the port when the adapter was plugged in."""
+    devices = list((sysfs / "bus/usb/devices").glob("*"))
+    adapters = [(_text(one / "idVendor"), _text(one / "idProduct")) for one in devices]
+    return CH340 in adapters and any(_text(one) == "brltty" for one in proc.glob("[1-9]*/comm"))
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(errors="replace").strip()
+    except OSError:
+        return ""

@@ -10,8 +10,6 @@ from motorbus.families.kst.profiles import DEFAULT_NODE
 
 FACTORY_ID: Final = DEFAULT_NODE
 HOT: Final = 80.0  # °C; no source gives a limit # assumption
-OTHER_SETTINGS: Final = ({"id_format": "ext"}, {"id_format": "std"})
-"""Settings of the bus with which a silent servo may answer."""
 
 
 async def check(subject: Subject) -> None:

@@ -1,20 +1,26 @@
-"""Whether a control loop reaches its rate on a bus, by reads only; what limits it, in words."""
+"""Two trials that a user asks for: the rate of a control loop, by reads only; a small movement of each axis."""
 
 from __future__ import annotations
 
 from statistics import quantiles
 from typing import Any, Final
 
+from motorbus.core.findings import Finding
 from motorbus.core.steps import Sleep
+from motorbus.core.units import DEGREE
 from motorbus.doctor.bus import BusDoctor
+from motorbus.doctor.findings import complete
 from motorbus.errors import MotorbusError
+from motorbus.motion.robot import Robot
 
 SECONDS: Final = 1.0
 SHARE: Final = 0.8  # of the period that a cycle may take
 MISSED: Final = 0.02  # share of the cycles that may be late
+SWING: Final = 3.0  # deg of the device, towards the middle of its range
+SPEED: Final = 0.3  # share of the velocity of the axis
 
 
-def measure(doctor: BusDoctor, rate: float) -> None:
+def measure_loop(doctor: BusDoctor, rate: float) -> None:
     """Read all positions at `rate` (Hz) for a second; goals are counted by their air time and not sent."""
     bus, streams = doctor.bus, _streams(doctor)
     reads = [request for stream in streams for request in stream.positions]
@@ -74,3 +80,33 @@ def _goals(doctor: BusDoctor, streams: list[Any]) -> list[Any]:
         except MotorbusError:
             continue  # a device is outside of its range
     return found
+
+
+def move_axes(robot: Robot) -> list[Finding]:
+    """Move each axis that has a position by 3 deg and back, one after the other. Limp axes are limp again after it."""
+    found = []
+    for name, axis in robot.axes.items():
+        if axis.config.is_wheel or "position" not in axis.driver:
+            continue
+        bus: Any = axis.bus
+        is_limp = "health" in axis.driver and bus.run(axis.driver.health(axis.device)).torque is False
+        try:
+            here = robot.positions(name)[name]
+            low, high = axis.config.low, axis.config.high
+            swing = SWING * DEGREE / abs(axis.config.ratio)
+            if low is not None and high is not None and here > (low + high) / 2:
+                swing = -swing
+            robot.move({name: here + swing}, speed=SPEED)
+            state = robot.states(name)[name]
+            robot.move({name: here}, speed=SPEED)
+        except MotorbusError as error:
+            cause = error.cause or "it is blocked, overloaded, or lost its torque"
+            found.append(Finding("motion-blocked", name, error.summary, cause, error.advice))
+            continue
+        finally:
+            if is_limp:
+                robot.disable_torque(name)
+        if "voltage" in state.alarm:
+            evidence = f"supply {state.voltage or 0:.1f} V after a move, its voltage alarm is set"
+            found.append(Finding("supply-sag", name, evidence))
+    return [complete(one, one.where) for one in found]
