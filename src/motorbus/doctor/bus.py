@@ -109,8 +109,9 @@ class BusDoctor:
                 self.bus.latency = before
         if present:
             answering = [one.node for one in present]
-            present += self._ask_again([node for node in self.chain if node not in answering])
-        return present
+            gaps = () if self._is_can else range(min(answering), max(answering))
+            present += self._ask_again([node for node in self.chain or gaps if node not in answering])
+        return sorted(present, key=lambda one: one.node)
 
     def _scan(self, ids: Sequence[int] = (), rates: Sequence[int] = ()) -> list[Found]:
         if (only := self.bus.family.link.only) is not None:

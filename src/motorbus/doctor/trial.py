@@ -10,13 +10,14 @@ from motorbus.core.steps import Sleep
 from motorbus.core.units import DEGREE
 from motorbus.doctor.bus import BusDoctor
 from motorbus.doctor.findings import complete
-from motorbus.errors import MotorbusError
+from motorbus.errors import DeviceError, MotorbusError, NoReply, WireError
 from motorbus.motion.robot import Robot
 
 SECONDS: Final = 1.0
 SHARE: Final = 0.8  # of the period that a cycle may take
 MISSED: Final = 0.02  # share of the cycles that may be late
 SWING: Final = 3.0  # deg of the device, towards the middle of its range
+LOST: Final = (NoReply, WireError, DeviceError)  # of one cycle; a lost port ends the trial
 SPEED: Final = 0.3  # share of the velocity of the axis
 
 
@@ -32,7 +33,7 @@ def measure_loop(doctor: BusDoctor, rate: float) -> None:
     due = bus.now() + period
     for _ in range(max(int(rate * SECONDS), 10)):
         start = bus.now()
-        bus.exchange(reads, (MotorbusError,))
+        bus.exchange(reads, LOST)
         times.append(bus.now() - start)
         late += bus.now() > due
         bus.run(Sleep(max(due - bus.now(), 0.0)))
@@ -73,7 +74,7 @@ def _goals(doctor: BusDoctor, streams: list[Any]) -> list[Any]:
     """The requests that would hold every device where it is."""
     found = []
     for stream in streams:
-        values = doctor.bus.exchange(stream.positions, (MotorbusError,))
+        values = doctor.bus.exchange(stream.positions, LOST)
         read = [one.values for one in values if not isinstance(one, MotorbusError)]
         try:
             found += stream.goals({node: angle for one in read for node, angle in one.items()})
