@@ -23,6 +23,7 @@ class Row(NamedTuple):
 
 
 ROWS: Final = (
+    Row("doctor", "{bus}", "{bus} --loop often"),
     Row("scan", "{bus}", "{bus} --ids one", bare=0),
     Row("info", "{bus}#1", "feetech"),
     Row("init", "arm={bus} --to new.toml", "arm"),

@@ -42,6 +42,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The working folder, with the files that the pages name."""
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     (tmp_path / "feed.toml").write_text(PROGRAM, encoding="utf-8")
+    (tmp_path / "traceback.txt").write_text("There is no status packet!", encoding="utf-8")
     (tmp_path / "wave.csv").write_text(WAVE, encoding="utf-8")
     monkeypatch.setattr("sys.stdin", StringIO("\n" * 20))
     monkeypatch.chdir(tmp_path)

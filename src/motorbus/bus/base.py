@@ -111,6 +111,15 @@ class BaseBus:
     def interlock(self, interlock: Interlock | None) -> None:
         self.engine.interlock = interlock
 
+    @property
+    def read_only(self) -> bool:
+        """Only reads leave; all that changes a device is refused with RequestError, but for an emergency stop."""
+        return self.engine.read_only
+
+    @read_only.setter
+    def read_only(self, on: bool) -> None:
+        self.engine.read_only = on
+
     def _start_stopper(self) -> None:
         """A motion request is about to leave: from now on a thread can stop it."""
         self.stopper.start()

@@ -127,7 +127,7 @@ class Bus(BaseBus):
             return None
         wire: Any = request.wire
         try:
-            if request.effect:
+            if request.effect or engine.read_only:
                 engine.check(request, since, since, now)
             if order is not None:
                 engine.check(order, since, since, now)

@@ -26,6 +26,7 @@ from motorbus.core.request import (
     ANY,
     EVERY_LANE,
     Data,
+    Effect,
     Event,
     Expected,
     Noise,
@@ -77,6 +78,8 @@ class Engine:
         self.before_motion: Callable[[], None] | None = None
         """Called when the interlock has passed a request; the bus sets it to None after the first."""
         self.listening = listen_only
+        self.read_only = False
+        """Only reads may leave; an emergency stop may as well."""
         self.diagnosis: Callable[[], str] = str
         self.trace: Feed[TraceRecord] = Feed()
         self.notices: Feed[Notification] = Feed()
@@ -181,6 +184,8 @@ class Engine:
         """
         if self.listening:
             raise failures.listen_only(request)
+        if self.read_only and not (is_poll(request) or self.stopping or self.latched):
+            raise failures.read_only(request)
         if request.priority is Priority.STOP:
             return
         self.check_stops(request, since, stop_since)
@@ -597,3 +602,9 @@ class Engine:
         """The link has this rate (bit/s) now."""
         self.rate = rate
         self.receiver, self.holds_data = self.driver.receiver(), False
+
+
+def is_poll(request: Request[Any]) -> bool:
+    """It changes nothing: a poll or a scan without effect. A write without a listed effect has another priority."""
+    polls = request.priority is Priority.POLL or request.reply_within is TimeoutClass.SCAN
+    return polls and request.effect is Effect.NONE and request.deferred is None

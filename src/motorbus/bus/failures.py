@@ -131,6 +131,16 @@ def listen_only(request: Request[Any]) -> RequestError:
     )
 
 
+def read_only(request: Request[Any]) -> RequestError:
+    """The error for a request that would change a device while the bus only reads."""
+    return RequestError(
+        "the bus only reads: nothing was sent",
+        sent=request.wire,
+        cause="`read_only` of the bus is set, as the doctor sets it",
+        advice="open the bus again to write",
+    )
+
+
 def outlived(request: Request[Any] | None = None) -> LinkLost:
     """The error for a motion request of a procedure that began before the port was lost."""
     return LinkLost(

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 from msgspec import Struct
 
+from motorbus.bus.engine import is_poll
 from motorbus.cli import output
 from motorbus.cli.output import confirm, note
 from motorbus.core.can_frame import CanFrame
-from motorbus.core.request import ANY, Effect, Priority, Request, Step, TimeoutClass
+from motorbus.core.request import ANY, Effect, Request, Step
 from motorbus.core.steps import Exclusive, Gather, SetBitrate, Shielded, Sleep, discard
 from motorbus.errors import MotorbusError
 
@@ -85,8 +86,7 @@ class Overlay:
 
     def _request(self, request: Request[Any]) -> Any:
         nodes = set() if request.expected is ANY else {one.node for one in request.expected}
-        is_polled = request.priority is Priority.POLL or request.reply_within is TimeoutClass.SCAN
-        if request.effect is Effect.NONE and is_polled:
+        if is_poll(request):
             if {-1, *nodes} & self._written:
                 raise Unforeseeable("later frames depend on replies to these: they are not shown")
             return self._bus.run(request)

@@ -44,6 +44,7 @@ COMMANDS: Final[Mapping[str, Mapping[str, tuple[str, str]]]] = {
         "init": ("discover", "Write a machine file from the devices that answer."),
     },
     "Set up": {
+        "doctor": ("doctor", "Find out why it does not work; writes nothing."),
         "setup": ("motorbus.cli.setup:app", "Set up an arm step by step."),
     },
     "Read and write": {

@@ -405,6 +405,8 @@ class Family:
     simulator_module: str  # has `simulate(ids, model, **options)`, and `OPTIONS` if it has options
     recording_module: str = ""
     """Has `Recording(direction)`. "": the bus driver decodes recordings, frames by `decode`, bytes by its receiver."""
+    checks_module: str = ""
+    """Has `CHECKS`, a tuple of `core.findings.Check`, and `FACTORY_ID`, the id of a new device; see `doctor`."""
     commands: Mapping[str, Callable[..., Runnable[Any]]] = field(default_factory=dict)
     """The commands of the manual: `function(device, …)` by name."""
     sync_write: Callable[[Mapping[Any, Mapping[str, float]]], Runnable[None]] | None = None

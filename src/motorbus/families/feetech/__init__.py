@@ -73,6 +73,7 @@ FAMILY: Final = Family(
     devices=DeviceTypes(Servo, AsyncServo),
     driver=FeetechDriver,
     simulator_module="motorbus.families.feetech.simulator",
+    checks_module="motorbus.families.feetech.checks",
     recording_module="motorbus.families.feetech.decode",
     commands={name: getattr(Servo, name).function for name in _COMMANDS},
     sync_write=sync_write,

@@ -56,5 +56,6 @@ FAMILY: Final = Family(
     devices=DeviceTypes(Servo, AsyncServo),
     driver=KstDriver,
     simulator_module="motorbus.families.kst.simulator",
+    checks_module="motorbus.families.kst.checks",
     commands={name: getattr(Servo, name).function for name in _COMMANDS},
 )

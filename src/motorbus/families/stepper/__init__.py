@@ -65,6 +65,7 @@ FAMILY: Final = Family(
     devices=DeviceTypes(Controller, AsyncController),
     driver=StepperDriver,
     simulator_module="motorbus.families.stepper.simulator",
+    checks_module="motorbus.families.stepper.checks",
     recording_module="motorbus.families.stepper.recording",
     commands={name: getattr(Controller, name).function for name in COMMANDS},
 )
