@@ -65,6 +65,6 @@ FAMILY: Final = Family(
     devices=DeviceTypes(Controller, AsyncController),
     driver=StepperDriver,
     simulator_module="motorbus.families.stepper.simulator",
-    recording_module="motorbus.families.stepper.recording",
+    recording_module="motorbus.families.stepper.protocol",
     commands={name: getattr(Controller, name).function for name in COMMANDS},
 )

@@ -8,8 +8,7 @@ from motorbus.core.recording import RecordedFrame
 from motorbus.errors import RequestError
 from motorbus.families.stepper import parameters, protocol
 from motorbus.families.stepper.parameters import ALL_OUTPUTS, PARAMETERS, ROW_LENGTH, TABLE, UNITS, Order
-from motorbus.families.stepper.protocol import REPLY_LENGTH, Command
-from motorbus.families.stepper.recording import Recording
+from motorbus.families.stepper.protocol import REPLY_LENGTH, Command, Recording
 
 
 def explain(data: bytes, order: Order = "little") -> list[Explanation]:

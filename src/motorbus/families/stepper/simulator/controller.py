@@ -43,7 +43,6 @@ class Controller(PoweredDevice):
         self.machine: Final = Machine(tick_ms=quirks.ramp_tick_ms)
         self.now = 0.0
         self.offset = 0
-        self.notices: list[float] = []
         self.on_power_off: Callable[[], object] = list  # set by the bus
         self._storing: Storing | None = None
         self._crossing: tuple[object, bool, float] = (None, False, inf)
@@ -72,9 +71,14 @@ class Controller(PoweredDevice):
         """Store a project as if it had been written and saved."""
         self.store.put(number, replace(project, number=number))
 
+    @property
+    def notices(self) -> list[float]:
+        """The times (s) of notices that the bus has not sent yet."""
+        return self.machine.notices
+
     def notice(self) -> None:
         """Send a notice without a cause."""
-        self.notices.append(self.now)
+        self.machine.notices.append(self.now)
 
     def midway(self) -> float:
         """When half of a save or a clear is done (s); inf if none runs."""
@@ -86,7 +90,6 @@ class Controller(PoweredDevice):
             self.store.stored[self._storing.number] = Project()
         self._storing = None
         self.machine.power_off(self.now)
-        self._collect()
         self.on_power_off()
 
     def power_on(self) -> None:
@@ -98,7 +101,6 @@ class Controller(PoweredDevice):
             rest = self.machine.inputs - {HOME_INPUT}
             self.machine.inputs = rest | {HOME_INPUT} if wired[self.quirks.home_switch] else rest
         self.machine.power_on(self.now, home_with=first if first.power_on_home else None)
-        self._collect()
 
     def status(self) -> dict[str, object]:
         """Its state; position in pulses, load where it is from power-on, whatever was homed since."""
@@ -137,13 +139,8 @@ class Controller(PoweredDevice):
             elif self._home_crossing() <= moment:
                 self._set_input(HOME_INPUT, HOME_INPUT not in self.machine.inputs, moment)
             self.machine.advance(moment)
-            self._collect()
         self.now = max(self.now, to)
         self.machine.advance(self.now)
-
-    def _collect(self) -> None:
-        self.notices += [one.at for one in self.machine.events if one.kind == "completed"]
-        self.machine.events.clear()
 
     # -- the home switch ---------------------------------------------------------------------------------------------
 
@@ -169,7 +166,6 @@ class Controller(PoweredDevice):
         self.machine.set_input(port, active, at, start=start if self.plugged else None)
         if is_homing and self.machine.phase is not Phase.HOMING and port == HOME_INPUT:
             self.offset += place
-        self._collect()
 
     # -- requests ----------------------------------------------------------------------------------------------------
 
@@ -191,7 +187,6 @@ class Controller(PoweredDevice):
             self._edit(command, values)
         else:
             self._act(command.name, values, at)
-        self._collect()
         image = self.store.image(number) if command.name == "read_project" else b""
         level = int(values.get("port") in self.machine.inputs)
         return encode_reply(request, selected=self.store.selected, level=level, image=image), ready
