@@ -23,7 +23,7 @@ from motorbus.errors import (
 from motorbus.families.stepper import Controller
 from motorbus.families.stepper.driver import manual
 from motorbus.families.stepper.driver import stop as stopping
-from motorbus.families.stepper.driver.plan import PlannedMove, plan_move
+from motorbus.families.stepper.driver.manual import PlannedMove, plan_move
 from motorbus.families.stepper.execution.machine import Phase
 from motorbus.families.stepper.parameters import Project, Step
 from tests.families.stepper.bench import STOP_MOTOR, STOP_PROJECT, TURN, Bench, bench, made

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motorbus.families.stepper.execution import ramp, sequence
+from motorbus.families.stepper.execution import ramp
 from motorbus.families.stepper.execution.machine import Machine, Phase
 from motorbus.families.stepper.execution.ramp import Ramp
 from motorbus.families.stepper.parameters import Project, Step, decode_image, with_steps
@@ -117,9 +117,9 @@ def test_a_known_order(vector: dict[str, Any]) -> None:
         total_steps=vector["total_steps"], loop_first=first, loop_last=last, loop_count=count,
         project_loop=vector["project_loop"],
     )  # fmt: skip
-    assert [place.step for place in sequence.one_pass(made)] == vector["order"]
-    assert sequence.passes(made) == vector["passes"]
-    assert [sequence.times(made, n) for n in range(1, 11)] == [vector["order"].count(n) for n in range(1, 11)]
+    assert [place.step for place in made.one_pass()] == vector["order"]
+    assert made.passes == vector["passes"]
+    assert [made.times(n) for n in range(1, 11)] == [vector["order"].count(n) for n in range(1, 11)]
 
 
 def test_no_project_ends_before_all_its_pauses_and_pulses() -> None:

@@ -15,13 +15,22 @@ example frames carry a correct checksum, so where an annotation differs the fram
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 from motorbus.core.recording import RecordedEvent, RecordedFrame
 from motorbus.core.register import shown
 from motorbus.core.request import Data, Effect, Event, Noise, Notification, Reply, TimeoutClass
 from motorbus.errors import RequestError
-from motorbus.families.stepper.parameters import IMAGE_LENGTH, PARAMETERS, check_loop, check_value
+from motorbus.families.stepper.parameters import (
+    BASE_NAMES,
+    IMAGE_LENGTH,
+    PARAMETERS,
+    STEPS,
+    Project,
+    check_loop,
+    check_value,
+)
 
 RATE: Final = 9600  # bit/s; 8 data bits, no parity, 1 stop bit
 HEADER: Final = b"\xff\xaa"
@@ -261,6 +270,55 @@ def key_of(reply: bytes) -> bytes:
 def expected_key(request: bytes) -> bytes:
     """The key of the reply to this request."""
     return key_of(encode_reply(request))
+
+
+# -- edits of a project ----------------------------------------------------------------------------------------------
+
+_EDITS: Final = [command for command in COMMANDS.values() if command.is_edit]
+
+
+class Edit(NamedTuple):
+    """One command that sets parameters, and its numbers."""
+
+    command: str
+    values: Mapping[str, int]
+
+
+def edits(project: Project) -> list[Edit]:
+    """The commands that write this project with all ten steps, in order."""
+    found = [_edit(project, command) for command in _EDITS if "step" not in command.fields]
+    for step in range(1, STEPS + 1):
+        found += [_edit(project, command, step) for command in _EDITS if "step" in command.fields]
+    return found
+
+
+def edits_between(before: Project, after: Project) -> list[Edit]:
+    """The commands that turn one project into another, the selection first; none if nothing differs."""
+    select, *_ = new = edits(after)
+    found = [one for old, one in zip(edits(before), new, strict=True) if old != one]
+    if found and found[0] != select:
+        found.insert(0, select)
+    return found
+
+
+def edited(project: Project, command: str, values: Mapping[str, int]) -> Project:
+    """The project after a command that sets parameters; a step that does not exist changes nothing."""
+    changes: dict[str, Any] = dict(values)
+    if "step" in changes:
+        step = changes.pop("step")
+        return project.with_step(step, **changes) if 1 <= step <= STEPS else project
+    if command == "select_project":
+        changes["number"] = changes.pop("project")
+    return replace(project, **changes)
+
+
+def _edit(project: Project, command: Command, step: int = 0) -> Edit:
+    known = {"project": project.number, "step": step}
+    values = {}
+    for name in command.fields:
+        source = project if name in BASE_NAMES else project.step(step or 1)
+        values[name] = known[name] if name in known else getattr(source, name)
+    return Edit(command.name, values)
 
 
 # -- frames of a line ------------------------------------------------------------------------------------------------

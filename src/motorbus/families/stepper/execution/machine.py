@@ -12,10 +12,9 @@ from math import inf
 from typing import Final
 
 from motorbus.families.stepper import parameters
-from motorbus.families.stepper.execution import ramp, sequence
+from motorbus.families.stepper.execution import ramp
 from motorbus.families.stepper.execution.ramp import Motion
-from motorbus.families.stepper.execution.sequence import Place
-from motorbus.families.stepper.parameters import HOME_INPUT, START_INPUT, STOP_INPUT, Project, Step
+from motorbus.families.stepper.parameters import HOME_INPUT, START_INPUT, STOP_INPUT, Place, Project, Step
 
 FIRST: Final = Place(1)
 EMPTY_PASS: Final = 0.001  # s of a pass of an endless project in which nothing takes time # assumption
@@ -237,9 +236,9 @@ class Machine:
         self._rest(Phase.PAUSE, self._now + run.step.delay / 1000)
 
     def _next_step(self, run: Run) -> None:
-        place = sequence.following(run.project, run.place)
+        place = run.project.following(run.place)
         if place is None:
-            passes = sequence.passes(run.project)
+            passes = run.project.passes
             if passes is not None and run.round >= passes:
                 self._finish(completed=True)
                 return
