@@ -23,12 +23,12 @@ class _Block:
 
     async def _finish(self, error: BaseException | None) -> None:
         guard = StopsIfInterrupted(self._loop.members)
-        if error is not None:
+        if error is None:
+            async with guard:
+                await self._loop.leave(None)
+        else:
             self._loop.close()
             await guard.leave(error)
-            return
-        async with guard:
-            await self._loop.leave()
 
 
 class Loop(_Block):

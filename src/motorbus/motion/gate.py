@@ -12,8 +12,8 @@ from motorbus.core.family import IdChanged
 from motorbus.core.request import EVERY_LANE, Effect, Priority, Request
 from motorbus.core.setpoint import Setpoint, Stays
 from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, NotHomed, Refused
+from motorbus.motion.axis import FRESH, AxisStatus
 from motorbus.motion.lease import Lease, lease_lost
-from motorbus.motion.status import FRESH, AxisStatus
 
 LEAD_TIME: Final = 0.8  # s at the maximum velocity that a goal without a speed may be away
 NEAR: Final = 0.1  # rad that any goal may be away
