@@ -236,6 +236,14 @@ def test_a_rate_is_chosen_and_one_that_the_wire_cannot_carry_is_refused() -> Non
             robot.loop(2)
 
 
+def test_a_loop_that_cannot_begin_is_not_counted() -> None:
+    with machine("1") as (config, sims), Robot(config) as robot:
+        next(iter(sims.values()))[1].unplug()
+        with pytest.raises(NoReply):
+            robot.jog("a1", 0.5, 1.0)
+        assert robot.loops == 0
+
+
 def test_axes_that_follow_no_setpoints_are_left_out_or_refused_by_name() -> None:
     with machine("1", lift=True) as (config, _), Robot(config) as robot:
         with robot.loop(50) as loop:

@@ -57,10 +57,6 @@ class Moved(NamedTuple):
     velocity: float
     seconds: float
 
-    def __str__(self) -> str:
-        rpm = abs(self.velocity) * 60 / tau
-        return f"estimated: {self.angle:.6g} rad at {rpm:.0f} RPM in at most {self.seconds:.3f} s"
-
 
 class Homed(NamedTuple):
     """Input 5 was active after `seconds` in reverse at `velocity` (rad/s, estimated), and the stop was acknowledged."""

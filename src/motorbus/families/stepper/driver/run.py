@@ -155,14 +155,15 @@ async def _checked_project(node: Node, number: int, endless: bool, expert: bool)
     await check_free(node, RUN)
     program = await read_project(node, number)
     errors = [] if expert else [str(one) for one in program.lint() if one.level == "error"]
-    refusals = {
-        "has no steps; write it first": program.project.is_cleared,
-        f"has errors: {'; '.join(errors)}": errors,
-        "has no end; say endless=True": program.project.is_endless and not endless,
-    }
-    for refusal, applies in refusals.items():
-        if applies:
-            raise RequestError(f"project {number} {refusal}", advice="nothing was started", node=node.node)
+    refusal = ""
+    if program.project.is_cleared:
+        refusal = "has no steps; write it first"
+    elif errors:
+        refusal = f"has errors: {'; '.join(errors)}"
+    elif program.project.is_endless and not endless:
+        refusal = "has no end; say endless=True"
+    if refusal:
+        raise RequestError(f"project {number} {refusal}", advice="nothing was started", node=node.node)
     return program.project
 
 
