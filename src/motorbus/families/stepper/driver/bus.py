@@ -14,9 +14,8 @@ from motorbus.core.steps import Runnable
 from motorbus.errors import NoReply, RequestError
 from motorbus.families.stepper import protocol
 from motorbus.families.stepper.driver import manual, run, stop
-from motorbus.families.stepper.driver.node import BusState, Node
+from motorbus.families.stepper.driver.node import STOPS, BusState, Node, command, ignore
 from motorbus.families.stepper.driver.projects import dump_once
-from motorbus.families.stepper.driver.requests import STOPS, command, ignore
 from motorbus.families.stepper.execution.ramp import TICK_MS
 from motorbus.families.stepper.parameters import PROJECTS, checked_order
 

@@ -20,10 +20,9 @@ from motorbus.core.setpoint import Setpoint
 from motorbus.core.steps import Emit, Exclusive, Progress, Sleep
 from motorbus.errors import NotHomed, RequestError
 from motorbus.families.stepper.driver.io import check_seconds, read_input
-from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.driver.node import Node, command, ignore
 from motorbus.families.stepper.driver.project1 import TemporaryProject1, with_project1
 from motorbus.families.stepper.driver.projects import MANUAL, cached
-from motorbus.families.stepper.driver.requests import command, ignore
 from motorbus.families.stepper.driver.stop import Watch, check_free
 from motorbus.families.stepper.execution import ramp
 from motorbus.families.stepper.execution.ramp import Motion, move_of

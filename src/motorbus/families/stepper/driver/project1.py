@@ -15,9 +15,8 @@ from typing import Any, Final, TypeVar
 from motorbus.core.steps import INTENT, OUTCOME, REACHED, Emit, Exclusive, Guard, JournalEntry, Sleep
 from motorbus.errors import LinkError, MotorbusError, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.stepper import parameters
-from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.driver.node import STOPS, Node
 from motorbus.families.stepper.driver.projects import MANUAL, bring, cached, read_image
-from motorbus.families.stepper.driver.requests import STOPS
 from motorbus.families.stepper.driver.stop import RUN, Watch, check_free, close_run, end_motion
 from motorbus.families.stepper.execution.ramp import stop_seconds
 from motorbus.families.stepper.parameters import STEPS, Project, amended, differences, encode_image

@@ -25,8 +25,7 @@ from motorbus.errors import (
 )
 from motorbus.families.stepper import parameters
 from motorbus.families.stepper.driver.io import read_input
-from motorbus.families.stepper.driver.node import Node
-from motorbus.families.stepper.driver.requests import command, ignore
+from motorbus.families.stepper.driver.node import Node, command, ignore
 from motorbus.families.stepper.driver.stop import check_free
 from motorbus.families.stepper.parameters import PROJECTS, STEPS, Project, check_value, differences
 from motorbus.families.stepper.program.backup import Backup

@@ -36,9 +36,8 @@ from motorbus.errors import (
     WireError,
 )
 from motorbus.families.stepper.driver.io import Levels, check_seconds, checked_ports, inputs, read_input
-from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.driver.node import Node, command, ignore
 from motorbus.families.stepper.driver.projects import read_project
-from motorbus.families.stepper.driver.requests import command, ignore
 from motorbus.families.stepper.driver.stop import RUN, Watch, check_free, close_run
 from motorbus.families.stepper.parameters import OUTPUTS, STOP_INPUT, Project
 from motorbus.families.stepper.program.estimate import Estimate, earliest_end, estimate, reach

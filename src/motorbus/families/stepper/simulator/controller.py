@@ -42,8 +42,8 @@ EXAMPLE: Final = with_steps(
 class Memory:
     """`stored` projects by number, one copy `working` that is edited, and the `selected` number.
 
-    Commands that edit carry no project, and two of them are answered with one: so one project is selected, and a save
-    puts the edited copy into a slot. # assumption
+    Commands that edit carry no project, and two of them are answered with one. So one project is selected:
+    a save puts the edited copy into a slot. # assumption
 
     `selected_at_power_on` is 1. # assumption
     """
