@@ -16,9 +16,8 @@ from motorbus.core.steps import Guard, catch, discard, gather
 from motorbus.core.stream import read_positions
 from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, NoReply, Refused, RequestError
 from motorbus.motion.axis import FRESH, Axis, by_bus, name_axis, on_axes
-from motorbus.motion.gate import check_owned
+from motorbus.motion.gate import check_owned, lease_lost
 from motorbus.motion.health import HealthMonitor
-from motorbus.motion.lease import lease_lost
 from motorbus.motion.machine import SLACK, Names
 from motorbus.motion.profile import Limits, SetpointGenerator
 from motorbus.motion.program import LOST, Exchange, OnBuses, raise_first

@@ -13,9 +13,8 @@ from motorbus.bus.base import BaseBus
 from motorbus.core.family import State
 from motorbus.errors import RequestError
 from motorbus.motion.axis import Axis, on_axes, read_state
-from motorbus.motion.gate import SafetyGate
+from motorbus.motion.gate import Lease, SafetyGate
 from motorbus.motion.health import HealthMonitor
-from motorbus.motion.lease import Lease
 from motorbus.motion.machine import MachineConfig, Names, nearest
 from motorbus.motion.program import raise_first
 
