@@ -12,10 +12,9 @@ from motorbus.core.family import IdChanged
 from motorbus.core.request import EVERY_LANE, Effect, Priority, Request
 from motorbus.core.setpoint import Deferred, Setpoint, Stays
 from motorbus.errors import LimitExceeded, MotorbusError, NotHomed, Refused
-from motorbus.motion.gate import SafetyGate, check_owned
-from motorbus.motion.lease import Lease
+from motorbus.motion.axis import AxisStatus
+from motorbus.motion.gate import Lease, SafetyGate, check_owned
 from motorbus.motion.machine import AxisConfig, Position, Velocity
-from motorbus.motion.status import AxisStatus
 
 NOW = 100.0
 

@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Self
+import logging
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
+from math import inf
+from threading import Event, Thread
+from typing import Any, Final, Self
 
 from motorbus.bus.base import BaseBus
+from motorbus.bus.blocking import run_on
+from motorbus.core.steps import Procedure
 from motorbus.errors import RequestError
-from motorbus.motion.lease import Lease, LeaseWatch, lease_lost
+from motorbus.motion.gate import Lease, lease_lost
 from motorbus.motion.loop import ControlLoop, LoopState
 from motorbus.motion.moves import StopsIfInterrupted, stop_axes
 from motorbus.motion.program import Program, drive, drive_async, raise_first
 from motorbus.motion.shutdown import stop_bus
 from motorbus.motion.state import OpenMachine
+
+LOG = logging.getLogger("motorbus.motion")
+RETRY: Final = 0.5  # s after which the stop is sent again to axes that did not accept it
+LOOK: Final = 0.05  # s between two looks at the lease
 
 
 class _Block:
@@ -23,12 +33,12 @@ class _Block:
 
     async def _finish(self, error: BaseException | None) -> None:
         guard = StopsIfInterrupted(self._loop.members)
-        if error is not None:
+        if error is None:
+            async with guard:
+                await self._loop.leave(None)
+        else:
             self._loop.close()
             await guard.leave(error)
-            return
-        async with guard:
-            await self._loop.leave()
 
 
 class Loop(_Block):
@@ -77,6 +87,46 @@ class AsyncLoop(_Block):
 
     async def __aexit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         await drive_async(self._finish(error))
+
+
+Stop = Callable[[BaseBus], Procedure[bool]]
+"""Stops what moves on a bus; False where an axis did not accept it."""
+
+
+class LeaseWatch:
+    """Stops what moves on these buses when the lease is lost, again every 0.5 s until each axis has accepted it.
+
+    A thread does that, so a program that hangs is stopped. In virtual time, which passes only while the program waits,
+    nothing does: there the gate refuses the next goal, and the movement ends by that.
+    """
+
+    def __init__(self, lease: Lease, buses: Iterable[BaseBus], stop: Stop) -> None:
+        self._lease = lease
+        self._buses = tuple(buses)
+        self._stop = stop
+        self._ended = Event()
+
+    def start(self) -> None:
+        """Begin to watch."""
+        if self._lease.seconds < inf and not any(bus.link.virtual for bus in self._buses):
+            Thread(target=self._watch, name="motorbus lease", daemon=True).start()
+
+    def end(self) -> None:
+        """Stop watching."""
+        self._ended.set()
+
+    def _watch(self) -> None:
+        going = set(self._buses)
+        while not self._ended.wait(LOOK):
+            if not self._lease.lost:
+                going = set(self._buses)
+                continue
+            with suppress(Exception):  # a bus that is gone: again after a pause
+                accepted = run_on({bus: self._stop(bus) for bus in going})
+                going -= {bus for bus, value in accepted.items() if value is True}
+            if going:
+                LOG.warning("the lease is lost, and not every axis has accepted the stop")
+                self._ended.wait(RETRY)
 
 
 class Attendance:

@@ -1,4 +1,4 @@
-"""The safety gate: a list of checks that each motion request passes before it is sent."""
+"""The safety gate: a list of checks that each motion request passes before it is sent; the lease."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from motorbus.core.family import IdChanged
 from motorbus.core.request import EVERY_LANE, Effect, Priority, Request
 from motorbus.core.setpoint import Setpoint, Stays
 from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, NotHomed, Refused
-from motorbus.motion.lease import Lease, lease_lost
-from motorbus.motion.status import FRESH, AxisStatus
+from motorbus.motion.axis import FRESH, AxisStatus
 
 LEAD_TIME: Final = 0.8  # s at the maximum velocity that a goal without a speed may be away
 NEAR: Final = 0.1  # rad that any goal may be away
@@ -22,6 +21,41 @@ SPEED_SLACK: Final = 0.01
 SPEED_UNIT: Final = 0.08
 """rad/s; a device rounds a speed up to its unit, so a legal speed never becomes illegal (50 counts/s of an STS)."""
 ENDLESS: Final = ("velocity", "load", "current")
+
+
+class Lease:
+    """The right to move a machine, for `seconds` after each `beat`; without `seconds` until it ends.
+
+    A lease that was not renewed in time is lost; it stays lost until `reset`.
+    """
+
+    def __init__(self, now: Callable[[], float], seconds: float = inf) -> None:
+        self.seconds: Final = seconds
+        self._now = now
+        self._until = now() + seconds
+
+    @property
+    def lost(self) -> bool:
+        """It was not renewed in time."""
+        return self._now() > self._until
+
+    def beat(self) -> None:
+        """Renew it. Raises Refused if it is lost."""
+        if self.lost:
+            raise lease_lost("the machine")
+        self._until = self._now() + self.seconds
+
+    def reset(self) -> None:
+        """Take it again after a loss. Nothing is sent."""
+        self._until = self._now() + self.seconds
+
+
+def lease_lost(name: str) -> Refused:
+    """The error for an axis that must not move because the lease is lost."""
+    return Refused(
+        f"{name}: the motion lease was not renewed in time", reason="lease", advice="lease.reset()"
+    )
+
 
 Check = Callable[["SafetyGate", AxisStatus, Setpoint, float], "MotorbusError | None"]
 

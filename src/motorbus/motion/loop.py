@@ -12,18 +12,16 @@ from msgspec import Struct
 from motorbus.bus.base import BaseBus
 from motorbus.core.family import Positions, PositionStream
 from motorbus.core.request import Precondition, Request, SetpointGroup, SetpointWrite, Stops
-from motorbus.core.steps import catch, discard, gather
+from motorbus.core.steps import Guard, catch, discard, gather
 from motorbus.core.stream import read_positions
 from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, NoReply, Refused, RequestError
-from motorbus.motion.axis import Axis, by_bus, name_axis, on_axes
-from motorbus.motion.gate import check_owned
+from motorbus.motion.axis import FRESH, Axis, by_bus, name_axis, on_axes
+from motorbus.motion.gate import check_owned, lease_lost
 from motorbus.motion.health import HealthMonitor
-from motorbus.motion.lease import lease_lost
 from motorbus.motion.machine import SLACK, Names
 from motorbus.motion.profile import Limits, SetpointGenerator
 from motorbus.motion.program import LOST, Exchange, OnBuses, raise_first
 from motorbus.motion.state import OpenMachine
-from motorbus.motion.status import FRESH
 
 Policy: TypeAlias = Literal["reject", "clamp"]
 MAX_MISSED: Final = 2  # cycles without a position after which an axis gets no goal
@@ -41,16 +39,14 @@ ENTRY_TRIES: Final = 5  # reads in which each axis must answer once
 class LoopStatistics(Struct):
     """`overruns`: cycles that began late; `skipped`: slots without a cycle; the rest by name of the axis.
 
-    `lost` and `suspect` count readings, `clamped` targets; delays are in s.
+    `lost` counts readings that are missing or doubtful, `clamped` targets.
     """
 
     rate: float
     cycles: int = 0
     overruns: int = 0
     skipped: int = 0
-    worst_delay: float = 0.0
     lost: dict[str, int] = {}
-    suspect: dict[str, int] = {}
     clamped: dict[str, int] = {}
 
 
@@ -155,8 +151,10 @@ class BusGroup:
         )
 
 
-class ControlLoop:
-    """Targets are followed within the limits of each axis; with `direct` they are sent as they are.
+class ControlLoop(Guard):
+    """For `async with`: it brakes at the end; after an error it is closed at once.
+
+    Targets are followed within the limits of each axis; with `direct` they are sent as they are.
 
     Entering reads and writes nothing. An axis gets torque, without a jump, in the cycle after its first target. A
     target outside the limits raises LimitExceeded, or is clamped and counted with the policy "clamp". A loop raises
@@ -226,6 +224,7 @@ class ControlLoop:
         groups = by_bus(self.members)
         opened = await OnBuses({bus: _open(bus, axes) for bus, axes in groups.items()})
         raise_first(opened)
+        self.machine.loops += 1
         for bus, axes in groups.items():
             members = [LoopAxis(axis) for axis in axes]
             stream, reads = opened[bus]
@@ -241,7 +240,6 @@ class ControlLoop:
             raise NoReply(f"{', '.join(sorted(missing))}: no reply", node=first.axis.config.node)
         for axis in self.axes.values():
             axis.restart()
-        self.machine.loops += 1
 
     def _settle_rate(self) -> None:
         """Choose the rate, or check that the wire carries it; goals need about as much as the positions."""
@@ -317,18 +315,21 @@ class ControlLoop:
         if any(one.suspect is not None or (one.measured and at - one.at > STALE) for one in led):
             self._absorb(await self._read())
 
-    async def leave(self) -> None:
+    async def leave(self, error: BaseException | None) -> None:
         """Brake the axes that are still moving, within their limits; then the loop sends nothing more."""
-        owned = [axis for axis in self.axes.values() if axis.owner is not None]
         try:
-            if not self.direct:
-                for axis in owned:
-                    axis.target = 0.0 if axis.config.is_wheel else axis.generator.brake()
-                while any(axis.owner is not None and not self._rests(axis) for axis in owned):
-                    await self.cycle()
-            self.settle()
+            if error is None:
+                await self._brake()
+                self.settle()
         finally:
             self.close()
+
+    async def _brake(self) -> None:
+        owned = [axis for axis in self.axes.values() if axis.owner is not None and not self.direct]
+        for axis in owned:
+            axis.target = 0.0 if axis.config.is_wheel else axis.generator.brake()
+        while any(axis.owner is not None and not self._rests(axis) for axis in owned):
+            await self.cycle()
 
     def settle(self) -> None:
         """The axes that the loop owns have come to rest."""
@@ -360,11 +361,9 @@ class ControlLoop:
         late = now - self._next
         if late <= 1e-6:
             return 1
-        statistics = self.statistics
         gone = int(late / period)
-        statistics.overruns += 1
-        statistics.skipped += gone
-        statistics.worst_delay = max(statistics.worst_delay, late)
+        self.statistics.overruns += 1
+        self.statistics.skipped += gone
         self.slot += gone
         self._next += gone * period
         if late > STALL and any(axis.owner is not None for axis in self.axes.values()):
@@ -435,8 +434,7 @@ class ControlLoop:
                         axis.behind = True
                     axis.missed = 0
                     continue
-                counts = self.statistics.lost if angle is None else self.statistics.suspect
-                counts[axis.name] = counts.get(axis.name, 0) + 1
+                self.statistics.lost[axis.name] = self.statistics.lost.get(axis.name, 0) + 1
                 axis.silent_since = axis.silent_since if axis.missed else self.machine.now()
                 axis.missed += 1
                 missing.append(axis.name)

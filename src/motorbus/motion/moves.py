@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from math import inf, isfinite
 from typing import Any, Final, NamedTuple
 
@@ -101,40 +102,33 @@ async def move(
     led = [axis.name for axis in axes if axis.follows_setpoints]
     timed = _TimedAxes([axis for axis in axes if not axis.follows_setpoints])
     loop = ControlLoop(machine, led, direct=True) if led else None
-    async with timed, StopsIfInterrupted(axes):
-        try:
-            moves = {}
-            if loop is not None:
-                await loop.enter()
-                for name, one in loop.axes.items():
-                    goal = goals[name] + (one.position if relative else 0.0)
-                    check_reach(one.axis, goal)
-                    moves[name] = Move(one.position, goal, limits[name])
-            await timed.plan(goals, limits, relative=relative)
-            profile = synchronize(moves, kind=kind, duration=duration, shortest=timed.shortest)
-            longest = timed.fit(profile.duration)
-            if longest > profile.duration:
-                profile = synchronize(moves, kind=kind, duration=longest, shortest=timed.shortest)
-            await timed.prepare(profile.duration)
-            begun = machine.now()
-            if loop is None:
-                await timed.start()
-            else:
-                period = 1 / loop.rate
+    async with timed, StopsIfInterrupted(axes), loop or nullcontext():
+        moves = {}
+        for name, one in loop.axes.items() if loop else ():
+            goal = goals[name] + (one.position if relative else 0.0)
+            check_reach(one.axis, goal)
+            moves[name] = Move(one.position, goal, limits[name])
+        await timed.plan(goals, limits, relative=relative)
+        profile = synchronize(moves, kind=kind, duration=duration, shortest=timed.shortest)
+        longest = timed.fit(profile.duration)
+        if longest > profile.duration:
+            profile = synchronize(moves, kind=kind, duration=longest, shortest=timed.shortest)
+        await timed.prepare(profile.duration)
+        begun = machine.now()
+        if loop is None:
+            await timed.start()
+        else:
+            period = 1 / loop.rate
 
-                def positions(elapsed: float) -> Mapping[str, float]:
-                    # `elapsed` is that of the next slot
-                    timed.estimate(min(elapsed - period, profile.duration))
-                    return profile.positions(elapsed)
+            def positions(elapsed: float) -> Mapping[str, float]:
+                timed.estimate(min(elapsed - period, profile.duration))  # `elapsed` is that of the next slot
+                return profile.positions(elapsed)
 
-                peaks = {name: one.peak for name, one in profile.profiles.items()}
-                ends = {name: one.goal for name, one in moves.items()}
-                course = Course(profile.duration, positions, peaks, ends)
-                begun = await lead(loop, course, timed.starts, tolerance, timeout)
-            await timed.end()
-        finally:
-            if loop is not None:
-                loop.close()
+            peaks = {name: one.peak for name, one in profile.profiles.items()}
+            ends = {name: one.goal for name, one in moves.items()}
+            course = Course(profile.duration, positions, peaks, ends)
+            begun = await lead(loop, course, timed.starts, tolerance, timeout)
+        await timed.end()
     results = {
         name: AxisResult(
             moves[name].goal if name in moves else goal,
@@ -358,7 +352,7 @@ async def jog(
     if not axis.follows_setpoints:
         return await _jog_self_timed(machine, axis, velocity, seconds)
     loop = ControlLoop(machine, [name], policy="clamp")
-    async with StopsIfInterrupted([axis]), Running(loop):
+    async with StopsIfInterrupted([axis]), loop:
         led = loop.axes[name]
         end = led.high if velocity > 0 else led.low
         if not config.is_wheel:
@@ -547,22 +541,6 @@ async def release_torque(axes: list[Axis]) -> dict[str, Any]:
 
 
 # -- shared by the clients of the loop -------------------------------------------------------------------------
-
-
-class Running(Guard):
-    """A control loop for `async with`: it brakes at the end; after an error it is closed at once."""
-
-    def __init__(self, loop: ControlLoop) -> None:
-        self._loop = loop
-
-    async def enter(self) -> None:
-        await self._loop.enter()
-
-    async def leave(self, error: BaseException | None) -> None:
-        if error is None:
-            await self._loop.leave()
-        else:
-            self._loop.close()
 
 
 def check_seconds(seconds: float | None) -> None:

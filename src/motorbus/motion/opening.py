@@ -15,12 +15,11 @@ from motorbus.core.family import Identity
 from motorbus.core.steps import READABLE, catch, gather
 from motorbus.errors import MotorbusError, NoReply, RequestError
 from motorbus.link.memory import MemoryLink, share_clock
-from motorbus.motion.axis import Axis
+from motorbus.motion.axis import Axis, AxisStatus
 from motorbus.motion.gate import SafetyGate
 from motorbus.motion.machine import AxisConfig, BusConfig, MachineConfig, Names, Velocity
 from motorbus.motion.program import OnBuses, raise_first
 from motorbus.motion.state import OpenMachine
-from motorbus.motion.status import AxisStatus
 from motorbus.session.address import parse_address
 from motorbus.session.journals import unfinished
 

@@ -31,13 +31,20 @@ from motorbus.motion import teach as recording
 from motorbus.motion.axis import Axis, read_position
 from motorbus.motion.blocks import AsyncLoop, Attendance, Loop
 from motorbus.motion.commands import EStopResult, RobotCommand
-from motorbus.motion.describe import MachineDescription, describe
 from motorbus.motion.loop import ControlLoop, Policy
 from motorbus.motion.machine import MachineConfig, Names
 from motorbus.motion.opening import UNTRUSTED, USUAL_VELOCITY, bus_options, identify, machine_at, select
 from motorbus.motion.program import Program, drive, drive_async, raise_first, run
 from motorbus.motion.shutdown import Shutdown
-from motorbus.motion.state import OpenMachine, Subscription, poll, read_axes, read_positions
+from motorbus.motion.state import (
+    MachineDescription,
+    OpenMachine,
+    Subscription,
+    describe,
+    poll,
+    read_axes,
+    read_positions,
+)
 from motorbus.session import open as open_bus
 from motorbus.session import open_async
 
@@ -95,9 +102,6 @@ async def _leave(machine: OpenMachine, error: BaseException | None, *, graceful:
                 error.add_note(note)
     if error is None:
         raise_first(ending.errors)
-    else:
-        for name, action in ending.carried_out():
-            error.add_note(f"{name}: {action}, as its exit says")
 
 
 class RobotMethods(OpenMachine):

@@ -60,15 +60,6 @@ class Shutdown:
         if interrupt is not None:
             raise interrupt
 
-    def carried_out(self) -> list[tuple[str, str]]:
-        """The axes that were parked or released, and which of it."""
-        words = {"park": "parked", "torque_off": "torque off", "park, torque_off": "parked, torque off"}
-        return [
-            (name, words[action])
-            for name, action in self._actions.items()
-            if action in words and not any(note.startswith(f"{name}: ") for note in self.notes)
-        ]
-
     def _with(self, action: str) -> list[Axis]:
         axes = self._machine.axes
         return [axes[name] for name, actions in self._actions.items() if action in actions]

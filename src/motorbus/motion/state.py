@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from math import isfinite
 from threading import Condition
 from typing import Any, Final
 
@@ -12,9 +13,8 @@ from motorbus.bus.base import BaseBus
 from motorbus.core.family import State
 from motorbus.errors import RequestError
 from motorbus.motion.axis import Axis, on_axes, read_state
-from motorbus.motion.gate import SafetyGate
+from motorbus.motion.gate import Lease, SafetyGate
 from motorbus.motion.health import HealthMonitor
-from motorbus.motion.lease import Lease
 from motorbus.motion.machine import MachineConfig, Names, nearest
 from motorbus.motion.program import raise_first
 
@@ -188,3 +188,77 @@ async def poll(machine: OpenMachine) -> None:
     """Program: read all axes for the subscribers; errors show as age."""
     await on_axes(machine.chosen(), read_state)
     machine.publish()
+
+
+# -- what it is ------------------------------------------------------------------------------------------------
+
+
+class AxisDescription(Struct, frozen=True):
+    """One axis. Positions in rad (m), velocities in rad/s (m/s); `low` and `high` None without a limit.
+
+    `commands` are the functions of its device.
+    """
+
+    device: str
+    model: str
+    kind: str
+    unit: str
+    low: float | None
+    high: float | None
+    max_velocity: float
+    max_acceleration: float
+    exit: str
+    estop: str
+    commands: tuple[str, ...]
+
+
+class BusDescription(Struct, frozen=True):
+    """One bus: its address, family, rate (bit/s), and whether its devices are simulated."""
+
+    address: str
+    family: str
+    rate: int
+    simulated: bool
+
+
+class MachineDescription(Struct, frozen=True):
+    """A machine: its tables by name."""
+
+    name: str
+    buses: dict[str, BusDescription]
+    axes: dict[str, AxisDescription]
+    groups: dict[str, tuple[str, ...]]
+    poses: dict[str, dict[str, float]]
+
+
+def describe(machine: OpenMachine) -> MachineDescription:
+    """Describe an open machine; sends nothing."""
+    config = machine.config
+    buses = {
+        name: BusDescription(config.buses[name].address, bus.family.name, bus.rate, bus.simulated)
+        for name, bus in machine.buses.items()
+    }
+    axes = {name: _describe_axis(axis) for name, axis in machine.axes.items()}
+    poses = {
+        name: {axis: float(place) for axis, place in pose.items()} for name, pose in config.poses.items()
+    }
+    return MachineDescription(config.name, buses, axes, dict(config.groups), poses)
+
+
+def _describe_axis(axis: Axis) -> AxisDescription:
+    config = axis.config
+    low, high = axis.range
+    stops = axis.bus.family.link.stops
+    return AxisDescription(
+        device=config.device,
+        model=axis.model,
+        kind=config.kind,
+        unit=config.display_unit,
+        low=low if isfinite(low) else None,
+        high=high if isfinite(high) else None,
+        max_velocity=float(config.max_velocity),
+        max_acceleration=float(config.acceleration),
+        exit=config.exit_action,
+        estop=config.estop or (stops[0] if stops else "stop"),
+        commands=tuple(sorted(axis.driver.names)),
+    )

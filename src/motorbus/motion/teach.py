@@ -14,7 +14,6 @@ from motorbus.motion.loop import ControlLoop, LoopState, Policy
 from motorbus.motion.machine import Names
 from motorbus.motion.moves import (
     Course,
-    Running,
     StopsIfInterrupted,
     check_reach,
     check_seconds,
@@ -57,7 +56,7 @@ async def teach(
     loop = ControlLoop(machine, [axis.name for axis in axes], rate=rate)
     samples: list[LoopState] = []
     try:
-        async with Running(loop):
+        async with loop:
             begun = machine.now()
             while not ended(machine.now() - begun, seconds, until) and len(samples) < MOST:
                 state = await loop.cycle()
@@ -114,19 +113,15 @@ async def replay(
     if smooth is not None:
         trajectory = trajectory.smoothed(smooth)
     loop = ControlLoop(machine, names, rate=rate, direct=True)
-    async with StopsIfInterrupted(axes):
-        try:
-            await loop.enter()
-            goals = trajectory.sampled(loop.rate, interpolation, speed)
-            goals.check({axis.name: axis.config for axis in axes})
-            for axis in axes:
-                for place in (min(goals.axes[axis.name]), max(goals.axes[axis.name])):
-                    check_reach(axis, place)
-            begun = machine.now()
-            for _ in range(repeat):
-                await _play(machine, loop, goals)
-        finally:
-            loop.close()
+    async with StopsIfInterrupted(axes), loop:
+        goals = trajectory.sampled(loop.rate, interpolation, speed)
+        goals.check({axis.name: axis.config for axis in axes})
+        for axis in axes:
+            for place in (min(goals.axes[axis.name]), max(goals.axes[axis.name])):
+                check_reach(axis, place)
+        begun = machine.now()
+        for _ in range(repeat):
+            await _play(machine, loop, goals)
     return loop_result(loop, machine.now() - begun, notes=trajectory.notes)
 
 
@@ -180,7 +175,7 @@ async def follow(
     )
     loop = ControlLoop(machine, names, rate=rate, policy=policy)
     held = dict.fromkeys(followers, 0)
-    async with StopsIfInterrupted(machine.chosen(followers)), Running(loop):
+    async with StopsIfInterrupted(machine.chosen(followers)), loop:
         begun = machine.now()
         while not ended(machine.now() - begun, seconds, until):
             state = await loop.cycle()

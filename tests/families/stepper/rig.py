@@ -17,8 +17,8 @@ from motorbus.core.steps import Runnable
 from motorbus.errors import MotorbusError
 from motorbus.families.stepper import FAMILY, Controller
 from motorbus.families.stepper.driver.io import read_input
+from motorbus.families.stepper.driver.node import command, ignore
 from motorbus.families.stepper.driver.projects import READINGS, dump, dump_once
-from motorbus.families.stepper.driver.requests import command, ignore
 from motorbus.families.stepper.execution.machine import Phase
 from motorbus.families.stepper.parameters import PARAMETERS, Project
 from motorbus.families.stepper.protocol import COMMANDS, REPLY_LENGTH

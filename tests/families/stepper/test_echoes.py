@@ -13,7 +13,7 @@ from motorbus.core.request import Data, Effect
 from motorbus.core.setpoint import Setpoint
 from motorbus.errors import MotorbusError
 from motorbus.families.stepper import FAMILY, Controller
-from motorbus.families.stepper.driver.requests import command
+from motorbus.families.stepper.driver.node import command
 from motorbus.families.stepper.parameters import PARAMETERS
 from motorbus.families.stepper.protocol import COMMANDS, REPLY_LENGTH
 from motorbus.link.base import Delivery, PerfectLine, Side

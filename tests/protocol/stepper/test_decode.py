@@ -11,7 +11,7 @@ from motorbus.core.recording import RecordedFrame
 from motorbus.core.request import Noise
 from motorbus.families.stepper import protocol
 from motorbus.families.stepper.decode import explain
-from motorbus.families.stepper.recording import Recording
+from motorbus.families.stepper.protocol import Recording
 from tests.protocol.stepper.vectors import ALL, DUMP_A, DUMP_B, INVALID, VALID, name_of
 from tests.protocol.vectors import Vector
 

@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 from motorbus.core.register import Access
 from motorbus.errors import RequestError
 from motorbus.families.stepper import parameters
-from motorbus.families.stepper.edits import edited, edits, edits_between
 from motorbus.families.stepper.parameters import BASE, PARAMETERS, STEP, STEPS, TABLE, Project, Step
-from motorbus.families.stepper.protocol import COMMANDS, encode
+from motorbus.families.stepper.protocol import COMMANDS, edited, edits, edits_between, encode
 from tests.protocol.stepper.projects import projects
 from tests.protocol.stepper.vectors import DUMPS, name_of
 from tests.protocol.vectors import Vector

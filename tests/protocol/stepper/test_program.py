@@ -57,7 +57,6 @@ def test_the_units_of_a_speed(speed: str, rpm: int) -> None:
     ("source", "says", "allows"),
     [
         ("format = 1\n[motor", "^the file is not TOML", "TOML|file"),
-        ("x" * ((1 << 20) + 1), "^the file is too long", "1048576"),
         ("a = " + "[" * 5000, "^the file is not TOML", ""),
         ("a = " + "9" * 5000, "^the file is not TOML", ""),
         ("", "^the file: Object missing required field `format`", "format, name"),
@@ -162,7 +161,7 @@ def test_a_program_is_read_from_a_dump_and_from_a_file(tmp_path: Path) -> None:
     path.write_text(found.text(), encoding="utf-8")
     assert Program.load(str(path)).project == found.project
     path.write_bytes(b"\xff")
-    with pytest.raises(RequestError, match=r"b\.toml is not text"):
+    with pytest.raises(RequestError, match=r"b\.toml cannot be read: it is not utf-8 text"):
         Program.load(str(path))
     with pytest.raises(RequestError, match="cannot be read: no such file"):
         Program.load(str(tmp_path / "none"))

@@ -13,7 +13,7 @@ from motorbus.families.stepper import FAMILY
 from motorbus.families.stepper.parameters import Project, Step, encode_image
 from motorbus.families.stepper.protocol import COMMANDS, encode
 from motorbus.families.stepper.simulator import OPTIONS, Quirks, simulate
-from motorbus.families.stepper.simulator.memory import EXAMPLE
+from motorbus.families.stepper.simulator.controller import EXAMPLE
 from tests.simulators.stepper.host import NOTICE, TURN, Host, made
 
 MANUAL = json.loads(Path("tests/vectors/stepper/manual.json").read_text(encoding="utf-8"))

@@ -66,6 +66,6 @@ FAMILY: Final = Family(
     driver=StepperDriver,
     simulator_module="motorbus.families.stepper.simulator",
     checks_module="motorbus.families.stepper.checks",
-    recording_module="motorbus.families.stepper.recording",
+    recording_module="motorbus.families.stepper.protocol",
     commands={name: getattr(Controller, name).function for name in COMMANDS},
 )

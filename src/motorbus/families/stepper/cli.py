@@ -21,7 +21,7 @@ from motorbus.errors import Interrupted, MotorbusError, NoReply, OutcomeUnknown,
 from motorbus.families.stepper.driver.controller import Controller
 from motorbus.families.stepper.driver.io import InputChanged
 from motorbus.families.stepper.driver.run import Outcome, Ran
-from motorbus.families.stepper.execution import ramp, sequence
+from motorbus.families.stepper.execution import ramp
 from motorbus.families.stepper.parameters import PARAMETERS, Project
 from motorbus.families.stepper.program import estimate
 from motorbus.families.stepper.program.file import Program
@@ -121,7 +121,7 @@ def _step(project: Project, number: int) -> StepPlan:
     step = project.step(number)
     return StepPlan(
         step=number,
-        times=sequence.times(project, number),
+        times=project.times(number),
         units=step.sign * step.distance,
         pulses=ramp.pulses_of(project, step),
         frequency=ramp.ramp_of(project, step).run,

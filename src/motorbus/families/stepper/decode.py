@@ -8,8 +8,7 @@ from motorbus.core.recording import RecordedFrame
 from motorbus.errors import RequestError
 from motorbus.families.stepper import parameters, protocol
 from motorbus.families.stepper.parameters import ALL_OUTPUTS, PARAMETERS, ROW_LENGTH, TABLE, UNITS, Order
-from motorbus.families.stepper.protocol import REPLY_LENGTH, Command
-from motorbus.families.stepper.recording import Recording
+from motorbus.families.stepper.protocol import REPLY_LENGTH, Command, Recording
 
 
 def explain(data: bytes, order: Order = "little") -> list[Explanation]:
@@ -18,7 +17,10 @@ def explain(data: bytes, order: Order = "little") -> list[Explanation]:
     found = []
     for event in recording.feed(data) + recording.flush():
         if isinstance(event, RecordedFrame) and event.kind == "notice":
-            found.append(_notice(event.data))
+            title = "notice: the project has ended"
+            fields = Fields(event.data)
+            fields.take_rest("notice", "a project that was started has ended")
+            found.append(Explanation(event.data, title, tuple(fields.parts)))
         elif isinstance(event, RecordedFrame) and event.kind == "reply":
             found.append(_reply(event.data, order))
         elif isinstance(event, RecordedFrame) or event.fault == "checksum":
@@ -28,12 +30,6 @@ def explain(data: bytes, order: Order = "little") -> list[Explanation]:
             fields.take_rest("bytes", fault)
             found.append(Explanation(event.data, "no frame", tuple(fields.parts), fault))
     return found
-
-
-def _notice(data: bytes) -> Explanation:
-    fields = Fields(data)
-    fields.take_rest("notice", "a project that was started has ended")
-    return Explanation(data, "notice: the project has ended", tuple(fields.parts))
 
 
 def _take_head(fields: Fields, data: bytes, command: Command | None) -> str:

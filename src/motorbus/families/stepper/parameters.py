@@ -7,11 +7,11 @@ row gives their unit. "Save project" stores them, until then they are edited in 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from math import pi
-from typing import Any, Final, Literal, TypeAlias
+from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 from motorbus.core.register import Access, Register, RegisterMap, Storage, changed, shown
 from motorbus.core.request import Effect
@@ -173,6 +173,13 @@ class Step:
 EMPTY: Final = Step()
 
 
+class Place(NamedTuple):
+    """A place in one pass of a project: the step, 1 to 10, and the pass of the step loop, from 1."""
+
+    step: int
+    lap: int = 1
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Project:
     """One project: 12 numbers and always ten steps, of which the first `total_steps` are carried out.
@@ -226,6 +233,33 @@ class Project:
     def has_loop(self) -> bool:
         """The step loop is carried out: 1 <= first <= last <= total, and a count. Else it is ignored."""
         return 1 <= self.loop_first <= self.loop_last <= self.total_steps and self.loop_count >= 1
+
+    @property
+    def passes(self) -> int | None:
+        """How often it runs; None: until it is stopped."""
+        return (
+            None if self.is_endless else max(1, self.project_loop)
+        )  # counts are totals, 0 is 1 # assumption
+
+    def following(self, place: Place) -> Place | None:
+        """The next place in the same pass; None at its end. The first step of the loop follows its last."""
+        step, lap = place
+        if self.has_loop and step == self.loop_last and lap < self.loop_count:
+            return Place(self.loop_first, lap + 1)  # the loop begins again in each pass # assumption
+        if step >= len(self.used):
+            return None
+        return Place(step + 1, lap if step + 1 <= self.loop_last else 1)
+
+    def one_pass(self) -> Iterator[Place]:
+        """Every place of one pass, in order."""
+        place = Place(1) if self.used else None
+        while place:
+            yield place
+            place = self.following(place)
+
+    def times(self, step: int) -> int:
+        """How often a step is carried out in one pass."""
+        return sum(place.step == step for place in self.one_pass())
 
     @property
     def is_endless(self) -> bool:

@@ -15,12 +15,22 @@ example frames carry a correct checksum, so where an annotation differs the fram
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final, NamedTuple
+from dataclasses import replace
+from typing import Any, Final, NamedTuple
 
+from motorbus.core.recording import RecordedEvent, RecordedFrame
 from motorbus.core.register import shown
 from motorbus.core.request import Data, Effect, Event, Noise, Notification, Reply, TimeoutClass
 from motorbus.errors import RequestError
-from motorbus.families.stepper.parameters import IMAGE_LENGTH, PARAMETERS, check_loop, check_value
+from motorbus.families.stepper.parameters import (
+    BASE_NAMES,
+    IMAGE_LENGTH,
+    PARAMETERS,
+    STEPS,
+    Project,
+    check_loop,
+    check_value,
+)
 
 RATE: Final = 9600  # bit/s; 8 data bits, no parity, 1 stop bit
 HEADER: Final = b"\xff\xaa"
@@ -262,63 +272,154 @@ def expected_key(request: bytes) -> bytes:
     return key_of(encode_reply(request))
 
 
-class Receiver:
-    """Parses the bytes of one controller into replies, dumps, notices and noise; see `core.family.Receiver`.
+# -- edits of a project ----------------------------------------------------------------------------------------------
 
-    It finds frames by length. Six bytes that no reply can be are dropped one by one. A dump is never searched: its 220
-    bytes may hold EE DD, which would be a false end of a project.
+_EDITS: Final = [command for command in COMMANDS.values() if command.is_edit]
+
+
+class Edit(NamedTuple):
+    """One command that sets parameters, and its numbers."""
+
+    command: str
+    values: Mapping[str, int]
+
+
+def edits(project: Project) -> list[Edit]:
+    """The commands that write this project with all ten steps, in order."""
+    found = [_edit(project, command) for command in _EDITS if "step" not in command.fields]
+    for step in range(1, STEPS + 1):
+        found += [_edit(project, command, step) for command in _EDITS if "step" in command.fields]
+    return found
+
+
+def edits_between(before: Project, after: Project) -> list[Edit]:
+    """The commands that turn one project into another, the selection first; none if nothing differs."""
+    select, *_ = new = edits(after)
+    found = [one for old, one in zip(edits(before), new, strict=True) if old != one]
+    if found and found[0] != select:
+        found.insert(0, select)
+    return found
+
+
+def edited(project: Project, command: str, values: Mapping[str, int]) -> Project:
+    """The project after a command that sets parameters; a step that does not exist changes nothing."""
+    changes: dict[str, Any] = dict(values)
+    if "step" in changes:
+        step = changes.pop("step")
+        return project.with_step(step, **changes) if 1 <= step <= STEPS else project
+    if command == "select_project":
+        changes["number"] = changes.pop("project")
+    return replace(project, **changes)
+
+
+def _edit(project: Project, command: Command, step: int = 0) -> Edit:
+    known = {"project": project.number, "step": step}
+    values = {}
+    for name in command.fields:
+        source = project if name in BASE_NAMES else project.step(step or 1)
+        values[name] = known[name] if name in known else getattr(source, name)
+    return Edit(command.name, values)
+
+
+# -- frames of a line ------------------------------------------------------------------------------------------------
+
+
+class Recording:
+    """Parses recorded frames of a controller, of a host, or of both; see `core.recording.RecordingReceiver`.
+
+    Requests and replies have the same header, and a reply has no checksum. In this order: eleven bytes
+    with a correct checksum are a request; the head of a dump starts a dump; eleven bytes with another
+    checksum are a damaged request if no frame starts in them, or behind a reply; six bytes in the form of
+    a reply are one. A dump is never searched: its 220 bytes may hold EE DD, which would be a false end of a
+    project. Nor is a frame that is incomplete at the end.
     """
 
+    def __init__(self, direction: str = "") -> None:
+        self._direction: Final = direction
+        self.rest = b""
+
+    def feed(self, data: Any) -> list[RecordedEvent]:
+        """Take a chunk of bytes; return the events that are complete."""
+        return self._split(self.rest + data, at_end=False)
+
+    def flush(self) -> list[RecordedEvent]:
+        """End of data: return the frames in the held bytes, and the remainder as noise."""
+        return self._split(self.rest, at_end=True)
+
+    def _split(self, data: bytes, *, at_end: bool) -> list[RecordedEvent]:
+        events: list[RecordedEvent] = []
+        start = noise = 0
+        needed = REPLY_LENGTH if at_end or self._direction == "rx" else REQUEST_LENGTH
+        while start < len(data):
+            head = data[start : start + REQUEST_LENGTH]
+            size, kind = self._frame(head)
+            end = start + (size or 1)
+            if end > len(data) or (len(head) < needed and HEADER.startswith(head[:2])):
+                start = len(data) if at_end else start
+                break
+            if kind:
+                _add_noise(events, data[noise:start])
+                events.append(_event(data[start:end], kind))
+                noise = end
+            start = end
+        _add_noise(events, data[noise:start])
+        self.rest = data[start:]
+        return events
+
+    def _frame(self, head: bytes) -> tuple[int, str]:
+        """Length and kind of the frame that begins with these eleven bytes, fewer at the end; 0: none."""
+        if NOTICE.startswith(head[:2]):
+            return (0, "") if self._direction == "tx" else (len(NOTICE), "notice")
+        if head[:2] != HEADER:
+            return 0, ""
+        if self._direction != "rx" and is_request(head):
+            return REQUEST_LENGTH, "request"
+        found_reply = self._direction != "tx" and len(head) >= REPLY_LENGTH and is_reply(head)
+        if found_reply and head[2] == READ_PROJECT:
+            return DUMP_LENGTH, "reply"
+        rest = head[REPLY_LENGTH:] if found_reply else head[2:]
+        if self._direction != "rx" and len(head) == REQUEST_LENGTH and not _starts_in(rest):
+            return REQUEST_LENGTH, "damaged"
+        return (REPLY_LENGTH, "reply") if found_reply else (0, "")
+
+
+def _starts_in(data: bytes) -> bool:
+    return HEADER in data or NOTICE in data or data[-1:] in (HEADER[:1], NOTICE[:1])
+
+
+def _event(data: bytes, kind: str) -> RecordedEvent:
+    if kind == "damaged":
+        return Noise(data, "checksum")
+    return RecordedFrame(data, kind, ONLY, int.from_bytes(data[2:4] or data, "big"))
+
+
+def _add_noise(events: list[RecordedEvent], data: bytes) -> None:
+    if data:
+        events.append(Noise(data, "framing"))
+
+
+class Receiver:
+    """Parses the bytes of one controller into replies, dumps, notices and noise; see `core.family.Receiver`."""
+
     def __init__(self) -> None:
-        self._rest = b""
+        self._frames = Recording("rx")
 
     @property
     def held(self) -> int:
-        return len(self._rest)
+        return len(self._frames.rest)
 
     def feed(self, data: Data) -> list[Event]:
         if not isinstance(data, bytes):
             return [Noise(data.data, "foreign")]
-        events: list[Event] = []
-        buffer, start, noise = self._rest + data, 0, 0
-        while start < len(buffer):
-            size = _frame_length(buffer[start : start + REPLY_LENGTH])
-            if start + size > len(buffer):
-                break
-            if size:
-                _add_noise(events, buffer[noise:start])
-                events.append(_event(buffer[start : start + size]))
-                noise = start + size
-            start += size or 1
-        _add_noise(events, buffer[noise:start])
-        self._rest = buffer[start:]
-        return events
+        return [_received(one) for one in self._frames.feed(data)]
 
     def flush(self) -> list[Event]:
-        """End of data: the held bytes are an incomplete frame, so noise."""
-        rest, self._rest = self._rest, b""
-        return [Noise(rest, "framing")] if rest else []
+        return [_received(one) for one in self._frames.flush()]
 
 
-def _frame_length(head: bytes) -> int:
-    """Bytes of the frame that begins with these, as far as they tell, at most 6; 0: none begins here."""
-    if NOTICE.startswith(head[:2]):
-        return len(NOTICE)
-    if not HEADER.startswith(head[:2]):
-        return 0
-    if len(head) < REPLY_LENGTH:
-        return REPLY_LENGTH
-    if not is_reply(head):
-        return 0
-    return DUMP_LENGTH if head[2] == READ_PROJECT else REPLY_LENGTH
-
-
-def _event(data: bytes) -> Event:
-    if data == NOTICE:
-        return Notification(ONLY, COMPLETED, data)
-    return Reply(0, key_of(data), data)
-
-
-def _add_noise(events: list[Event], data: bytes) -> None:
-    if data:
-        events.append(Noise(data, "framing"))
+def _received(event: RecordedEvent) -> Event:
+    if isinstance(event, Noise):
+        return event
+    if event.kind == "notice":
+        return Notification(ONLY, COMPLETED, event.data)
+    return Reply(0, key_of(event.data), event.data)

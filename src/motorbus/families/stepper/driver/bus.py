@@ -13,10 +13,9 @@ from motorbus.core.request import Request, Response, TimeoutClass
 from motorbus.core.steps import Runnable
 from motorbus.errors import NoReply, RequestError
 from motorbus.families.stepper import protocol
-from motorbus.families.stepper.driver import manual, plan, run, stop
-from motorbus.families.stepper.driver.node import BusState, Node
+from motorbus.families.stepper.driver import manual, run, stop
+from motorbus.families.stepper.driver.node import STOPS, BusState, Node, command, ignore
 from motorbus.families.stepper.driver.projects import dump_once
-from motorbus.families.stepper.driver.requests import STOPS, command, ignore
 from motorbus.families.stepper.execution.ramp import TICK_MS
 from motorbus.families.stepper.parameters import PROJECTS, checked_order
 
@@ -28,7 +27,7 @@ GAP: Final = 0.05  # s within an old reply # assumption
 _AXIS: Final = AxisDriver(
     jog=manual.jog,
     home=manual.home,
-    plan_move=plan.plan_move,
+    plan_move=manual.plan_move,
     run=run.run,
     stop=stop.stop,
 )

@@ -8,7 +8,7 @@ from motorbus.core.device import AsyncDevice, AsyncRunner, BlockingDevice, Block
 from motorbus.families.stepper.driver import bus as bus_driver
 from motorbus.families.stepper.driver import io, manual, project1, projects, run, stop
 from motorbus.families.stepper.driver.node import Node
-from motorbus.families.stepper.driver.requests import manual as command_method
+from motorbus.families.stepper.driver.node import manual as command_method
 from motorbus.families.stepper.protocol import ONLY
 
 

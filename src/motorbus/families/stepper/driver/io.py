@@ -13,8 +13,7 @@ from motorbus.core.register import is_number, shown
 from motorbus.core.request import Request
 from motorbus.core.steps import Emit, Sleep
 from motorbus.errors import FramingError, RequestError
-from motorbus.families.stepper.driver.node import Node
-from motorbus.families.stepper.driver.requests import command, ignore
+from motorbus.families.stepper.driver.node import Node, command, ignore
 from motorbus.families.stepper.parameters import ALL_OUTPUTS, INPUTS, OUTPUTS, check_value
 
 PORTS: Final = tuple(range(1, INPUTS + 1))

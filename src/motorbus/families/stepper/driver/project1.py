@@ -12,12 +12,11 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import replace
 from typing import Any, Final, TypeVar
 
-from motorbus.core.steps import INTENT, OUTCOME, REACHED, Emit, Exclusive, Guard, JournalEntry, Sleep, catch
+from motorbus.core.steps import INTENT, OUTCOME, REACHED, Emit, Exclusive, Guard, JournalEntry, Sleep
 from motorbus.errors import LinkError, MotorbusError, OutcomeUnknown, RequestError, VerificationFailed
 from motorbus.families.stepper import parameters
-from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.driver.node import STOPS, Node
 from motorbus.families.stepper.driver.projects import MANUAL, bring, cached, read_image
-from motorbus.families.stepper.driver.requests import STOPS
 from motorbus.families.stepper.driver.stop import RUN, Watch, check_free, close_run, end_motion
 from motorbus.families.stepper.execution.ramp import stop_seconds
 from motorbus.families.stepper.parameters import STEPS, Project, amended, differences, encode_image
@@ -112,22 +111,22 @@ async def restore(node: Node, before: Project, wanted: Project, *, is_read: bool
 
     `is_read`: it was read as `wanted`; else what reads as before may be what is stored, so the edits are undone unread.
     """
-    for tries in range(1, TRIES + 1):
-        error = await catch(_restore(node, before, wanted, is_read))
-        if not isinstance(error, MotorbusError):
-            return error and tries == 1
-        if tries == TRIES or isinstance(error, LinkError):
-            error.add_note("project 1 may still be edited: recover() restores it, and so does a power cycle")
-            raise error
-    raise AssertionError("the last try returns or raises")
-
-
-async def _restore(node: Node, before: Project, wanted: Project, is_read: bool) -> bool:
-    shown = await read_image(node, MANUAL)
-    if shown == before and is_read:
-        return True
-    await bring(node, wanted if shown == before else shown, before)
-    return False
+    tries = 0
+    while True:
+        tries += 1
+        try:
+            shown = await read_image(node, MANUAL)
+            if shown == before and is_read:
+                return tries == 1
+            await bring(node, wanted if shown == before else shown, before)
+        except MotorbusError as error:
+            if tries == TRIES or isinstance(error, LinkError):
+                error.add_note(
+                    "project 1 may still be edited: recover() restores it, and so does a power cycle"
+                )
+                raise
+        else:
+            return False
 
 
 async def with_project1(

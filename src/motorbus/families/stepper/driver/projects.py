@@ -25,14 +25,12 @@ from motorbus.errors import (
 )
 from motorbus.families.stepper import parameters
 from motorbus.families.stepper.driver.io import read_input
-from motorbus.families.stepper.driver.node import Node
-from motorbus.families.stepper.driver.requests import command, ignore
+from motorbus.families.stepper.driver.node import Node, command, ignore
 from motorbus.families.stepper.driver.stop import check_free
-from motorbus.families.stepper.edits import Edit, edits, edits_between
 from motorbus.families.stepper.parameters import PROJECTS, STEPS, Project, check_value, differences
 from motorbus.families.stepper.program.backup import Backup
 from motorbus.families.stepper.program.file import Program
-from motorbus.families.stepper.protocol import REPLY_LENGTH
+from motorbus.families.stepper.protocol import REPLY_LENGTH, Edit, edits, edits_between
 
 READINGS: Final = 5  # dumps of which two must be equal
 TRIES: Final = 3  # of a save; flash wears

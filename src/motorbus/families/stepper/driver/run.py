@@ -36,9 +36,8 @@ from motorbus.errors import (
     WireError,
 )
 from motorbus.families.stepper.driver.io import Levels, check_seconds, checked_ports, inputs, read_input
-from motorbus.families.stepper.driver.node import Node
+from motorbus.families.stepper.driver.node import Node, command, ignore
 from motorbus.families.stepper.driver.projects import read_project
-from motorbus.families.stepper.driver.requests import command, ignore
 from motorbus.families.stepper.driver.stop import RUN, Watch, check_free, close_run
 from motorbus.families.stepper.parameters import OUTPUTS, STOP_INPUT, Project
 from motorbus.families.stepper.program.estimate import Estimate, earliest_end, estimate, reach
@@ -48,7 +47,6 @@ LONGER: Final = 1.2  # share of the estimate that a project may take # assumptio
 SPARE: Final = 2.0  # s that it may take besides # assumption
 CLOCK: Final = 0.98  # share of the shortest time before which a notice is false # assumption
 SETTLES: Final = 20 / RATE  # s by which the bus may take an acknowledgement later than the notice behind it
-STOPPING: Final = 3.0  # s in which a stop that was sent before a notice is acknowledged, if at all
 REPORT: Final = 0.25  # s between two reports
 LOOK: Final = 0.02  # s between two rounds of inputs
 
@@ -57,9 +55,11 @@ class Outcome(Enum):
     """What is known at the end of the wait for a project."""
 
     COMPLETED = "completed"  # its notice came
-    STOPPED = "stopped"  # a stop of this host was acknowledged, or input 4 read active
+    STOPPED = (
+        "stopped"  # a stop of this host was acknowledged or the notice followed it, or input 4 read active
+    )
     TIMEOUT = "timeout"  # no notice in time; it may still run
-    UNKNOWN = "unknown"  # the start was not acknowledged, or the notice may not be its own
+    UNKNOWN = "unknown"  # the start was not acknowledged, or its notice came too early
 
 
 class Ran(NamedTuple):
@@ -114,7 +114,7 @@ async def run(
         raise RequestError("a project without end needs a timeout", advice="or use start_project()")
     guard, ports = Watch(node), checked_ports(watch)
     notices: list[float] = []
-    is_over: list[bool] = []
+    is_over = False
 
     def take(notice: Notification) -> bool:
         if notice.kind == COMPLETED:
@@ -128,15 +128,18 @@ async def run(
     async def begin() -> tuple[_Course, Levels]:
         found = await _checked_project(node, project, endless, expert)
         levels = Levels(await inputs(node, ports))
-        course = _Course(guard, found, await Sleep(0), timeout, notices)
-        course.begin(await catch(_start(guard, found)))
-        return course, levels
+        sent = await Sleep(0)
+        begun = await catch(_start(guard, found))
+        if isinstance(begun, MotorbusError) and not isinstance(begun, OutcomeUnknown | NoReply | WireError):
+            raise begun
+        return _Course(guard, found, sent, begun, timeout, notices), levels
 
     async def follow() -> Ran:
+        nonlocal is_over
         try:
             return await _follow(*await Exclusive(begin()))
         finally:
-            is_over.append(True)
+            is_over = True
 
     ran, _ = await gather(follow(), listen())
     if not node.state.may_run:
@@ -151,14 +154,15 @@ async def _checked_project(node: Node, number: int, endless: bool, expert: bool)
     await check_free(node, RUN)
     program = await read_project(node, number)
     errors = [] if expert else [str(one) for one in program.lint() if one.level == "error"]
-    refusals = {
-        "has no steps; write it first": program.project.is_cleared,
-        f"has errors: {'; '.join(errors)}": errors,
-        "has no end; say endless=True": program.project.is_endless and not endless,
-    }
-    for refusal, applies in refusals.items():
-        if applies:
-            raise RequestError(f"project {number} {refusal}", advice="nothing was started", node=node.node)
+    refusal = ""
+    if program.project.is_cleared:
+        refusal = "has no steps; write it first"
+    elif errors:
+        refusal = f"has errors: {'; '.join(errors)}"
+    elif program.project.is_endless and not endless:
+        refusal = "has no end; say endless=True"
+    if refusal:
+        raise RequestError(f"project {number} {refusal}", advice="nothing was started", node=node.node)
     return program.project
 
 
@@ -211,71 +215,56 @@ def setpoints(node: Node, project: Project) -> tuple[Setpoint, ...]:
 
 
 class _Course:
-    """One run of a project, `sent` at this time. Times in s, link clock."""
+    """One run of a project: requested at `sent`, acknowledged at `begun` or not (an error). Times in s, link clock."""
 
     def __init__(
-        self, watch: Watch, project: Project, sent: float, timeout: float | None, notices: list[float]
+        self,
+        watch: Watch,
+        project: Project,
+        sent: float,
+        begun: float | MotorbusError | None,
+        timeout: float | None,
+        notices: list[float],
     ) -> None:
         self.watch: Final = watch
         self.predicted: Final = estimate(project, watch.node.tick_ms)
-        self.start = sent
         self.is_button_pressed = False  # input 4
-        self._sent: Final = sent
-        self._least: Final = earliest_end(project) * CLOCK
-        self._timeout: Final = timeout
+        self._lost: Final = begun if isinstance(begun, MotorbusError) else None
+        self.start: Final = begun if isinstance(begun, float) else sent
+        self._earliest: Final = sent + earliest_end(project) * CLOCK
         self._notices: Final = notices
         self._stopped: Final = watch.node.state.stopped
-        self._lost: MotorbusError | None = None
-
-    def begin(self, start: float | MotorbusError | None) -> None:
-        """It was acknowledged at this time; None in a dry run. Raises the error of a start that did not leave."""
-        if not isinstance(start, MotorbusError):
-            self.start = start or self._sent
-        elif isinstance(start, OutcomeUnknown | NoReply | WireError):
-            self._lost = start
-        else:
-            raise start
-
-    @property
-    def deadline(self) -> float:
-        """Until when its notice is waited for."""
-        if self._timeout is not None:
-            return self.start + self._timeout
+        longest = self.predicted.seconds * LONGER + SPARE
         if self.predicted.waits and self._lost is None:
-            return inf
-        return self.start + self.predicted.seconds * LONGER + SPARE
+            longest = inf
+        self.deadline: Final = self.start + (longest if timeout is None else timeout)
 
     def outcome(self, now: float) -> Ran | None:
         """The outcome; None if it is not known yet."""
-        state, seconds = self.watch.node.state, None
-        end = next((at for at in self._notices if self._is_own(at)), None)
+        state = self.watch.node.state
+        own = [at for at in self._notices if at > self.start - SETTLES and at >= self._earliest]
+        if own or self.is_button_pressed:
+            state.may_run = False
         if state.stopped > self._stopped:
-            outcome, why = Outcome.STOPPED, "a stop of this host was acknowledged"
-        elif self.is_button_pressed:
-            state.may_run = False
-            outcome, why = Outcome.STOPPED, "input 4, which stops projects, was active"
-        elif end is not None and not self.watch.is_stopped:
-            state.may_run = False
-            seconds = max(0.0, end - self.start)
-            outcome, why = Outcome.COMPLETED, f"its notice came {seconds:.3f} s after the start"
-        elif now < (self.deadline if end is None else end + STOPPING):
+            return self._ran(Outcome.STOPPED, "a stop of this host was acknowledged")
+        if self.is_button_pressed:
+            return self._ran(Outcome.STOPPED, "input 4, which stops projects, was active")
+        if own and self.watch.is_stopped:
+            return self._ran(Outcome.STOPPED, "its notice came after a stop that was not acknowledged yet")
+        if own:
+            seconds = max(0.0, own[0] - self.start)
+            return self._ran(Outcome.COMPLETED, f"its notice came {seconds:.3f} s after the start", seconds)
+        if now < self.deadline:
             return None
-        elif end is not None:
-            state.may_run = False
-            outcome, why = Outcome.UNKNOWN, "its notice came after a stop that was not acknowledged"
-        elif self._lost is not None:
+        if self._lost is not None:
             why = f"neither an acknowledgement ({self._lost.summary}) nor a notice came; it may run"
-            outcome = Outcome.UNKNOWN
-        elif self._notices:
-            first = self._notices[0] - self._sent
-            why = f"a notice came after {first:.3f} s, which is too early; it may still run"
-            outcome = Outcome.UNKNOWN
-        else:
-            outcome, why = Outcome.TIMEOUT, "no notice came in time; it may still run"
-        return Ran(outcome, seconds, self.predicted, why)
+            return self._ran(Outcome.UNKNOWN, why)
+        if self._notices:
+            return self._ran(Outcome.UNKNOWN, "its only notice came too early; it may still run")
+        return self._ran(Outcome.TIMEOUT, "no notice came in time; it may still run")
 
-    def _is_own(self, at: float) -> bool:
-        return at > self.start - SETTLES and at - self._sent >= self._least
+    def _ran(self, outcome: Outcome, why: str, seconds: float | None = None) -> Ran:
+        return Ran(outcome, seconds, self.predicted, why)
 
 
 async def _follow(course: _Course, levels: Levels) -> Ran:

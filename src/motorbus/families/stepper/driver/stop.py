@@ -12,8 +12,7 @@ from typing import Final
 from motorbus.core.request import Stops
 from motorbus.core.steps import ASKED, OUTCOME, Emit, JournalEntry, catch
 from motorbus.errors import Interrupted, LinkError, MotorbusError, OutcomeUnknown, RequestError
-from motorbus.families.stepper.driver.node import Node
-from motorbus.families.stepper.driver.requests import STOPS, command, ignore
+from motorbus.families.stepper.driver.node import STOPS, Node, command, ignore
 
 RUN: Final = "run"  # journal entry of a project that was started
 TRIES: Final = 5  # of each command; a silent controller takes about 2 s

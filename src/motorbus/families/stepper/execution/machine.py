@@ -6,18 +6,15 @@ Source of each transition: stepper controller serial protocol manual; `# assumpt
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from functools import partial
 from math import inf
-from typing import Final, NamedTuple
+from typing import Final
 
 from motorbus.families.stepper import parameters
-from motorbus.families.stepper.execution import ramp, sequence
+from motorbus.families.stepper.execution import ramp
 from motorbus.families.stepper.execution.ramp import Motion
-from motorbus.families.stepper.execution.sequence import Place
-from motorbus.families.stepper.parameters import HOME_INPUT, START_INPUT, STOP_INPUT, Project, Step
+from motorbus.families.stepper.parameters import HOME_INPUT, START_INPUT, STOP_INPUT, Place, Project, Step
 
 FIRST: Final = Place(1)
 EMPTY_PASS: Final = 0.001  # s of a pass of an endless project in which nothing takes time # assumption
@@ -35,18 +32,6 @@ class Phase(Enum):
     HOMING = "homing"
     SLOWING = "slowing down"
     OFF = "off"
-
-
-class Happening(NamedTuple):
-    """An event: its moment (s), and the step of the project (0: none).
-
-    `kind` is "waits", "begins" (a step, with its outputs), "moved", "ended" (a project, by itself), "completed" (the
-    notice), "stopped" (a project), "homed", or "rests" (the end of a manual motion).
-    """
-
-    at: float
-    kind: str
-    step: int = 0
 
 
 @dataclass(slots=True)
@@ -68,7 +53,7 @@ class Machine:
     """The state of a controller.
 
     `outputs` has three bits, bit 0 is output 1; `inputs` are the active ones, 1 to 5; `motion` is the move since
-    `since`, from the position `base`. `events` collects all `Happening`s; the caller empties it.
+    `since`, from the position `base`. `notices` are the times of all ends that it reports; the caller empties it.
     """
 
     def __init__(self, *, tick_ms: float = ramp.TICK_MS) -> None:
@@ -84,7 +69,7 @@ class Machine:
         self.inputs: frozenset[int] = frozenset()
         self.stop_mode = 0
         self.is_homed = False
-        self.events: list[Happening] = []
+        self.notices: list[float] = []
         self._now = 0.0
 
     def position(self, at: float) -> int:
@@ -105,7 +90,12 @@ class Machine:
         """Let time pass until this moment."""
         while self.until <= to:
             self._now = self.until
-            self._end_phase()
+            if self.run and self.phase is Phase.MOVE:
+                self._end_motion(self.run)
+            elif self.run and self.phase is Phase.PAUSE:
+                self._next_step(self.run)
+            else:
+                self._finish()
         self._now = max(self._now, to)
 
     # -- commands --------------------------------------------------------------------------------------------------
@@ -125,27 +115,34 @@ class Machine:
         self.run = None
         self.outputs, self.leds, self.is_homed = 0, False, False
 
-    def start(self, project: Project, at: float, *, by_command: bool = True) -> bool:
-        """Start a project. False if it is busy."""
-        return self._begin(at, partial(self._start, project, by_command))
+    def start(self, project: Project, at: float, *, by_command: bool = True) -> None:
+        """Start a project."""
+        if not self._is_free(at):
+            return
+        self.stop_mode = project.stop_mode  # the stop mode belongs to each project # assumption
+        self.run = Run(project, by_command, at)
+        if project.used:
+            self._begin_step(self.run)
+        else:
+            self._finish(completed=True)  # without steps it ends at once, with a notice # assumption
+        self.advance(at)
 
-    def jog(self, project: Project, sign: int, at: float) -> bool:
-        """Turn until stopped with the speed of step 1 of this project; False if it is busy."""
-        return self._begin(at, partial(self._move_by_hand, Phase.JOG, project, None, sign))
+    def jog(self, project: Project, sign: int, at: float) -> None:
+        """Turn until stopped with the speed of step 1 of this project."""
+        self._move_by_hand(Phase.JOG, project, None, sign, at)
 
-    def run_once(self, project: Project, at: float) -> bool:
-        """Make the move of step 1 of this project, without its inputs, output and pause; False if it is busy."""
+    def run_once(self, project: Project, at: float) -> None:
+        """Make the move of step 1 of this project, without its inputs, output and pause."""
         step = project.step(1)
-        pulses = ramp.pulses_of(project, step)
-        return self._begin(at, partial(self._move_by_hand, Phase.ONCE, project, pulses, step.sign))
+        self._move_by_hand(Phase.ONCE, project, ramp.pulses_of(project, step), step.sign, at)
 
-    def home(self, project: Project, at: float) -> bool:
-        """Turn in reverse with the speed of step 1 of this project until input 5; False if it is busy.
+    def home(self, project: Project, at: float) -> None:
+        """Turn in reverse with the speed of step 1 of this project until input 5.
 
         It ends at once, without a motion, if the input is active.
         """
         pulses = 0 if HOME_INPUT in self.inputs else None
-        return self._begin(at, partial(self._move_by_hand, Phase.HOMING, project, pulses, -1))
+        self._move_by_hand(Phase.HOMING, project, pulses, -1, at)
 
     def stop_project(self, at: float) -> None:
         """Stop the project."""
@@ -176,8 +173,6 @@ class Machine:
         if port == HOME_INPUT and self.phase is Phase.HOMING:
             self._rest()  # homing ends at once in every stop mode # assumption
             self.base, self.is_homed = 0, True
-            self._add("homed")
-            self._add("rests")
         elif self.run and self.phase is Phase.WAIT and self.run.step.start_input == port:
             self._begin_motion(self.run)
         elif self.run and self.phase is Phase.MOVE and self.run.step.stop_input == port:
@@ -200,60 +195,32 @@ class Machine:
         self.phase, self.motion, self.since, self.until = phase, None, self._now, until
 
     def _stop(self) -> None:
-        """Stop the motion as the stop mode says; a slow stop that began continues."""
+        """Stop the motor as the stop mode says; a slow stop that began continues."""
         if self.phase is Phase.SLOWING:
             return
         slow = self.motion.slowing(self._now - self.since) if self.motion else None
         if slow is None or self.stop_mode == parameters.IMMEDIATE:
-            self._end_stop()
+            self._finish()
         else:
             self._go(Phase.SLOWING, slow)
 
-    def _end_stop(self) -> None:
-        if self.run is not None:
-            self._finish(self.run, "stopped")
-        else:
-            self._rest()
-            self._add("rests")
-
-    def _begin(self, at: float, begin: Callable[[], None]) -> bool:
-        """Begin something, with all of it that takes no time; False if it is busy."""
+    def _is_free(self, at: float) -> bool:
         self.advance(at)
-        if self.phase is not Phase.IDLE:  # a busy controller acknowledges and ignores a start # assumption
-            return False
-        begin()
-        self.advance(at)
-        return True
+        return self.phase is Phase.IDLE  # a busy controller acknowledges and ignores a start # assumption
 
-    def _move_by_hand(self, phase: Phase, project: Project, pulses: int | None, sign: int) -> None:
-        self.stop_mode = project.stop_mode
-        speed = ramp.ramp_of(project, project.step(1), self.tick_ms)
-        self._go(phase, ramp.motion(speed, pulses, sign))
-
-    def _end_phase(self) -> None:
-        """The phase ends by itself."""
-        if self.run and self.phase is Phase.MOVE:
-            self._end_motion(self.run)
-        elif self.run and self.phase is Phase.PAUSE:
-            self._next_step(self.run)
-        else:
-            self._end_stop()
+    def _move_by_hand(self, phase: Phase, project: Project, pulses: int | None, sign: int, at: float) -> None:
+        if self._is_free(at):
+            self.stop_mode = project.stop_mode
+            speed = ramp.ramp_of(project, project.step(1), self.tick_ms)
+            self._go(phase, ramp.motion(speed, pulses, sign))
+            self.advance(at)
 
     # -- a project -------------------------------------------------------------------------------------------------
-
-    def _start(self, project: Project, by_command: bool) -> None:
-        self.stop_mode = project.stop_mode  # the stop mode belongs to each project # assumption
-        self.run = Run(project, by_command, self._now)
-        if project.used:
-            self._begin_step(self.run)
-        else:
-            self._finish(self.run, "ended")  # without steps it ends at once, with a notice # assumption
 
     def _begin_step(self, run: Run) -> None:
         port = run.step.start_input
         if port and port not in self.inputs:  # an active input starts a step at once # assumption
             self._rest(Phase.WAIT)
-            self._add("waits")
         else:
             self._begin_motion(run)
 
@@ -261,21 +228,19 @@ class Machine:
         """Outputs and motor at the same moment."""
         self.outputs = parameters.outputs_after_step(self.outputs, run.step.output)
         self._go(Phase.MOVE, ramp.move_of(run.project, run.step, self.tick_ms))
-        self._add("begins")
         if run.step.stop_input in self.inputs:
             self._end_motion(run)
 
     def _end_motion(self, run: Run) -> None:
         """The motion is over, or its stop input ends it at once."""
         self._rest(Phase.PAUSE, self._now + run.step.delay / 1000)
-        self._add("moved")
 
     def _next_step(self, run: Run) -> None:
-        place = sequence.following(run.project, run.place)
+        place = run.project.following(run.place)
         if place is None:
-            passes = sequence.passes(run.project)
+            passes = run.project.passes
             if passes is not None and run.round >= passes:
-                self._finish(run, "ended")
+                self._finish(completed=True)
                 return
             if passes is None and self._now <= run.began:
                 run.began = -inf
@@ -285,13 +250,9 @@ class Machine:
         run.place = place or FIRST
         self._begin_step(run)
 
-    def _finish(self, run: Run, kind: str) -> None:
-        """The project has ended. The notice follows a natural end of one that a command started."""
-        self._add(kind)
+    def _finish(self, *, completed: bool = False) -> None:
+        """A motion or a project has ended. The notice follows a natural end of one that a command started."""
         self._rest()
-        if kind == "ended" and run.by_command:
-            self._add("completed")
+        if completed and self.run and self.run.by_command:
+            self.notices.append(self._now)
         self.run = None  # the outputs stay as they are at its end # assumption
-
-    def _add(self, kind: str) -> None:
-        self.events.append(Happening(self._now, kind, self.run.place.step if self.run else 0))

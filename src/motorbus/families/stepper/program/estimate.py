@@ -11,7 +11,7 @@ from typing import Final
 
 from msgspec import Struct
 
-from motorbus.families.stepper.execution import ramp, sequence
+from motorbus.families.stepper.execution import ramp
 from motorbus.families.stepper.execution.ramp import TICK_MS
 from motorbus.families.stepper.parameters import ENDLESS, Project, Step
 
@@ -42,8 +42,8 @@ class Estimate(Struct, frozen=True, kw_only=True):
 
 def estimate(project: Project, tick_ms: float = TICK_MS) -> Estimate:
     """The duration of a project."""
-    count = sequence.passes(project) or 1
-    steps = [(step, sequence.times(project, number) * count) for number, step in enumerate(project.used, 1)]
+    count = project.passes or 1
+    steps = [(step, project.times(number) * count) for number, step in enumerate(project.used, 1)]
     return Estimate(
         seconds=sum(
             times * (ramp.move_of(project, step, tick_ms).duration + step.delay / 1000)
@@ -61,10 +61,10 @@ def earliest_end(project: Project) -> float:
     All its pauses, and all its pulses but one at the highest frequency. A step with a stop input counts with its pause
     only, a wait for an input with nothing.
     """
-    count = sequence.passes(project)
+    count = project.passes
     if count is None:
         return inf
-    return count * sum(_least(project, project.step(place.step)) for place in sequence.one_pass(project))
+    return count * sum(_least(project, project.step(place.step)) for place in project.one_pass())
 
 
 def _least(project: Project, step: Step) -> float:
@@ -82,7 +82,7 @@ def reach(project: Project) -> tuple[int, int]:
     ends = [0]
     for count in (project.loop_count, min(ENDLESS - 1, project.loop_count + project.has_loop)):
         at, own = 0, [0]
-        for place in sequence.one_pass(replace(project, loop_count=count)):
+        for place in replace(project, loop_count=count).one_pass():
             step = project.step(place.step)
             at += step.sign * step.distance if step.speed else 0
             own.append(at)
@@ -93,5 +93,5 @@ def reach(project: Project) -> tuple[int, int]:
 
 def net_units(project: Project) -> int:
     """The end of one pass in user units from its beginning; steps of less than one pulse do not count."""
-    steps = [project.step(place.step) for place in sequence.one_pass(project)]
+    steps = [project.step(place.step) for place in project.one_pass()]
     return sum(step.sign * step.distance for step in steps if ramp.pulses_of(project, step))

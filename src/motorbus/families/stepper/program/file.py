@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import ceil, floor
+from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 import msgspec
@@ -24,8 +25,6 @@ from motorbus.families.stepper.parameters import ENDLESS, INPUTS, PARAMETERS, ST
 from motorbus.families.stepper.program.estimate import Estimate, estimate
 from motorbus.families.stepper.program.lint import Finding, lint
 from motorbus.families.stepper.protocol import DUMP_LENGTH, HEADER, READ_PROJECT, REPLY_LENGTH
-
-LONGEST: Final = 1 << 20  # characters of a file
 
 _QUANTITY: Final = re.compile(
     r"\s*([+-]?(?:\d{1,20}(?:\.\d{0,20})?|\.\d{1,20}))\s*([^\d\s.].*?)\s*", re.ASCII
@@ -144,12 +143,10 @@ class Program:
     def load(cls, path: str) -> Program:
         """From a file. Raises RequestError if it cannot be read, and as `parse`."""
         try:
-            with open(path, encoding="utf-8") as file:
-                source = file.read(LONGEST + 1)
-        except UnicodeDecodeError as error:
-            raise RequestError(f"{path} is not text: {error.reason}", expected="TOML in UTF-8") from None
-        except OSError as error:
-            raise RequestError(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from error
+            source = Path(path).read_text("utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            why = getattr(error, "strerror", "") or "it is not UTF-8 text"
+            raise RequestError(f"{path} cannot be read: {why.lower()}") from error
         return cls.parse(source)
 
     @classmethod
@@ -205,9 +202,7 @@ def _decode(source: str) -> ProgramFile:
 
 
 def read_toml(source: str) -> dict[str, Any]:
-    """The data of a TOML file of at most 1 MiB. Raises RequestError."""
-    if len(source) > LONGEST:
-        raise _wrong("the file is too long", f"at most {LONGEST} characters")
+    """The data of a TOML file. Raises RequestError."""
     try:
         return tomllib.loads(source)
     except (ValueError, RecursionError) as error:

@@ -8,7 +8,7 @@ from typing import Final, Literal, TypeAlias
 from msgspec import Struct
 
 from motorbus.families.stepper import parameters
-from motorbus.families.stepper.execution import ramp, sequence
+from motorbus.families.stepper.execution import ramp
 from motorbus.families.stepper.parameters import PARAMETERS, Project, Step
 from motorbus.families.stepper.program.estimate import net_units
 
@@ -85,7 +85,7 @@ def _of_project(project: Project) -> _Found:
         yield "L9", f"steps {first} to {last} run once"
     if project.is_endless:
         yield "L10", "the project loop is 255"
-    passes, net = sequence.passes(project), net_units(project)
+    passes, net = project.passes, net_units(project)
     if net and passes != 1:
         total = f", {net * passes:+d} after {passes} passes" if passes else ""
         yield "L11", f"{net:+d} units in each pass{total}"
@@ -99,7 +99,7 @@ def _of_project(project: Project) -> _Found:
         yield "L16", f"at {step.speed} rpm, from {step.start_frequency} Hz by {step.acceleration} Hz"
     if project.power_on_home:
         yield "L17", "in reverse until input 5, without a limit of travel or time"
-    pauses = sum(project.step(place.step).delay for place in sequence.one_pass(project)) * (passes or 1)
+    pauses = sum(project.step(place.step).delay for place in project.one_pass()) * (passes or 1)
     if pauses > LONG_PAUSES:
         yield "L19", f"{pauses / 1000:g} s of pauses in all"
     if project.mode4:
@@ -115,7 +115,7 @@ def _motion(project: Project, step: Step, number: int) -> _Found:
         return
     exact, pulses = step.distance * project.pulses_per_unit, ramp.pulses_of(project, step)
     if exact != pulses:
-        times = sequence.times(project, number) * (sequence.passes(project) or 1)
+        times = project.times(number) * (project.passes or 1)
         lost = float(exact - pulses) * times
         yield "L3", f"{float(exact):.6g} pulses, {lost:.3g} lost in {times} executions"
     if speed.run > HIGHEST:

@@ -14,12 +14,77 @@ from motorbus.core.request import TimeoutClass
 from motorbus.core.simulated import PoweredDevice
 from motorbus.errors import RequestError
 from motorbus.families.stepper.execution.machine import Machine, Phase
-from motorbus.families.stepper.parameters import HOME_INPUT, INPUTS, PARAMETERS, Project, values_of
-from motorbus.families.stepper.protocol import MOTOR, Command, decode_request, encode_reply
-from motorbus.families.stepper.simulator.memory import Memory
+from motorbus.families.stepper.parameters import (
+    HOME_INPUT,
+    INPUTS,
+    PARAMETERS,
+    PROJECTS,
+    Project,
+    Step,
+    checked_order,
+    encode_image,
+    values_of,
+    with_steps,
+)
+from motorbus.families.stepper.protocol import MOTOR, Command, decode_request, edited, encode_reply
 from motorbus.families.stepper.simulator.quirks import Quirks
 
 STORE_TIME: Final = 0.03  # s that a save or a clear takes before its reply # assumption
+
+
+EXAMPLE: Final = with_steps(
+    Project(number=1, microsteps=8, step_angle=180, turn_distance=1),
+    (Step(distance=1, direction=1, start_frequency=50, acceleration=30, speed=100, delay=1000),),
+)
+"""The values of the manual's examples."""
+
+
+class Memory:
+    """`stored` projects by number, one copy `working` that is edited, and the `selected` number.
+
+    Commands that edit carry no project, and two of them are answered with one. So one project is selected:
+    a save puts the edited copy into a slot. # assumption
+
+    `selected_at_power_on` is 1. # assumption
+    """
+
+    def __init__(self, quirks: Quirks) -> None:
+        self.quirks: Final = quirks
+        self.order: Final = checked_order(quirks.dump_order)
+        self.stored = dict.fromkeys(range(1, PROJECTS + 1), Project())
+        if quirks.shipped == "example":
+            self.stored[1] = EXAMPLE
+        self.selected_at_power_on = 1
+        self.power_on()
+
+    def power_on(self) -> None:
+        """What was not saved is lost."""
+        self.selected = self.selected_at_power_on
+        self.working = self.stored[self.selected]
+
+    def project(self, number: int) -> Project:
+        """What a start of this project runs: of the selected one its edits, assumption."""
+        project = self.working if number == self.selected else self.stored[number]
+        return replace(project, number=number)
+
+    def image(self, number: int) -> bytes:
+        """The 220 bytes that a read of this project shows."""
+        is_edited = self.quirks.read_view == "working" and number == self.selected
+        return encode_image(self.working if is_edited else self.stored[number], self.order)
+
+    def edit(self, name: str, values: Mapping[str, int]) -> None:
+        """Carry out a command that sets parameters."""
+        if name == "select_project":
+            self.selected = values["project"]
+            if self.quirks.select == "load":
+                self.working = self.stored[self.selected]
+        self.working = edited(self.working, name, values)
+
+    def put(self, number: int, project: Project) -> None:
+        """Store a project; the edited copy of the selected one changes with it."""
+        self.stored[number] = project
+        if number == self.selected:
+            self.working = project
 
 
 class Storing(NamedTuple):
@@ -43,7 +108,6 @@ class Controller(PoweredDevice):
         self.machine: Final = Machine(tick_ms=quirks.ramp_tick_ms)
         self.now = 0.0
         self.offset = 0
-        self.notices: list[float] = []
         self.on_power_off: Callable[[], object] = list  # set by the bus
         self._storing: Storing | None = None
         self._crossing: tuple[object, bool, float] = (None, False, inf)
@@ -72,9 +136,14 @@ class Controller(PoweredDevice):
         """Store a project as if it had been written and saved."""
         self.store.put(number, replace(project, number=number))
 
+    @property
+    def notices(self) -> list[float]:
+        """The times (s) of notices that the bus has not sent yet."""
+        return self.machine.notices
+
     def notice(self) -> None:
         """Send a notice without a cause."""
-        self.notices.append(self.now)
+        self.machine.notices.append(self.now)
 
     def midway(self) -> float:
         """When half of a save or a clear is done (s); inf if none runs."""
@@ -86,7 +155,6 @@ class Controller(PoweredDevice):
             self.store.stored[self._storing.number] = Project()
         self._storing = None
         self.machine.power_off(self.now)
-        self._collect()
         self.on_power_off()
 
     def power_on(self) -> None:
@@ -98,7 +166,6 @@ class Controller(PoweredDevice):
             rest = self.machine.inputs - {HOME_INPUT}
             self.machine.inputs = rest | {HOME_INPUT} if wired[self.quirks.home_switch] else rest
         self.machine.power_on(self.now, home_with=first if first.power_on_home else None)
-        self._collect()
 
     def status(self) -> dict[str, object]:
         """Its state; position in pulses, load where it is from power-on, whatever was homed since."""
@@ -137,13 +204,8 @@ class Controller(PoweredDevice):
             elif self._home_crossing() <= moment:
                 self._set_input(HOME_INPUT, HOME_INPUT not in self.machine.inputs, moment)
             self.machine.advance(moment)
-            self._collect()
         self.now = max(self.now, to)
         self.machine.advance(self.now)
-
-    def _collect(self) -> None:
-        self.notices += [one.at for one in self.machine.events if one.kind == "completed"]
-        self.machine.events.clear()
 
     # -- the home switch ---------------------------------------------------------------------------------------------
 
@@ -169,7 +231,6 @@ class Controller(PoweredDevice):
         self.machine.set_input(port, active, at, start=start if self.plugged else None)
         if is_homing and self.machine.phase is not Phase.HOMING and port == HOME_INPUT:
             self.offset += place
-        self._collect()
 
     # -- requests ----------------------------------------------------------------------------------------------------
 
@@ -191,7 +252,6 @@ class Controller(PoweredDevice):
             self._edit(command, values)
         else:
             self._act(command.name, values, at)
-        self._collect()
         image = self.store.image(number) if command.name == "read_project" else b""
         level = int(values.get("port") in self.machine.inputs)
         return encode_reply(request, selected=self.store.selected, level=level, image=image), ready
