@@ -88,9 +88,9 @@ def _choice() -> Iterator[str]:
     yield "By registers 0 to 4: firmware, byte order, model. The model number decides the byte order, for an unknown"
     yield "one register 2 does. Other firmware has no map here: it is read by what all maps share.\n"
     rows: list[list[object]] = []
-    for one in FIRMWARE:
-        minors = f"{one.major}.{one.minors.start} to {one.major}.{one.minors.stop - 1}"
-        rows.append([minors, one.order, f"[{one.table}](#{one.table})"])
+    for major, minors, order, table in FIRMWARE:
+        versions = f"{major}.{minors.start} to {major}.{minors.stop - 1}"
+        rows.append([versions, order, f"[{table}](#{table})"])
     yield from listed(("firmware", "byte order", "map"), rows)
 
 

@@ -115,8 +115,6 @@ def test_values_are_shown_as_their_row_says(address: int, data: str, name: str, 
         ("FF FF FE 03 03 05 F6", "WRITE with 1 byte of parameters cannot be carried out"),
         ("FF FF FE 04 02 28 00 D3", "READ of no byte"),
         ("FF FF FE 04 02 28 01 D2", "no servo answers a READ to everyone"),
-        ("FF FF FD 00 01 03 00 01 19 4E", "a Dynamixel 2.0 packet"),
-        ("55 55 01 03 01 FA", "a packet of LX or Hiwonder servos"),
     ],
 )
 def test_a_fault_has_its_reason(text: str, fault: str) -> None:

@@ -139,14 +139,6 @@ def test_limits_0_and_phase_bit_4_count_over_many_turns() -> None:
     assert host.read(1, PRESENT) == (-5_000) % 4096
 
 
-def test_phase_bit_7_reverses_position_and_drive() -> None:
-    host = Host(position=1000)
-    host.write(1, PHASE, 12 + 128)
-    assert host.read(1, PRESENT) == 3096
-    host.write(1, GOAL, *word(3000))
-    assert host.wait(1.0).read(1, PRESENT) == 3000
-
-
 @pytest.mark.parametrize(("time", "seconds"), [(1000, 1.0), (2000, 2.0)])
 def test_scs_moves_in_the_time_of_register_44(time: int, seconds: float) -> None:
     host = Host((1,), "scs")

@@ -22,11 +22,10 @@ from motorbus.families.feetech.driver.group import (
     sync_read,
     sync_write,
 )
-from motorbus.families.feetech.driver.identity import ScanWarning
+from motorbus.families.feetech.driver.identity import ScanWarning, scan
 from motorbus.families.feetech.driver.maintenance import Recovery
 from motorbus.families.feetech.driver.motion import Promise
 from motorbus.families.feetech.driver.node import Node
-from motorbus.families.feetech.driver.scan import scan
 from motorbus.families.feetech.driver.servo import AsyncServo, Servo
 from motorbus.families.feetech.registers import TABLES
 from motorbus.families.feetech.registers.codes import BAUD_CODES

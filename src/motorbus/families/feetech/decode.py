@@ -26,11 +26,6 @@ from motorbus.families.feetech.registers import TABLES
 from motorbus.families.feetech.registers.codes import alarms
 
 IDENTITY: Final = 5  # registers that identify a servo
-FOREIGN: Final[Mapping[bytes, str]] = {
-    b"\xff\xff\xfd\x00": "a Dynamixel 2.0 packet, which no FEETECH servo answers",
-    b"\x55\x55": "a packet of LX or Hiwonder servos, which no FEETECH servo answers",
-}
-"""First bytes of packets of other makers -> text."""
 BEGIN: Final = re.compile(rb"(?<!\xff)(?=\xff\xff)")  # of a header; the last two FF of a run are the header
 
 
@@ -272,11 +267,10 @@ def _word(data: bytes) -> str:
 
 def _invalid(data: bytes) -> Explanation:
     """Explain bytes that are no valid packet; they contain at most one header, at their beginning."""
-    foreign = next((text for head, text in FOREIGN.items() if data.startswith(head)), "")
-    fault = foreign or _fault(data)
-    if foreign or data[:2] != HEADER or set(data) == {0xFF}:
+    fault = _fault(data)
+    if data[:2] != HEADER or set(data) == {0xFF}:
         fields = Fields(data)
-        fields.take_rest("stray", foreign or counted(len(data)))
+        fields.take_rest("stray", counted(len(data)))
         return Explanation(data, "no packet", tuple(fields.parts), fault)
     fields = _head(data)
     if len(data) > 4:

@@ -114,24 +114,15 @@ NO_LOAD: Final[Mapping[str, float]] = {
 """Model -> its velocity (rad/s) without load, where a source tells it."""
 
 
-class Firmware(NamedTuple):
-    """Firmware of this major version, these minor ones and this byte order has this register map."""
-
-    major: int
-    minors: range
-    order: str
-    table: str
-
-
 FIRMWARE: Final = (
-    Firmware(0, range(40), "big", "scs"),
-    Firmware(1, range(40), "little", "smcl"),
-    Firmware(2, range(40, 70), "little", "smbl"),
-    Firmware(3, range(40), "little", "sts"),
-    Firmware(3, range(20, 40), "big", "scs2"),
-    Firmware(3, range(40, 60), "little", "hls"),
+    (0, range(40), "big", "scs"),
+    (1, range(40), "little", "smcl"),
+    (2, range(40, 70), "little", "smbl"),
+    (3, range(40), "little", "sts"),
+    (3, range(20, 40), "big", "scs2"),
+    (3, range(40, 60), "little", "hls"),
 )
-"""Every firmware with a known map; 3.20 to 3.39 is told apart by the byte order."""
+"""Major version, minor versions, byte order and map; the byte order tells 3.20 to 3.39 apart."""
 
 
 class Choice(NamedTuple):
@@ -161,9 +152,9 @@ def map_for(major: int, minor: int, order: str) -> str:
 
     Firmware 20.0 to 20.19, which FD knows too, is that of another kind of device.
     """
-    for firmware in FIRMWARE:
-        if (firmware.major, firmware.order) == (major, order) and minor in firmware.minors:
-            return firmware.table
+    for known, minors, its_order, table in FIRMWARE:
+        if (known, its_order) == (major, order) and minor in minors:
+            return table
     return ""
 
 

@@ -23,7 +23,6 @@ from motorbus.families.feetech.driver.group import disable_torque_everyone, limp
 from motorbus.families.feetech.driver.motion import LIMP, Promise
 from motorbus.families.feetech.driver.node import IMAGE, BusFacts, Node, checked_id
 from motorbus.families.feetech.driver.requests import DATA, PRESENT, TORQUE_ENABLE, Block, read_id
-from motorbus.families.feetech.driver.scan import scan
 from motorbus.families.feetech.registers import TABLES
 from motorbus.families.feetech.traits import TRAITS, Mode
 
@@ -34,7 +33,7 @@ PROCESSING: Final = 0.001
 STORE_DELAY: Final = 0.100  # s for flash: more than 21 ms measured by a recovery tool, 50 to 100 ms advised
 DELAYS: Final = {
     TimeoutClass.REPLY: PROCESSING,
-    TimeoutClass.SCAN: PROCESSING,  # servolab waits 10 ms; a late reply is noticed, see scan.py
+    TimeoutClass.SCAN: PROCESSING,  # servolab waits 10 ms; a late reply is noticed
     TimeoutClass.STORE: STORE_DELAY,
 }
 COLLISION: Final = 0.8  # s in which all servos have answered a broadcast PING at 1 Mbit/s (rustypot)
@@ -112,7 +111,7 @@ class FeetechDriver(HalfDuplexSerial):
         return identity.identify(Node(node, self.facts))
 
     def scan(self, ids: tuple[int, ...] = (), rates: tuple[int, ...] = ()) -> Procedure[list[Found]]:
-        return scan(ids, rates, self.facts)
+        return identity.scan(ids, rates, self.facts)
 
     def axis(self, identity: Identity) -> AxisDriver:
         """By the register map, whatever the model; a servo in another mode than position has an axis of that kind."""

@@ -7,7 +7,7 @@ Source: FEETECH SDK hls.py; HLS memory table; STS3215 memory table V3.6.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Final, TypeAlias
 
 from motorbus.core.family import State
@@ -44,51 +44,37 @@ async def why_not_moving(node: Node) -> tuple[str, ...]:
     await read_settings(node)
     raw = await _read_all(node)
     state = await feedback.telemetry(node)
-    found = [text for holds, text in _rules(node, raw) if holds]
-    return (*found, *_explain(node, state, raw))
+    return (*_reasons(node, raw), *_explain(node, state, raw))
 
 
-def _rules(node: Node, raw: Raw) -> list[tuple[bool, str]]:
-    """Each rule: whether it holds, and its text."""
+def _reasons(node: Node, raw: Raw) -> Iterator[str]:
+    """The settings that keep it from moving."""
     mode, traits, settings = node.known_mode, node.traits, node.settings
     assert settings is not None
     low, high = settings.raw_limits
-    bound = raw(traits.current) if traits.current else 1
-    bounded = mode in BOUNDED
-    return [
-        (mode is None, f"its operating mode {shown_mode(node)} is not documented: set_mode('position')"),
-        (
-            mode is Mode.PWM and not traits.duty,
-            "the duty register of its PWM mode is not published: set_mode('position')",
-        ),
-        (
-            mode is Mode.POSITION and low >= high and not settings.many_turns,
-            f"its position limits {low} to {high} (raw) leave no range: write limits that do",
-        ),
-        (
-            mode is Mode.VELOCITY and raw("goal_velocity") == 0,
-            "its goal velocity is 0: set_velocity() gives one",
-        ),
-        (
-            mode is Mode.PWM and bool(traits.duty) and raw(traits.duty) == 0,
-            "its duty is 0: set_duty() gives one",
-        ),
-        (mode is Mode.CURRENT and bound == 0, "its goal current is 0: set_current() gives one"),
-        (
-            bounded and bound == 0,
-            "goal_torque is 0, so its current is bounded to 0 A: enable_torque() sets its protection current",
-        ),
-        (
-            bounded and bound == 0 and settings.protection_current == 0,
-            "its protection current is 0 as well: write(protection_current=…)",
-        ),
-        (raw("torque_enable") != 1, "its torque is off: enable_torque()"),
-        (
-            bool(traits.limit) and raw(traits.limit or "lock") == 0,
-            "torque_limit is 0: cap_torque(1.0)",
-        ),
-        (raw("max_torque") == 0, "max_torque is 0, which bounds its torque: write(max_torque=1.0)"),
-    ]
+    if mode is None:
+        yield f"its operating mode {shown_mode(node)} is not documented: set_mode('position')"
+    if mode is Mode.PWM and not traits.duty:
+        yield "the duty register of its PWM mode is not published: set_mode('position')"
+    if mode is Mode.POSITION and low >= high and not settings.many_turns:
+        yield f"its position limits {low} to {high} (raw) leave no range: write limits that do"
+    if mode is Mode.VELOCITY and raw("goal_velocity") == 0:
+        yield "its goal velocity is 0: set_velocity() gives one"
+    if mode is Mode.PWM and traits.duty and raw(traits.duty) == 0:
+        yield "its duty is 0: set_duty() gives one"
+    if traits.current and raw(traits.current) == 0:
+        if mode is Mode.CURRENT:
+            yield "its goal current is 0: set_current() gives one"
+        if mode in BOUNDED:
+            yield "goal_torque is 0, so its current is bounded to 0 A: enable_torque() sets its protection current"
+            if settings.protection_current == 0:
+                yield "its protection current is 0 as well: write(protection_current=…)"
+    if raw("torque_enable") != 1:
+        yield "its torque is off: enable_torque()"
+    if traits.limit and raw(traits.limit) == 0:
+        yield "torque_limit is 0: cap_torque(1.0)"
+    if raw("max_torque") == 0:
+        yield "max_torque is 0, which bounds its torque: write(max_torque=1.0)"
 
 
 async def _read_all(node: Node) -> Raw:

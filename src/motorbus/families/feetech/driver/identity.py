@@ -1,29 +1,37 @@
-"""Whether a servo is there, what it is, how it is set, and whether it is alone.
+"""Whether a servo is there, what it is, how it is set, and whether it is alone; the scan of a line.
 
 The register map follows from firmware and byte order; the model gives the name and the byte order (algorithm of FD
 1.9.8.5). A servo of an unknown map is read by the rows that all maps share, and never written: the same address is the
 lock in one map and the torque limit in another.
+
+A scan reads each id in order: every servo answers READ, and boards exist that lack PING. A broadcast PING is not used:
+the replies of servos with one return delay collide, SCS do not answer it, and its window is 0.8 s. A silent id is asked
+once. A reply that comes late disturbs the request to the next id, so both are identified then, with the normal
+time-out. A servo at another rate is silent.
 """
 
 from __future__ import annotations
 
-from functools import cache
+from collections.abc import Sequence
+from functools import cache, partial
 from typing import Final, NamedTuple
 
-from motorbus.core.family import Identity
+from motorbus.core.family import Found, Identity
 from motorbus.core.register import Access, RegisterMap, changed
-from motorbus.core.request import Expected, Request, Response
-from motorbus.core.steps import Sleep
-from motorbus.errors import DeviceError, NoReply, RequestError, WireError
+from motorbus.core.request import Expected, Request, Response, TimeoutClass
+from motorbus.core.scan import scan_rates
+from motorbus.core.steps import Emit, Exclusive, Progress, SetBitrate, Sleep, catch
+from motorbus.errors import DeviceError, LinkError, NoReply, RequestError, WireError
 from motorbus.families.feetech import protocol
-from motorbus.families.feetech.driver.node import IMAGE, Node, Settings, settings_of
-from motorbus.families.feetech.driver.requests import STORE, read_block
+from motorbus.families.feetech.driver.node import IMAGE, BusFacts, Node, Settings, as_nodes, settings_of
+from motorbus.families.feetech.driver.requests import STORE, read_block, read_id
 from motorbus.families.feetech.models import Choice, choose, model_number
 from motorbus.families.feetech.registers import STS, TABLES
 
 ALONE: Final = 12  # reads that show two servos with one id; 4 of 10 short reads were garbled (servolab)
 SILENCE: Final = 1.0
 """s without a reply after which settings are read again: another servo may be there by now."""
+DRAIN: Final = 0.02  # s of quiet at a new rate: a servo may answer what it has buffered (feetech-cli)
 COMMON: Final = frozenset(
     (
         *("firmware_major", "firmware_minor", "byte_order", "model_major", "model_minor", "id", "baud_rate"),
@@ -173,3 +181,54 @@ async def check_alone(node: Node) -> bytes:
         advice="connect one servo at a time",
         node=node.node,
     )
+
+
+# -- scan ------------------------------------------------------------------------------------------------------
+
+
+async def scan(
+    ids: Sequence[int] = (), rates: Sequence[int] = (), facts: BusFacts | None = None
+) -> list[Found]:
+    """All servos that answer, with their identity; () means all ids, or the present rate, which is restored.
+
+    Reports `Found` when one answers, `Progress`, a `ScanWarning` where two servos seem to share an id, and `Skipped`
+    for a rate that the adapter lacks. Writes nothing.
+    """
+    nodes = [Node(node.node, facts) for node in as_nodes(ids or range(protocol.MAX_ID + 1))]
+    if rates:
+        return await Exclusive(scan_rates(rates, partial(_scan_rate, nodes)))
+    return await _scan_rate(nodes, await SetBitrate(0))
+
+
+async def _scan_rate(nodes: Sequence[Node], rate: int) -> list[Found]:
+    await Sleep(DRAIN)
+    answering: set[int] = set()
+    doubtful: set[int] = set()
+    for done, node in enumerate(nodes, 1):
+        try:
+            await read_id(node.node, within=TimeoutClass.SCAN)
+        except NoReply:
+            pass
+        except WireError:
+            doubtful |= {node.node, node.node - 1}
+        else:
+            answering.add(node.node)
+            await Emit(Found(node.node, rate, None))
+        await Emit(Progress(done, len(nodes), f"id {node.node} at {rate} bit/s"))
+    suspects = [node for node in nodes if node.node in answering | doubtful]
+    found = [await _identify_found(node, rate, sure=node.node in answering) for node in suspects]
+    return [one for one in found if one is not None]
+
+
+async def _identify_found(node: Node, rate: int, *, sure: bool) -> Found | None:
+    """What answers, None for nothing; reports a suspected second servo."""
+    identity = await catch(identify(node))
+    if isinstance(identity, NoReply) and not sure:
+        return None
+    alone = await catch(check_alone(node))
+    for result in (identity, alone):
+        if isinstance(result, LinkError):
+            raise result
+    if isinstance(alone, RequestError):
+        await Emit(ScanWarning(node.node, rate, alone.summary))
+    return Found(node.node, rate, identity if isinstance(identity, Identity) else None)

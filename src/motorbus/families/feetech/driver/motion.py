@@ -15,14 +15,14 @@ from typing import Any, Final
 
 from motorbus.core import move as core_move
 from motorbus.core.family import State
-from motorbus.core.register import Register, RegisterMap, is_number, shown
+from motorbus.core.register import Register, is_number, shown
 from motorbus.core.request import Effect, Precondition, Priority
 from motorbus.core.setpoint import Setpoint, torque_off, torque_on
 from motorbus.core.steps import Procedure, Runnable, catch
 from motorbus.errors import LimitExceeded, MotionError, MotorbusError, Stalled
 from motorbus.families.feetech.driver import diagnosis, feedback, goals
 from motorbus.families.feetech.driver.identity import known, read_settings, writable
-from motorbus.families.feetech.driver.node import MANY_TURNS, Node
+from motorbus.families.feetech.driver.node import Node
 from motorbus.families.feetech.driver.requests import (
     DOUBTS,
     ON,
@@ -397,15 +397,3 @@ async def max_velocity(node: Node) -> float | None:
     """The velocity (rad/s) of its model without load; None where no source tells it."""
     await known(node)
     return NO_LOAD.get(node.identity.model) if node.identity else None
-
-
-async def travel(node: Node) -> tuple[float, float] | None:
-    """Range (rad) of its encoder and registers, whatever its limits; None in another mode than position."""
-    table: RegisterMap = await known(node)
-    settings = node.settings
-    if not node.is_writable or settings is None or settings.mode is not Mode.POSITION:
-        return None
-    count = table["goal_position"].scale * settings.factors["goal_position"]
-    if settings.many_turns:
-        return -MANY_TURNS * count, MANY_TURNS * count
-    return 0.0, settings.turn * count

@@ -50,8 +50,6 @@ LOADED: Final = {
     "live_i": "position_i",
 }
 """RAM row -> EEPROM row from which it is loaded at power-up."""
-REVERSES: Final = {"sts": 0x80, "smbl": 0x80, "hls": 0x80, "scs": 0x01, "scs2": 0x01}
-"""Map -> bit of `phase` that reverses position feedback, and the drive with it. # assumption"""
 CALIBRATING: Final = ("hls", "sts")
 """Maps with 0x0B: FTServo_Python, reOfsCal; dispatcher of STS3215 firmware 3.10 (kuterd/feetech-fw-util)."""
 _COUNTING: Final = {"operating_mode", "homing_offset", "phase", "angular_resolution"}
@@ -113,7 +111,7 @@ class Servo(PoweredDevice):
         self._load, self._blocked = 0.0, None
         self._now = now
         self._traits = model.traits
-        self._reversed = self._tripped = False
+        self._tripped = False
         self._above = inf, inf  # s in which the torque is above the limit
         position = model.traits.turn // 2 if quirks.position < 0 else quirks.position
         self.course = Course(rest(now(), position))
@@ -405,10 +403,6 @@ class Servo(PoweredDevice):
     def set_zero(self) -> None:
         """Apply the homing offset, in position mode only (feetech-cli, servolab, on STS3215)."""
         now, memory, turn = self._now(), self.memory, self._traits.turn
-        reverses = REVERSES.get(self.model.table.name, 0)
-        if self._reversed is not bool(memory["phase"] & reverses):
-            self._reversed = not self._reversed
-            self.course = Course(rest(now, -self.motion.position(now)))
         applies = "homing_offset" in self.model.table and self.mode is Mode.POSITION
         offset = memory["homing_offset"] * self._resolution if applies else 0
         counts = round(self.motion.position(now))
