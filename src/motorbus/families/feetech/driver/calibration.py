@@ -196,7 +196,7 @@ async def set_multi_turn(node: Node, on: bool, limits: tuple[float, float] | Non
     wished = limits if limits is not None or node.settings.many_turns else node.limits
     if (on and limits is not None) or (not on and wished is None):
         fix = "give limits=(low, high) in rad, in the shell --low 0deg --high 300deg"
-        raise node.refusal("has no limits over many turns, and needs them within one", fix)
+        raise node.refusal("has no limits over many turns, and needs limits within one", fix)
     image = await check_alone(node)  # the other bits of its phase belong to this servo
     learn(node, image)
     row = table["phase"]
