@@ -13,7 +13,7 @@ import pytest
 
 from motorbus.bus.blocking import Bus
 from motorbus.bus.interlock import DeviceLimits
-from motorbus.bus.sync import RETRIES
+from motorbus.bus.retry import RETRIES
 from motorbus.core.can_frame import CanFrame
 from motorbus.core.request import Data
 from motorbus.errors import MotorbusError, NoReply, OutcomeUnknown

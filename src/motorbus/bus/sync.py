@@ -1,4 +1,4 @@
-"""Which nodes are in sync, and what is done for a request in trouble. A state changes in `SyncTable._fire` only.
+"""Which nodes are in sync. A state changes in `SyncTable._fire` only.
 
 A node whose reply did not come in time owes it. Before the next request to it the bus is silent for a quiet time, then
 sends a probe: a request whose reply differs in key or length from every reply that the node owes. A link is first in,
@@ -8,20 +8,10 @@ first out, so when the probe is answered no older reply can follow. Decision rec
 from __future__ import annotations
 
 from enum import Enum
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
-from motorbus.bus import failures
-from motorbus.bus.attempt import Attempt
 from motorbus.core.family import BusDriver
-from motorbus.core.request import ANY, Effect, Expected, Key, Priority, Request, Response, TimeoutClass
-from motorbus.core.steps import Sleep
-from motorbus.errors import MotorbusError
-
-if TYPE_CHECKING:
-    from motorbus.bus.engine import Engine
-
-RETRIES: Final = 2
-"""Attempts of a repeatable request after the first."""
+from motorbus.core.request import ANY, Effect, Expected, Key, Priority, Request, TimeoutClass
 
 PROBES: Final = 64
 """Probes compared with what a node owes, to find one that differs."""
@@ -184,79 +174,3 @@ def must_sync(request: Request[Any]) -> bool:
 def is_read(request: Request[Any]) -> bool:
     """Sending it again changes nothing."""
     return request.repeatable and request.effect is Effect.NONE
-
-
-async def carry_out(engine: Engine, request: Request[Any], attempt: Attempt | None = None) -> Response:
-    """The reply to this request; `attempt` is its first one, which has failed. Raises when the last one fails."""
-    tries, sent = 0, False
-    while True:
-        if attempt is not None:
-            sent = True
-            if attempt.accepted is not None:
-                return attempt.accepted
-            if engine.stopping and not is_read(request) and request.priority is not Priority.STOP:
-                raise failures.latched(engine.latched_by)
-            tries += 1
-            if not _may_repeat(request) or tries > RETRIES:
-                raise _error(engine, request, attempt, tries, sent)
-            for node in attempt.nodes:
-                engine.statistics.of(node).retries += 1
-        excluded: tuple[int, ...] = ()
-        is_probed = False
-        for node in engine.sync.doubtful(request) if must_sync(request) else ():
-            if len(request.expected) > 1 and engine.sync.is_put_off(node, await Sleep(0)):  # type: ignore[arg-type]
-                excluded += (node,)  # a group does not wait for a node that was silent lately
-                continue
-            failed, probes = await _resync(engine, node)
-            is_probed = is_probed or failed is None
-            if failed is None:
-                continue
-            tries += probes
-            if len(request.expected) == 1:  # type: ignore[arg-type]  # never ANY here
-                raise _error(engine, request, failed, tries, sent)
-            excluded += (node,)
-        if excluded and len(excluded) == len(request.expected):  # type: ignore[arg-type]
-            return Response((), excluded, await Sleep(0))
-        step = Attempt(request, excluded=excluded)
-        step.is_probed = is_probed
-        attempt = await step
-        if attempt is None:  # a node came out of sync before it left
-            tries += 1
-            if tries > RETRIES:
-                step.fault = "surplus"  # data that were not expected came before it, each time
-                raise _error(engine, request, step, tries, sent)
-
-
-def _may_repeat(request: Request[Any]) -> bool:
-    """A scan is not repeated, for silence is its usual answer; nor is a stop, which has rounds of its own."""
-    return (
-        request.repeatable
-        and request.priority is not Priority.STOP
-        and request.expected is not ANY
-        and request.reply_within is not TimeoutClass.SCAN
-    )
-
-
-async def _resync(engine: Engine, node: int) -> tuple[Attempt | None, int]:
-    """Wait for the quiet time and probe this node: the probe that failed, None when it is in sync, and how many."""
-    state, tries = engine.sync.of(node), 0
-    for tries in range(1, RETRIES + 2):
-        # Another request may have moved the quiet time, or probed the node, while this one slept.
-        while (pause := state.quiet_until - await Sleep(0)) > 0:
-            await Sleep(pause)
-        if node not in engine.sync.out_of_sync:
-            return None, tries
-        attempt = await Attempt(engine.sync.next_probe(node), is_probe=True)
-        assert attempt is not None
-        if not attempt.fault:
-            return None, tries
-        if attempt.fault == "silence":
-            break
-    engine.sync.back_off(node, await Sleep(0), engine.quiet_time)
-    return attempt, tries
-
-
-def _error(engine: Engine, request: Request[Any], attempt: Attempt, tries: int, sent: bool) -> MotorbusError:
-    return failures.no_answer(
-        request, attempt.failure(), attempt.received(), tries=tries, sent=sent, diagnosis=engine.diagnosis()
-    )

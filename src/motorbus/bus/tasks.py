@@ -20,7 +20,7 @@ from motorbus.bus import failures
 from motorbus.bus.attempt import Attempt
 from motorbus.bus.engine import Engine
 from motorbus.bus.nodes import GATED
-from motorbus.bus.sync import carry_out
+from motorbus.bus.retry import carry_out
 from motorbus.core.request import Notification, Priority, Request, Response, Step
 from motorbus.core.steps import (
     Emit,
