@@ -406,7 +406,7 @@ async def _lead(robot: Robot, names: Sequence[str], feed: Callable[[ControlLoop]
 def failed(name: str, error: MotorbusError) -> Failed:
     """An error as a message."""
     notes = tuple(getattr(error, "__notes__", ()))
-    advice = "press Take control" if error.reason == "lease" else error.advice
+    advice = "press Take control" if getattr(error, "reason", "") == "lease" else error.advice
     return Failed(name, error.summary, error.expected, error.cause, advice, notes)
 
 
