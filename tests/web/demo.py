@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, Self
 import msgspec
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin
 
 from motorbus import Robot
 from motorbus.motion.machine import MachineConfig
@@ -70,7 +71,7 @@ class Client:
         headers = served.headers()
         self._connection = connect(
             f"ws://{headers['Host']}/ws",
-            origin=headers["Origin"],  # type: ignore[arg-type]
+            origin=Origin(headers["Origin"]),
             additional_headers={"Cookie": headers["Cookie"]},
         )
         self.messages: list[dict[str, Any]] = []

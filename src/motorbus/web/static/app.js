@@ -1,9 +1,13 @@
 // The page: header with the stop, tabs, messages.
 import { Axes } from "./axes.js";
+import { Faults } from "./faults.js";
 import { html, render, useEffect, useState } from "./lib.js";
 import { clearMessages, link, open, order, send, stop, useLink } from "./link.js";
+import { Plot } from "./plot.js";
+import { Registers } from "./registers.js";
+import { Teach } from "./teach.js";
 
-const TABS = { Axes };
+const TABS = { Axes, Plot, Registers, Teach, Faults };
 
 function Header({ tab, setTab }) {
   const { machine, online, control, frame } = useLink();
