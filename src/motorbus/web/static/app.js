@@ -21,9 +21,9 @@ function Header({ tab, setTab }) {
       <span class="badge" data-testid="activity" hidden=${!frame?.activity}>${frame?.activity}</span>
       <span class="space"></span>
       ${control === "you"
-        ? html`<button onClick=${() => send({ type: "leave" })} title="Let another page move the machine">Release control</button>`
+        ? html`<button onClick=${() => send({ type: "leave" })} title="Stop, and let another page move the machine">Release</button>`
         : html`<button class="primary" disabled=${!online} onClick=${() => send({ type: "take", force: control === "other" })}>
-            ${control === "other" ? "Take control from the other page" : "Take control"}</button>`}
+            ${control === "other" ? "Take over" : "Take control"}</button>`}
       ${latched
         ? html`<button disabled=${control !== "you"} onClick=${() => order({ type: "reset" })}>Reset emergency stop</button>`
         : html`<button class="estop" onClick=${() => send({ type: "estop" })}
