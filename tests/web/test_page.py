@@ -155,11 +155,31 @@ def test_a_register_is_written_after_a_question(page: Page, served: Served) -> N
     expect(page.get_by_test_id("messages")).to_contain_text("read back")
 
 
+def test_the_sketch_has_the_shape_of_the_arm(page: Page) -> None:
+    expect(page.get_by_test_id("sketch")).to_be_visible()
+    lines = page.evaluate("async () => (await import('/static/sketch.js')).segments([0, 0, 0, 0, 0, 0])")
+    elbow, wrist = lines[3][0], lines[3][1]
+    assert elbow[2] == pytest.approx(wrist[2], abs=0.006)  # at zero the forearm is level, 0.234 m high
+    assert elbow[2] == pytest.approx(0.234, abs=0.01)
+
+
 def test_an_injected_fault_shows(page: Page) -> None:
     page.get_by_role("tab", name="Faults").click()
     page.get_by_role("button", name="unplug", exact=True).click()
     page.get_by_role("tab", name="Axes").click()
     expect(page.get_by_test_id("axis-base")).to_contain_text("no reply for")
+
+
+def test_the_set_up_is_answered(page: Page, served: Served) -> None:
+    page.get_by_role("tab", name="Setup").click()
+    page.get_by_role("button", name="Begin").click()
+    expect(page.get_by_role("tabpanel")).to_contain_text("base: move it by hand")
+    served.faults.inject("arm", "push 1 30deg")
+    expect(page.get_by_test_id("notes")).to_contain_text("base moves as named")
+    page.get_by_role("button", name="Pass over").click()
+    expect(page.get_by_role("tabpanel")).to_contain_text("elbow: move it by hand")
+    page.get_by_role("button", name="End").click()
+    expect(page.get_by_role("button", name="Begin")).to_be_enabled()
 
 
 def test_no_panel_scrolls_sideways_on_a_phone(browser: Browser, served: Served) -> None:

@@ -63,7 +63,21 @@ class Inject(Struct, frozen=True, tag="inject"):
     order: str
 
 
-PageMessage: TypeAlias = Heartbeat | Take | Leave | Target | JogStart | JogEnd | Finish | Inject
+class Verify(Struct, frozen=True, tag="verify"):
+    """Verify the axes of a bus by hand; its steps, `Note` and `Live` of `setup.engine`, go to this page."""
+
+    bus: str
+
+
+class Answer(Struct, frozen=True, tag="answer"):
+    """The text of the user for the present step; "" for Enter."""
+
+    text: str = ""
+
+
+PageMessage: TypeAlias = (
+    Heartbeat | Take | Leave | Target | JogStart | JogEnd | Finish | Inject | Verify | Answer
+)
 PageCommand: TypeAlias = (
     commands.Move
     | commands.Pose

@@ -27,6 +27,7 @@ from motorbus.motion.loop import ControlLoop
 from motorbus.motion.moves import Running, StopsIfInterrupted
 from motorbus.motion.robot import Robot
 from motorbus.web import messages
+from motorbus.web.guide import PageFace, verify_axes
 from motorbus.web.messages import Control, Done, Failed, Frame, Message, Notice
 
 LOG: Final = logging.getLogger("motorbus.web")
@@ -100,7 +101,8 @@ class Service:
         self._left_at = monotonic()
         self._targets: dict[str, float] = {}
         self._next: tuple[Page, str, Callable[[], Any]] | None = None
-        self._released = False  # the jog button, or the recording
+        self._released = False  # the jog button, the recording, the set-up
+        self._face = PageFace(lambda step: None, lambda: self._released)
         self._lock = Lock()  # of the fields above
         self._wake = Event()
         self._idle = Event()
@@ -208,6 +210,12 @@ class Service:
                 if self.demo is None:
                     raise RequestError("faults can be injected in `motorbus web --demo` only")
                 page.put(Done("inject", self.demo.inject(bus, order)))
+            case messages.Verify(bus):
+                self._released = False
+                self._face = face = PageFace(page.put, lambda: self._released)
+                self._start(page, "verify", lambda: verify_axes(self.robot, bus, face))
+            case messages.Answer(text):
+                self._face.answers.put(text)
             case commands.Torque(False) | commands.ClearFault() | commands.Reset():
                 self._run(page, message)
             case commands.Teach():

@@ -2,12 +2,13 @@
 import { Axes } from "./axes.js";
 import { Faults } from "./faults.js";
 import { html, render, useEffect, useState } from "./lib.js";
-import { clearMessages, link, open, order, send, stop, useLink } from "./link.js";
+import { clearMessages, link, open, order, release, send, stop, useLink } from "./link.js";
 import { Plot } from "./plot.js";
 import { Registers } from "./registers.js";
+import { Setup } from "./setup.js";
 import { Teach } from "./teach.js";
 
-const TABS = { Axes, Plot, Registers, Teach, Faults };
+const TABS = { Axes, Plot, Registers, Teach, Setup, Faults };
 
 function Header({ tab, setTab }) {
   const { machine, online, control, frame } = useLink();
@@ -21,7 +22,7 @@ function Header({ tab, setTab }) {
       <span class="badge" data-testid="activity" hidden=${!frame?.activity}>${frame?.activity}</span>
       <span class="space"></span>
       ${control === "you"
-        ? html`<button onClick=${() => send({ type: "leave" })} title="Stop, and let another page move the machine">Release</button>`
+        ? html`<button onClick=${release} title="Stop, and let another page move the machine">Release</button>`
         : html`<button class="primary" disabled=${!online} onClick=${() => send({ type: "take", force: control === "other" })}>
             ${control === "other" ? "Take over" : "Take control"}</button>`}
       ${latched

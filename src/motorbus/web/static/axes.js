@@ -1,6 +1,7 @@
 // Axes: position, goal, load, current, voltage, temperature, alarms; sliders, typed goals, jog, torque, poses, programs.
 import { html, number, places, useEffect, useRef, useState } from "./lib.js";
 import { link, order, send, stops, useLink } from "./link.js";
+import { Sketch } from "./sketch.js";
 
 const SEND = 25; // ms between two targets of a slider
 const OLD = 1.0; // s without a position
@@ -168,6 +169,6 @@ export function Axes() {
       <label>speed <input type="range" min="0.05" max="1" step="0.05" value=${speed}
         onInput=${(event) => setSpeed(event.target.valueAsNumber)} /> ${Math.round(speed * 100)} %</label>
     </div>
-    <div class="grid">${Object.keys(machine.axes).map((name) => html`
+    <div class="grid"><${Sketch} />${Object.keys(machine.axes).map((name) => html`
       <${Axis} key=${name} name=${name} speed=${speed} locked=${locked} />`)}</div>`;
 }

@@ -2,7 +2,7 @@
 import { html, useState } from "./lib.js";
 import { ask, link, say } from "./link.js";
 
-const DEVICE = ["unplug", "plug", "power-cycle", "block", "release", "push 10deg", "load 60%", "supply 5.5", "heat 72"];
+const DEVICE = ["unplug", "plug", "power-cycle", "block", "release", "push 30deg", "load 60%", "supply 5.5", "heat 72"];
 const WIRE = ["1%: corrupt", "5%: drop", "5%: delay 0.02", "2%: duplicate", "off"];
 
 export function Faults() {

@@ -2,6 +2,7 @@
 import { useEffect, useState } from "./lib.js";
 
 const BEAT = 150; // ms between two heartbeats
+const RETAKE = 200; // ms until the control is taken again
 const DRAW = 70; // ms between two drawings of the panels
 const MESSAGES = 6;
 
@@ -13,12 +14,15 @@ export const link = {
   control: "none", // "you", "other" or "none"
   frame: null, // the last state
   messages: [],
+  notes: [], // of a guided procedure
+  step: null, // its question or live table
 };
 const frameListeners = new Set();
 const drawListeners = new Set();
 const waiting = []; // commands whose results are awaited
 let socket = null;
 let drawn = 0;
+let releasing = false;
 let count = 0;
 
 /** Load the description of the machine, then connect. */
@@ -56,7 +60,12 @@ function receive(message) {
       if (performance.now() - drawn < DRAW) return;
       break;
     case "control":
+      // A page that was too slow for a moment, while nothing moved, takes the control again.
+      if (link.control === "you" && message.holder === "none" && !releasing && !link.frame?.activity) {
+        setTimeout(() => link.control === "none" && send({ type: "take" }), RETAKE);
+      }
       link.control = message.holder;
+      releasing = false;
       break;
     case "done":
       take(message.of)?.finish(message.result);
@@ -69,6 +78,13 @@ function receive(message) {
     }
     case "notice":
       say(message.text, false);
+      break;
+    case "note":
+      link.notes = [...link.notes, message];
+      break;
+    case "live":
+    case "prompt":
+      link.step = message;
   }
   draw();
 }
@@ -76,6 +92,12 @@ function receive(message) {
 function take(name) {
   const index = waiting.findIndex((one) => one.name === name);
   return index < 0 ? null : waiting.splice(index, 1)[0];
+}
+
+/** Give the control back; the machine stops. */
+export function release() {
+  releasing = true;
+  send({ type: "leave" });
 }
 
 /** Show a text among the messages. */
