@@ -368,7 +368,12 @@ class Service:
                 quiet_since = self.robot.now()
             return self.robot.now() - quiet_since < QUIET
 
-        self.robot.carry_out(_lead(self.robot, sorted(wanted), feed))
+        try:
+            self.robot.carry_out(_lead(self.robot, sorted(wanted), feed))
+        except BaseException:
+            with self._lock:
+                self._targets.clear()  # none of them is followed later
+            raise
 
     # -- end of the pages ------------------------------------------------------------------------------------------
 
