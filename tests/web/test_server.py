@@ -21,7 +21,7 @@ from motorbus.cli import main
 from motorbus.errors import MotorbusError
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.commands import EStop, Stop
-from motorbus.web.messages import DECODER, Failed, Message, Take, Target
+from motorbus.web.messages import DECODER, Failed, Message, Take
 from tests.web.demo import Client, Recorder, Served, serve, services, wait_for
 
 READS: Final = (0x01, 0x02, 0x82)  # FEETECH: ping, read, sync read
@@ -386,10 +386,3 @@ def test_a_slow_page_delays_no_other(served: Served, client: Client) -> None:
             numbers.append(client.frame["state"]["number"])
             slide(client, 1.0 + 0.1 * (len(numbers) % 2))
     assert len(numbers) > 30
-
-
-def test_a_target_that_is_not_finite_is_refused(served: Served) -> None:
-    page = Recorder()
-    served.service.join(page)
-    with pytest.raises(MotorbusError):
-        served.service.receive(page, Target("base", float("nan"), 0))

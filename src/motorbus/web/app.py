@@ -35,7 +35,7 @@ from motorbus.core import units
 from motorbus.errors import MotorbusError, RequestError
 from motorbus.web.messages import DECODER, Failed
 from motorbus.web.registers import read_table
-from motorbus.web.service import Page, Service, failed
+from motorbus.web.service import Page, Service, failed, tag_of
 
 STATIC: Final = Path(__file__).parent / "static"
 LIBRARIES: Final = ("preact.mjs", "hooks.mjs", "htm.mjs", "uPlot.mjs", "uPlot.css")
@@ -211,12 +211,15 @@ class Routes:
                 if allowance < 0:
                     await connection.close(1008, "too many messages")
                     return
+                name = "message"
                 try:
-                    self._service.receive(page, DECODER.decode(data.get("text") or data.get("bytes") or b""))
+                    message = DECODER.decode(data.get("text") or data.get("bytes") or b"")
+                    name = tag_of(message)
+                    self._service.receive(page, message)
                 except MotorbusError as error:
-                    page.put(failed("message", error))
+                    page.put(failed(name, error))
                 except (msgspec.MsgspecError, UnicodeError) as error:
-                    page.put(Failed("message", f"the message is not valid: {error}"))
+                    page.put(Failed(name, f"the message is not valid: {error}"))
 
 
 async def _send(connection: WebSocket, page: Page) -> None:

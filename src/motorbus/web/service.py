@@ -200,7 +200,6 @@ class Service:
                 self._set_target(name, value)
             case messages.JogStart(name, velocity, stops):
                 self._check_stops(stops)
-                self._released = False
                 self._start(page, f"jog {name}", lambda: self._jog(name, velocity))
             case messages.JogEnd() | messages.Finish():
                 self._released = True
@@ -211,22 +210,21 @@ class Service:
                     raise RequestError("faults can be injected in `motorbus web --demo` only")
                 page.put(Done("inject", self.demo.inject(bus, order)))
             case messages.Verify(bus):
-                self._released = False
-                self._face = face = PageFace(page.put, lambda: self._released)
+                face = PageFace(page.put, lambda: self._released)
                 self._start(page, "verify", lambda: verify_axes(self.robot, bus, face))
+                self._face = face
             case messages.Answer(text):
                 self._face.answers.put(text)
             case commands.Torque(False) | commands.ClearFault() | commands.Reset():
                 self._run(page, message)
             case commands.Teach():
-                self._released = False
                 options = structs.asdict(message) | {"file": self._recording(message.file)}
                 self._start(page, "teach", lambda: self._teach(**options))
             case commands.Replay():
                 command = structs.replace(message, file=self._recording(message.file))
                 self._start(page, "replay", lambda: self.robot.execute(command))
             case _:
-                self._start(page, _tag(message), lambda: self.robot.execute(message))  # type: ignore[arg-type]
+                self._start(page, tag_of(message), lambda: self.robot.execute(message))  # type: ignore[arg-type]
 
     def _check_stops(self, stops: int) -> None:
         if stops != self.stops:
@@ -261,7 +259,7 @@ class Service:
         if page is not None:
             self.broadcast(Notice("emergency stop" if isinstance(command, commands.EStop) else "stop"))
         for _ in range(STOP_TRIES):
-            self._report(page, _tag(command), lambda: self.robot.execute(command))
+            self._report(page, tag_of(command), lambda: self.robot.execute(command))
             if self._idle.wait(STOP_WAIT):
                 return
 
@@ -269,37 +267,39 @@ class Service:
 
     def _run(self, page: Page, command: Any) -> None:
         """Carry out a command beside what runs."""
-        self._pool.submit(self._report, page, _tag(command), lambda: self.robot.execute(command))
+        self._pool.submit(self._report, page, tag_of(command), lambda: self.robot.execute(command))
 
     def _start(self, page: Page, name: str, job: Callable[[], Any]) -> None:
         """Carry out a command after the sliders. Raises Refused while another one runs."""
         with self._lock:
-            if self._next is not None or self.activity not in ("", FOLLOWING):
-                raise Refused(f"{self.activity or name} is running", advice="wait for its end, or stop it")
+            self._check_free()
             self._next = page, name, job
+            self._released = False
             self._idle.clear()
         self._wake.set()
 
+    def _check_free(self) -> None:
+        running = self._next[1] if self._next is not None else self.activity
+        if running not in ("", FOLLOWING):
+            raise Refused(f"{running} is running", advice="wait for its end, or stop it")
+
     def _set_target(self, name: str, value: float) -> None:
         with self._lock:
-            if self._next is not None or self.activity not in ("", FOLLOWING):
-                raise Refused(f"{self.activity} is running", advice="wait for its end, or stop it")
+            self._check_free()
             self._targets[name] = value
             self._idle.clear()
         self._wake.set()
 
     def _report(self, page: Page | None, name: str, job: Callable[[], Any]) -> None:
-        """Run a job; the page gets its result, every page its error."""
+        """Run a job; the page, without one every page, gets its result or error."""
+        tell = self.broadcast if page is None else page.put
         try:
-            result = job()
+            tell(Done(name, job()))
         except MotorbusError as error:
-            self.broadcast(failed(name, error))
+            tell(failed(name, error))
         except Exception as error:
             LOG.exception("%s", name)
-            self.broadcast(Failed(name, f"{name}: {error}"))
-        else:
-            if page is not None:
-                page.put(Done(name, result))
+            tell(Failed(name, f"{name}: {error}"))
 
     def _work(self) -> None:
         while not self._closed.is_set():
@@ -423,7 +423,8 @@ def failed(name: str, error: MotorbusError) -> Failed:
     return Failed(name, error.summary, error.expected, error.cause, advice, notes)
 
 
-def _tag(command: Any) -> str:
+def tag_of(command: Any) -> str:
+    """The name of a message."""
     return str(command.__struct_config__.tag)
 
 
