@@ -32,7 +32,7 @@ test soak bench: export PYTHONDONTWRITEBYTECODE =
 assets: src/motorbus/web/static/vendor/.ready
 
 src/motorbus/web/static/vendor/.ready: scripts/assets.py
-	$(PYTHON) scripts/assets.py && touch $@
+	@$(PYTHON) scripts/assets.py && touch $@ || true
 
 browser: $(READY)
 	$(BIN)/python scripts/browser.py

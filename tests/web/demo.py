@@ -19,7 +19,6 @@ from websockets.typing import Origin
 
 from motorbus import Robot
 from motorbus.motion.machine import MachineConfig
-from motorbus.web import service as services
 from motorbus.web.app import Server
 from motorbus.web.demo import SimulatedMachine, simulated
 from motorbus.web.service import Page, Service
@@ -144,6 +143,3 @@ def wait_for(condition: Callable[[], bool], seconds: float = 8.0) -> None:
     while not condition():
         assert time.monotonic() < end
         time.sleep(0.01)
-
-
-__all__ = ["Client", "Recorder", "Served", "serve", "services", "wait_for"]

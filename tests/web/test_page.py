@@ -11,10 +11,12 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
+from motorbus.web import service as services
 from motorbus.web.app import LIBRARIES, STATIC
-from tests.web.demo import Served, serve, services, wait_for
+from tests.web.demo import Served, serve, wait_for
 
 NOT_INSTALLABLE = Path(__file__).parents[2] / "build/no-browser"
+CONSOLE: list[str] = []  # of the pages of the present test
 expect.set_options(timeout=10_000)
 
 
@@ -38,11 +40,18 @@ def served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
         yield one
 
 
+@pytest.fixture(autouse=True)
+def no_console_output() -> Iterator[None]:
+    CONSOLE.clear()
+    yield
+    assert CONSOLE == []
+
+
 def show(browser: Browser, served: Served, width: int = 1366) -> Page:
     """Open the page; anything on its console fails the test."""
     page = browser.new_page(viewport={"width": width, "height": 850})
-    page.on("console", lambda message: pytest.fail(f"console: {message.text}"))
-    page.on("pageerror", lambda error: pytest.fail(f"page: {error}"))
+    page.on("console", lambda message: CONSOLE.append(message.text))
+    page.on("pageerror", lambda error: CONSOLE.append(str(error)))
     page.goto(served.server.url)
     expect(page.get_by_test_id("link")).to_have_text("live")
     return page
@@ -114,9 +123,14 @@ def test_a_closed_tab_stops_the_machine(page: Page, served: Served) -> None:
 def test_a_second_tab_watches_and_takes_over(browser: Browser, page: Page, served: Served) -> None:
     other = show(browser, served)
     expect(other.get_by_role("button", name="Pose reach")).to_be_disabled()
+    page.get_by_label("speed").fill("0.2")
+    page.get_by_role("button", name="Pose reach").click()
+    wait_for(lambda: served.position("base") > 0.05)
     other.get_by_role("button", name="Take over").click()
     expect(other.get_by_role("button", name="Pose reach")).to_be_enabled()
     expect(page.get_by_role("button", name="Pose reach")).to_be_disabled()
+    expect(other.get_by_test_id("activity")).to_be_hidden()
+    assert served.position("base") < 1.15
     other.close()
 
 

@@ -21,8 +21,9 @@ from motorbus.cli import main
 from motorbus.errors import MotorbusError
 from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.commands import EStop, Stop
+from motorbus.web import service as services
 from motorbus.web.messages import DECODER, Failed, Message, Take
-from tests.web.demo import Client, Recorder, Served, serve, services, wait_for
+from tests.web.demo import Client, Recorder, Served, serve, wait_for
 
 READS: Final = (0x01, 0x02, 0x82)  # FEETECH: ping, read, sync read
 
@@ -313,18 +314,6 @@ def test_the_machine_holds_without_heartbeats(client: Client) -> None:
     client.wait(lambda page: page.messages[-1] == {"type": "control", "holder": "you"})
 
 
-def test_a_second_page_takes_the_control_over(served: Served, client: Client) -> None:
-    slide(client, 2.0)
-    client.wait(lambda page: page.axis("base")["position"] > 0.1)
-    with Client(served) as other:
-        other.wait(lambda page: page.got("control", holder="other"))
-        other.send(type="take", force=True)
-        other.wait(lambda page: page.got("control", holder="you"))
-        client.wait(lambda page: page.got("control", holder="other"))
-        other.wait(lambda page: not page.frame.get("activity", "x"))
-        assert served.position("base") < 1.8
-
-
 def test_closed_pages_end_with_a_graceful_stop(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(services, "GRACE", 0.6)
     with Client(served) as page:
@@ -356,16 +345,6 @@ def test_a_recording_is_taught_and_replayed(served: Served, client: Client) -> N
     assert json.loads(ask(served, "/recordings", served.headers())[2]) == ["wave"]
     client.send(type="replay", file="wave")
     client.wait(lambda page: page.got("done", of="replay"))
-
-
-def test_a_register_is_written_and_read_back(served: Served, client: Client) -> None:
-    client.send(type="write_registers", name="base", values={"torque_limit": 0.5})
-    client.wait(lambda page: page.got("done", of="write_registers"))
-    table = json.loads(ask(served, "/registers/base", served.headers())[2])
-    found = next(row for row in table["rows"] if row["name"] == "torque_limit")
-    assert found["value"] == 0.5
-    assert found["storage"] == "RAM"
-    assert found["source"]
 
 
 def test_an_injected_fault_is_seen(client: Client) -> None:
