@@ -1,5 +1,5 @@
 // Registers of the device of an axis: search, favourites, unit, range, choices, source; a write is confirmed and read back.
-import { html, store, stored, useEffect, useRef, useState } from "./lib.js";
+import { html, store, stored, useEffect, useState } from "./lib.js";
 import { ask, link, say, useLink } from "./link.js";
 
 function digits(value) {
@@ -19,11 +19,9 @@ function range(row) {
   return `${digits(row.low)} to ${digits(row.high)}${row.unit ? ` ${row.unit}` : ""}`;
 }
 
-/** The question before a write, and the write itself. */
+/** The question before a write, and the write itself; not modal, so that the stop can be pressed. */
 function Confirm({ axis, row, value, close, done }) {
-  const dialog = useRef(null);
   const [problem, setProblem] = useState("");
-  useEffect(() => dialog.current.showModal(), []);
   const write = async () => {
     try {
       await ask({ type: "write_registers", name: axis, values: { [row.name]: value } });
@@ -36,15 +34,15 @@ function Confirm({ axis, row, value, close, done }) {
       setProblem(error.text);
     }
   };
-  return html`<dialog ref=${dialog} onClose=${close}>
+  return html`<div class="question" role="dialog" aria-label="confirm the write">
     <h2>Write ${row.name} of ${axis}?</h2>
     <p>${words(row, row.value)} → <b>${words(row, value)}</b></p>
     ${row.storage === "EEPROM" && html`<p>It is kept without power (EEPROM).</p>`}
     ${row.effect !== "none" && html`<p class="bad">Effect of this write: ${row.effect}.</p>`}
     ${problem && html`<p class="bad">${problem}</p>`}
     <div class="row"><button class="primary" onClick=${write}>Write</button>
-      <button onClick=${() => dialog.current.close()}>Cancel</button></div>
-  </dialog>`;
+      <button onClick=${close}>Cancel</button></div>
+  </div>`;
 }
 
 function Editor({ axis, row, done, locked }) {
