@@ -8,10 +8,12 @@ PEERS := .peers/.ready
 SOURCES := src tests bench examples scripts
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check soak bench docs lint types contracts interpreters lerobot lock clean
+.PHONY: help demo assets browser test check soak bench docs lint types contracts interpreters lerobot lock clean
 
 help:
 	@echo "make demo    nine simulated axes of three families move together; picture in build/demo.png"
+	@echo "make assets  the libraries of the page (preact, htm, uPlot), by npm"
+	@echo "make browser Chromium for the tests of the page"
 	@echo "make test    every test but the long ones"
 	@echo "make check   lint, types, contracts, strict docs, a few tests on other Pythons, LeRobot with the plugin"
 	@echo "make soak    the long runs; their figures are printed"
@@ -27,7 +29,15 @@ demo: $(READY)
 # Tests start hundreds of processes; each would compile the whole package again where a shell forbids to keep that.
 test soak bench: export PYTHONDONTWRITEBYTECODE =
 
-test: $(READY) $(PEERS)
+assets: src/motorbus/web/static/vendor/.ready
+
+src/motorbus/web/static/vendor/.ready: scripts/assets.py
+	@$(PYTHON) scripts/assets.py && touch $@ || true
+
+browser: $(READY)
+	$(BIN)/python scripts/browser.py
+
+test: $(READY) $(PEERS) assets browser
 	$(BIN)/python -m pytest -n auto --dist worksteal $(ARGS)
 
 soak: $(READY) $(PEERS)

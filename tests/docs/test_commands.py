@@ -58,7 +58,7 @@ def shell(folder: Path, capsys: pytest.CaptureFixture[str]) -> Shell:
 
     def run(line: str) -> Ran:
         words = shlex.split(line)[1:]
-        if words[0] == "simulate":
+        if words[0] in ("simulate", "web"):
             return interrupted(words)
         capsys.readouterr()
         ran = Ran(main(words), *capsys.readouterr())
@@ -109,6 +109,8 @@ def finite(line: str) -> str:
     """The same line with an end: fewer ids, one sample."""
     line = re.sub(r"--for \d+s", "--for 1s", line).replace("--rates all", "--rates all --ids 1,0x25")
     line = line.replace("--port /", "--port feetech:/")
+    if line.startswith("motorbus web"):
+        line = re.sub(r"--port \d+", "", line) + " --port 0"
     if line.startswith("motorbus monitor") and not re.search("--(count|for)", line):
         line += " --count 1" if "--listen" not in line else " --for 1s"
     return line

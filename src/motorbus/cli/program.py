@@ -47,6 +47,9 @@ COMMANDS: Final[Mapping[str, Mapping[str, tuple[str, str]]]] = {
         "doctor": ("doctor", "Find out why it does not work; writes nothing."),
         "setup": ("motorbus.cli.setup:app", "Set up an arm step by step."),
     },
+    "Watch": {
+        "web": ("web", "Serve a page on which a machine is watched, moved and tuned."),
+    },
     "Read and write": {
         "read": ("registers", "Read registers, or the state of a device."),
         "write": ("registers", "Write registers."),

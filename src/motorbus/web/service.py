@@ -1,0 +1,433 @@
+"""The machine behind the page: one robot, the lease of the page that moves it, one thread that runs its commands.
+
+A stop runs in a thread of its own, needs no lease, and is repeated until the command that ran has ended.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, suppress
+from math import isfinite
+from pathlib import Path
+from re import fullmatch
+from threading import Event, Lock, Thread
+from time import monotonic
+from typing import Any, Final, Protocol, Self
+
+import msgspec
+from msgspec import Struct, structs
+
+from motorbus.errors import Interrupted, MotorbusError, Refused, RequestError
+from motorbus.motion import commands
+from motorbus.motion.loop import ControlLoop
+from motorbus.motion.moves import Running, StopsIfInterrupted
+from motorbus.motion.robot import Robot
+from motorbus.web import messages
+from motorbus.web.guide import PageFace, verify_axes
+from motorbus.web.messages import Control, Done, Failed, Frame, Message, Notice
+
+LOG: Final = logging.getLogger("motorbus.web")
+LEASE: Final = 0.5  # s without a heartbeat after which the machine stops
+GRACE: Final = 5.0  # s without any page after which the machine is shut down gracefully
+FRAMES: Final = 50.0  # Hz
+SILENT: Final = 1.0  # s without a position; such an axis is left out of the loop of the sliders
+QUIET: Final = 1.0  # s at rest without a new target after which the loop of the sliders ends
+STOP_TRIES: Final = 10
+STOP_WAIT: Final = 0.2  # s until a stop is repeated
+LONGEST_JOG: Final = 10.0  # s of a jog that the device times itself
+FOLLOWING: Final = "follow"  # activity while sliders lead axes
+PARKING: Final = "shutdown"
+
+
+class Demo(Protocol):
+    """What carries out `Inject`."""
+
+    def inject(self, bus: str, order: str) -> dict[str, Any]:
+        """Carry out an order to a simulated bus; gives its reply."""
+
+
+class Page:
+    """One connected page and what it has yet to be sent. Of states it gets the last one only. From any thread."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self._loop = loop
+        self._events: deque[bytes] = deque(maxlen=100)
+        self._frame: bytes | None = None
+        self._changed = asyncio.Event()
+
+    def put(self, message: Struct) -> None:
+        """Send a message."""
+        self._events.append(msgspec.json.encode(message, enc_hook=_plain))
+        self._wake()
+
+    def show(self, frame: bytes) -> None:
+        """Send this state, unless a later one comes first."""
+        self._frame = frame
+        self._wake()
+
+    def _wake(self) -> None:
+        with suppress(RuntimeError):  # the server has ended
+            self._loop.call_soon_threadsafe(self._changed.set)
+
+    async def next(self) -> list[bytes]:
+        """What is to be sent; waits until there is something."""
+        await self._changed.wait()
+        self._changed.clear()
+        texts = [self._events.popleft() for _ in range(len(self._events))]
+        if self._frame is not None:
+            texts.append(self._frame)
+            self._frame = None
+        return texts
+
+
+class Service:
+    """Carries out the messages of pages, and sends them the states of the robot. Use it in a `with`.
+
+    `folder` has the recordings. Its end stops what moves; the robot stays open.
+    """
+
+    def __init__(self, robot: Robot, folder: Path, demo: Demo | None = None) -> None:
+        self.robot: Final = robot
+        self.folder: Final = folder
+        self.demo: Final = demo
+        self.activity = ""
+        self.stops = 0
+        self._pages: list[Page] = []
+        self._holder: Page | None = None
+        self._left_at = monotonic()
+        self._targets: dict[str, float] = {}
+        self._next: tuple[Page, str, Callable[[], Any]] | None = None
+        self._released = False  # the jog button, the recording, the set-up
+        self._face = PageFace(lambda step: None, lambda: self._released)
+        self._lock = Lock()  # of the fields above
+        self._wake = Event()
+        self._idle = Event()
+        self._idle.set()
+        self._closed = Event()
+        self._stack = ExitStack()
+        self._pool = ThreadPoolExecutor(4, "motorbus web")
+
+    def __enter__(self) -> Self:
+        self.lease = self._stack.enter_context(self.robot.attended(LEASE))
+        self._states = self.robot.subscribe(rate=FRAMES, depth=1)
+        self._threads = [
+            Thread(target=self._work, name="motorbus web motion", daemon=True),
+            Thread(target=self._send_states, name="motorbus web states", daemon=True),
+        ]
+        for thread in self._threads:
+            thread.start()
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self._closed.set()
+        self._wake.set()
+        self._stop(None, commands.Stop())
+        for thread in self._threads:
+            thread.join()
+        self._pool.shutdown()
+        self.robot.unsubscribe(self._states)
+        with suppress(Refused):  # the lease is lost without a page
+            self._stack.close()
+
+    # -- pages -----------------------------------------------------------------------------------------------------
+
+    def join(self, page: Page) -> None:
+        """A page was opened; it may move the machine if no other one does."""
+        self._pages.append(page)
+        self._take(page, force=False)
+
+    def leave(self, page: Page) -> None:
+        """A page was closed. If it moved the machine, its lease runs out."""
+        self._pages.remove(page)
+        self._left_at = monotonic()
+        if page is self._holder:
+            self._give(None)
+
+    def broadcast(self, message: Struct) -> None:
+        """Send a message to every page."""
+        for page in tuple(self._pages):
+            page.put(message)
+
+    def _take(self, page: Page, *, force: bool) -> None:
+        if self._holder is not None and page is not self._holder:
+            if not force:
+                page.put(Control("other"))
+                return
+            self._stop(None, commands.Stop())
+        self.lease.reset()
+        self._give(page)
+
+    def _give(self, page: Page | None) -> None:
+        self._holder = page
+        for one in tuple(self._pages):
+            one.put(Control("you" if one is page else "none" if page is None else "other"))
+
+    def _check_holder(self, page: Page) -> None:
+        if page is not self._holder or self.lease.lost:
+            raise Refused("this page does not control the machine", advice="press Take control")
+
+    # -- messages --------------------------------------------------------------------------------------------------
+
+    def receive(self, page: Page, message: Message) -> None:
+        """Begin what a message asks for; never waits. Raises MotorbusError for what is refused."""
+        match message:
+            case messages.Heartbeat():
+                if page is self._holder and not self.lease.lost:
+                    self.lease.beat()
+            case commands.Stop() | commands.EStop():
+                self._stop(page, message)
+            case messages.Take(force):
+                self._take(page, force=force)
+            case commands.ReadRegisters():
+                self._run(page, message)
+            case _:
+                self._check_holder(page)
+                self._receive_motion(page, message)
+
+    def _receive_motion(self, page: Page, message: Message) -> None:
+        match message:
+            case messages.Leave():
+                self._stop(None, commands.Stop())
+                self._give(None)
+            case messages.Target(name, value, stops):
+                self._check_stops(stops)
+                if not isfinite(value) or not self.robot.axis(name).follows_setpoints:
+                    raise RequestError(f"{name}: no target {value}", expected="a position that it can follow")
+                self._set_target(name, value)
+            case messages.JogStart(name, velocity, stops):
+                self._check_stops(stops)
+                self._start(page, f"jog {name}", lambda: self._jog(name, velocity))
+            case messages.JogEnd() | messages.Finish():
+                self._released = True
+                if self.activity.startswith("jog ") and not self._leads(self.activity[4:]):
+                    self._stop(None, commands.Stop((self.activity[4:],)))
+            case messages.Inject(bus, order):
+                if self.demo is None:
+                    raise RequestError("faults can be injected in `motorbus web --demo` only")
+                page.put(Done("inject", self.demo.inject(bus, order)))
+            case messages.Verify(bus):
+                face = PageFace(page.put, lambda: self._released)
+                self._start(page, "verify", lambda: verify_axes(self.robot, bus, face))
+                self._face = face
+            case messages.Answer(text):
+                self._face.answers.put(text)
+            case commands.Torque(False) | commands.ClearFault() | commands.Reset():
+                self._run(page, message)
+            case commands.Teach():
+                options = structs.asdict(message) | {"file": self._recording(message.file)}
+                self._start(page, "teach", lambda: self._teach(**options))
+            case commands.Replay():
+                command = structs.replace(message, file=self._recording(message.file))
+                self._start(page, "replay", lambda: self.robot.execute(command))
+            case _:
+                self._start(page, tag_of(message), lambda: self.robot.execute(message))  # type: ignore[arg-type]
+
+    def _check_stops(self, stops: int) -> None:
+        if stops != self.stops:
+            raise Interrupted("the machine was stopped since", advice="release the control and take it again")
+
+    def _leads(self, name: str) -> bool:
+        return self.robot.axis(name).follows_setpoints
+
+    def _recording(self, name: str) -> str:
+        """The path of a recording. Raises RequestError for more than a plain name."""
+        if not fullmatch(r"[\w-]{1,60}", name):
+            raise RequestError(f"recording {name!r}", expected="a name of letters, digits, _ and -")
+        self.folder.mkdir(exist_ok=True)
+        return str(self.folder / f"{name}.csv")
+
+    def recordings(self) -> list[str]:
+        """The names of all recordings."""
+        return sorted(path.stem for path in self.folder.glob("*.csv"))
+
+    # -- stop ------------------------------------------------------------------------------------------------------
+
+    def _stop(self, page: Page | None, command: commands.Stop | commands.EStop) -> None:
+        """Stop in a thread of its own; commands and targets that wait are dropped."""
+        with self._lock:
+            self.stops += 1
+            self._targets.clear()
+            self._next = None
+            self._released = True
+        Thread(target=self._carry_out_stop, args=(page, command), name="motorbus web stop").start()
+
+    def _carry_out_stop(self, page: Page | None, command: commands.Stop | commands.EStop) -> None:
+        if page is not None:
+            self.broadcast(Notice("emergency stop" if isinstance(command, commands.EStop) else "stop"))
+        for _ in range(STOP_TRIES):
+            self._report(page, tag_of(command), lambda: self.robot.execute(command))
+            if self._idle.wait(STOP_WAIT):
+                return
+
+    # -- commands --------------------------------------------------------------------------------------------------
+
+    def _run(self, page: Page, command: Any) -> None:
+        """Carry out a command beside what runs."""
+        self._pool.submit(self._report, page, tag_of(command), lambda: self.robot.execute(command))
+
+    def _start(self, page: Page, name: str, job: Callable[[], Any]) -> None:
+        """Carry out a command after the sliders. Raises Refused while another one runs."""
+        with self._lock:
+            self._check_free()
+            self._next = page, name, job
+            self._released = False
+            self._idle.clear()
+        self._wake.set()
+
+    def _check_free(self) -> None:
+        running = self._next[1] if self._next is not None else self.activity
+        if running not in ("", FOLLOWING):
+            raise Refused(f"{running} is running", advice="wait for its end, or stop it")
+
+    def _set_target(self, name: str, value: float) -> None:
+        with self._lock:
+            self._check_free()
+            self._targets[name] = value
+            self._idle.clear()
+        self._wake.set()
+
+    def _report(self, page: Page | None, name: str, job: Callable[[], Any]) -> None:
+        """Run a job; the page, without one every page, gets its result or error."""
+        tell = self.broadcast if page is None else page.put
+        try:
+            tell(Done(name, job()))
+        except MotorbusError as error:
+            tell(failed(name, error))
+        except Exception as error:
+            LOG.exception("%s", name)
+            tell(Failed(name, f"{name}: {error}"))
+
+    def _work(self) -> None:
+        while not self._closed.is_set():
+            self._wake.wait(0.1)
+            self._wake.clear()
+            with self._lock:
+                job, self._next = self._next, None
+                if job is not None:
+                    self.activity = job[1]
+                elif self._targets:
+                    job, self.activity = (None, FOLLOWING, self._follow), FOLLOWING  # type: ignore[assignment]
+                elif self._is_abandoned():
+                    job, self.activity = (None, PARKING, self._park), PARKING  # type: ignore[assignment]
+            if job is not None:
+                self._report(*job)
+            with self._lock:
+                self.activity = ""
+                if self._next is None and not self._targets:
+                    self._idle.set()
+
+    def _jog(self, name: str, velocity: float) -> Any:
+        if self._released:
+            return None
+        if self._leads(name):
+            return self.robot.jog(name, velocity, until=lambda: self._released)
+        axis = self.robot.axis(name)
+        here, (low, high) = axis.status.known_position, axis.range
+        seconds = LONGEST_JOG
+        if here is not None and velocity:
+            seconds = min(seconds, ((high if velocity > 0 else low) - here) / velocity)
+        return self.robot.jog(name, velocity, seconds)
+
+    def _teach(self, file: str, seconds: float, names: Any, rate: float, keep_torque: bool) -> Any:
+        path = Path(file)
+        if path.exists():
+            raise RequestError(f"{path.stem} exists", advice="choose another name")
+        made = self.robot.teach(
+            names, seconds=seconds, until=lambda: self._released, rate=rate, keep_torque=keep_torque
+        )
+        path.write_text(made.text(self.robot.config.axes))
+        return {"name": path.stem, "duration": made.duration, "notes": made.notes}
+
+    # -- sliders ---------------------------------------------------------------------------------------------------
+
+    def _follow(self) -> None:
+        """Lead axes to the targets of the sliders until they rest, another axis is wanted, or a command waits."""
+        now = self.robot.now()
+        with self._lock:
+            wanted = set(self._targets)
+        for name, axis in self.robot.axes.items():
+            if axis.follows_setpoints and now - axis.status.at < SILENT and not axis.status.fault:
+                wanted.add(name)
+        quiet_since = now
+
+        def feed(loop: ControlLoop) -> bool:
+            nonlocal quiet_since
+            with self._lock:
+                given = [name for name in self._targets if name in loop.axes]
+                for name in given:
+                    loop.set_target(name, self._targets.pop(name))
+                if self._targets or self._next is not None or self._closed.is_set():
+                    return False
+            led = [axis for axis in loop.axes.values() if axis.owner is not None]
+            rests = all(not one.sent if one.config.is_wheel else one.generator.arrived for one in led)
+            if given or not rests:
+                quiet_since = self.robot.now()
+            return self.robot.now() - quiet_since < QUIET
+
+        try:
+            self.robot.carry_out(_lead(self.robot, sorted(wanted), feed))
+        except BaseException:
+            with self._lock:
+                self._targets.clear()  # none of them is followed later
+            raise
+
+    # -- end of the pages ------------------------------------------------------------------------------------------
+
+    def _is_abandoned(self) -> bool:
+        """No page is left, the lease is lost, and an axis has torque."""
+        return (
+            not self._pages
+            and self.lease.lost
+            and monotonic() - self._left_at > GRACE
+            and any(axis.status.engaged for axis in self.robot.axes.values())
+        )
+
+    def _park(self) -> None:
+        """Graceful stop; for its time the machine needs no lease."""
+        self.robot.lease = None
+        try:
+            self.robot.shutdown()
+        finally:
+            self.robot.lease = self.lease
+
+    def _send_states(self) -> None:
+        while not self._closed.is_set():
+            state = self._states.get(0.1)
+            if self._holder is not None and self.lease.lost:
+                self._give(None)
+                self.broadcast(Notice("control lost: the page sent no heartbeat; the machine holds"))
+            if state is None or not self._pages:
+                continue
+            latched = any(bus.latched for bus in self.robot.buses.values())
+            frame = msgspec.json.encode(Frame(state, self.activity, latched, self.stops))
+            for page in tuple(self._pages):
+                page.show(frame)
+
+
+async def _lead(robot: Robot, names: Sequence[str], feed: Callable[[ControlLoop], bool]) -> None:
+    """Program: a loop of these axes while `feed`, which sets its targets, is true; then they brake."""
+    loop = ControlLoop(robot, names, policy="clamp")
+    async with StopsIfInterrupted(loop.members), Running(loop):
+        while feed(loop):
+            await loop.cycle()
+
+
+def failed(name: str, error: MotorbusError) -> Failed:
+    """An error as a message."""
+    notes = tuple(getattr(error, "__notes__", ()))
+    advice = "press Take control" if getattr(error, "reason", "") == "lease" else error.advice
+    return Failed(name, error.summary, error.expected, error.cause, advice, notes)
+
+
+def tag_of(command: Any) -> str:
+    """The name of a message."""
+    return str(command.__struct_config__.tag)
+
+
+def _plain(value: Any) -> Any:
+    """Results that are no Structs as plain data."""
+    return value._asdict() if hasattr(value, "_asdict") else str(value)

@@ -1,0 +1,367 @@
+"""The server of the page: who may ask, what bad messages do, who moves the machine, how it stops."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import random
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final, get_args
+
+import msgspec
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+from motorbus.cli import main
+from motorbus.errors import MotorbusError
+from motorbus.link.base import Delivery, PerfectLine, Side
+from motorbus.motion.commands import EStop, Stop
+from motorbus.web import service as services
+from motorbus.web.messages import DECODER, Failed, Message, Take
+from tests.web.demo import Client, Recorder, Served, serve, wait_for
+
+READS: Final = (0x01, 0x02, 0x82)  # FEETECH: ping, read, sync read
+
+
+@pytest.fixture
+def served(tmp_path: Path) -> Iterator[Served]:
+    with serve(tmp_path) as one:
+        wait_for(lambda: one.robot.snapshot().axes["tilt"].age is not None)
+        yield one
+
+
+@pytest.fixture
+def client(served: Served) -> Iterator[Client]:
+    with Client(served) as one:
+        one.wait(lambda page: page.got("control", holder="you") and bool(page.frame))
+        yield one
+
+
+class Sniffer(PerfectLine):
+    """Keeps the instruction of each FEETECH packet that the host sends."""
+
+    def __init__(self) -> None:
+        self.instructions: set[int] = set()
+
+    def carry(self, sender: Side, data: Any, at: float) -> list[Delivery]:
+        if sender is Side.HOST:
+            self.instructions.add(data[4])
+        return super().carry(sender, data, at)
+
+
+# -- who may ask ---------------------------------------------------------------------------------------------------
+
+ROUTES: Final = {
+    "/": 200,
+    "/describe": 200,
+    "/recordings": 200,
+    "/registers/base": 200,
+    "/registers/none": 404,
+    "/static/app.js": 200,
+    "/static/../app.py": 404,
+    "/none": 404,
+    "/ws": 101,
+}
+REFUSED: Final = [
+    ({"Cookie": ""}, 401),
+    ({"Cookie": "motorbus=x; motorbus-{port}=wrong"}, 401),
+    ({"Cookie": "motorbus-{port}=ä"}, 401),
+    ({"Host": "evil.example:{port}"}, 403),
+    ({"Host": "127.0.0.1"}, 403),
+    ({"Host": "192.168.0.7:{port}"}, 403),
+    ({"Origin": "http://evil.example"}, 403),
+    ({"Origin": "null"}, 403),
+    ({"Origin": "https://127.0.0.1:{port}"}, 403),
+]
+
+
+def ask(served: Served, path: str, headers: dict[str, str], method: str = "GET") -> tuple[int, Any, bytes]:
+    connection = http.client.HTTPConnection("127.0.0.1", served.server.port, timeout=5)
+    connection.putrequest(method, path, skip_host=True)
+    for name, value in headers.items():
+        connection.putheader(name, value.encode())
+    connection.endheaders()
+    answer = connection.getresponse()
+    found = answer.status, answer.headers, answer.read()
+    connection.close()
+    return found
+
+
+def upgrade(served: Served, headers: dict[str, str]) -> int:
+    extra = {name: value for name, value in headers.items() if name == "Cookie"}
+    host = headers["Host"] if ":" in headers["Host"] else f"{headers['Host']}:80"
+    try:
+        with (
+            socket.create_connection(("127.0.0.1", served.server.port)) as connected,
+            connect(
+                f"ws://{host}/ws",
+                sock=connected,
+                origin=headers.get("Origin"),  # type: ignore[arg-type]
+                additional_headers={name: value.encode().decode("latin-1") for name, value in extra.items()},
+            ),
+        ):
+            return 101
+    except InvalidStatus as error:
+        return error.response.status_code
+
+
+def test_each_route_needs_cookie_host_and_origin(served: Served) -> None:
+    line = Sniffer()
+    served.faults._buses["arm"].line = line
+    for path, expected in ROUTES.items():
+        if path == "/ws":
+            assert upgrade(served, served.headers()) == expected
+        else:
+            assert ask(served, path, served.headers())[0] == expected, path
+            assert ask(served, path, served.headers(Origin=""))[0] == expected, path
+        for changes, status in REFUSED:
+            filled = {
+                name: value.replace("{port}", str(served.server.port)) for name, value in changes.items()
+            }
+            headers = served.headers(**filled)
+            if path == "/ws":
+                assert upgrade(served, headers) == 403, changes
+            else:
+                assert ask(served, path, headers)[0] == status, (path, changes)
+    assert upgrade(served, served.headers(Origin="")) == 403  # a socket needs an Origin
+    for method in ("POST", "PUT", "DELETE"):
+        assert ask(served, "/describe", served.headers(), method)[0] == 405
+    assert line.instructions <= set(READS)
+
+
+def test_the_token_of_the_address_becomes_a_cookie(served: Served) -> None:
+    host = served.headers()["Host"]
+    path = "/?" + served.server.url.partition("?")[2]
+    status, headers, _ = ask(served, path, {"Host": host})
+    assert status == 303
+    assert headers["Location"] == "/"
+    assert {"HttpOnly", "SameSite=strict"} <= set(headers["Set-Cookie"].split("; "))
+    assert ask(served, "/?token=wrong", {"Host": host})[0] == 401
+    assert ask(served, path.replace("/?", "/describe?"), {"Host": host})[0] == 401
+    _, headers, _ = ask(served, "/", served.headers())
+    policy = headers["Content-Security-Policy"]
+    assert "script-src 'self';" in policy
+    assert "unsafe" not in policy
+
+
+@pytest.mark.parametrize("words", [[], ["--token", "short"]])
+def test_another_address_needs_a_token(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["web", "--demo", "--host", "0.0.0.0", *words]) == 2
+    assert "--host needs --token" in capsys.readouterr().err
+
+
+# -- messages ------------------------------------------------------------------------------------------------------
+
+MALFORMED: Final = [
+    "",
+    "{",
+    "[]",
+    "null",
+    '{"type":"none"}',
+    '{"type":"move"}',
+    '{"type":"move","goals":{"base":"far"}}',
+    '{"type":"target","name":"base","value":NaN,"stops":0}',
+    '{"type":"target","name":"base","value":1e999,"stops":0}',
+    '{"type":"target","name":"nobody","value":0,"stops":0}',
+    '{"type":"device_command","name":"base","function":"reset"}',
+    '{"type":"follow","pairs":{"base":"shoulder"},"seconds":1}',
+    '{"type":"teach","file":"../../etc/x","seconds":1}',
+    '{"type":"replay","file":"/etc/passwd"}',
+    '{"type":"replay","file":"a.csv"}',
+    '{"type":"inject","bus":"none","order":"status"}',
+    '{"type":"inject","bus":"arm","order":"unplug"}',
+    "[" * 20_000,
+    "é\u0000",
+]
+
+
+def test_a_malformed_message_is_answered(client: Client) -> None:
+    for text in MALFORMED:
+        client.messages.clear()
+        client.socket.send(text)
+        client.wait(lambda page: page.got("failed"))
+    client.messages.clear()
+    client.socket.send(b"\xff\xfe")
+    client.wait(lambda page: page.got("failed"))
+    assert all(not one["torque"] for one in client.frame["state"]["axes"].values())
+
+
+@pytest.mark.parametrize(("data", "code"), [("x" * 70_000, 1009), ("flood", 1008)])
+def test_too_much_closes_the_connection(served: Served, data: str, code: int) -> None:
+    with Client(served) as page:
+        with suppress(ConnectionClosed):
+            for _ in range(1 if len(data) > 10 else 2_000):
+                page.socket.send(data)
+        with pytest.raises(ConnectionClosed) as closed:
+            page.wait(lambda _: False)
+    assert closed.value.rcvd is not None
+    assert closed.value.rcvd.code == code
+    with Client(served) as page:  # the server lives
+        page.wait(lambda one: bool(one.frame))
+
+
+TAGS: Final = [kind.__struct_config__.tag for kind in get_args(Message) if kind not in (Stop, EStop, Take)]
+FIELDS: Final = sorted({field for kind in get_args(Message) for field in kind.__struct_fields__} - {"force"})
+
+
+def _random_message(chance: random.Random) -> bytes:
+    words = ["base", "slide", "", "é", "../x", 0, -1, 1e300, 0.5, True, None, [], {}, ["base"], {"base": 1.0}]
+    message = {field: chance.choice(words) for field in chance.sample(FIELDS, chance.randrange(8))}
+    text = json.dumps(message | {"type": chance.choice(TAGS)}).encode()
+    if chance.random() < 0.2:
+        text = bytes(chance.randrange(256) if chance.random() < 0.05 else byte for byte in text)
+    return text
+
+
+def test_random_messages_of_a_page_without_control_send_nothing(served: Served) -> None:
+    chance = random.Random(43)
+    line = Sniffer()
+    served.faults._buses["arm"].line = line
+    page, holder = Recorder(), Recorder()
+    served.service.join(holder)
+    served.service.join(page)
+    for _ in range(10_000):
+        try:
+            served.service.receive(page, DECODER.decode(_random_message(chance)))
+        except (MotorbusError, msgspec.MsgspecError, UnicodeError):
+            continue
+    time.sleep(0.2)
+    assert line.instructions <= set(READS)
+    assert not any(isinstance(one, Failed) and "NoneType" in one.text for one in page.got)
+    served.service.leave(page)
+
+
+# -- who moves the machine -----------------------------------------------------------------------------------------
+
+
+def slide(client: Client, value: float) -> None:
+    """Move the slider of the base."""
+    client.send(type="target", name="base", value=value, stops=client.frame["stops"])
+
+
+def test_a_slider_moves_and_clamps(client: Client) -> None:
+    slide(client, 0.4)
+    client.wait(lambda page: abs(page.axis("base")["position"] - 0.4) < 0.02)
+    slide(client, 9.0)
+    client.wait(lambda page: abs((page.axis("base")["target"] or 0) - 2.618) < 0.01)
+    client.wait(lambda page: abs(page.axis("base")["position"] - 2.618) < 0.05)
+
+
+def test_a_stop_ends_the_slider_until_it_is_taken_again(client: Client) -> None:
+    slide(client, 2.0)
+    client.wait(lambda page: page.axis("base")["position"] > 0.1)
+    known = client.frame["stops"]
+    client.send(type="stop")
+    client.wait(lambda page: page.frame["stops"] > known and not page.frame["activity"])
+    at = client.axis("base")["position"]
+    client.send(type="target", name="base", value=2.0, stops=known)
+    client.wait(lambda page: page.got("failed", text="the machine was stopped since"))
+    time.sleep(0.3)
+    client.wait(lambda page: page.axis("base")["age"] < 0.2)
+    assert abs(client.axis("base")["position"] - at) < 0.05
+    assert client.axis("base")["torque"]
+
+
+@pytest.mark.parametrize("kind", ["stop", "estop"])
+def test_a_page_without_control_stops_a_move(served: Served, client: Client, kind: str) -> None:
+    with Client(served) as watcher:
+        watcher.wait(lambda page: page.got("control", holder="other"))
+        client.send(type="pose", name="reach", speed=0.3)
+        client.wait(lambda page: page.axis("base")["position"] > 0.05)
+        watcher.send(type="move", goals={"base": 0.0})
+        watcher.wait(lambda page: page.got("failed"))
+        watcher.send(type=kind)
+        client.wait(lambda page: page.got("failed", of="pose"))
+        client.wait(lambda page: page.frame["latched"] is (kind == "estop"))
+    assert client.axis("base")["position"] < 1.0
+
+
+def test_a_stop_reaches_the_machine_while_the_server_is_busy(served: Served) -> None:
+    page = Recorder()
+    served.service.join(page)
+    served.service.receive(page, DECODER.decode(b'{"type":"pose","name":"reach","speed":0.3}'))
+    wait_for(lambda: _beat(served) and served.position("base") > 0.05)
+    for _ in range(8):  # every thread for commands is in use
+        served.service._pool.submit(time.sleep, 1.0)
+    begun = time.monotonic()
+    served.service.receive(page, Stop())
+    wait_for(lambda: _beat(served) and not served.service.activity)
+    assert time.monotonic() - begun < 0.8
+    assert served.position("base") < 1.0
+
+
+def _beat(served: Served) -> bool:
+    served.service.lease.reset()
+    return True
+
+
+def test_the_machine_holds_without_heartbeats(client: Client) -> None:
+    slide(client, 2.0)
+    client.wait(lambda page: page.axis("base")["position"] > 0.1)
+    client.silent.set()
+    client.wait(lambda page: page.got("control", holder="none"))
+    at = client.axis("base")["position"]
+    client.wait(lambda page: not page.frame["activity"])
+    assert at < 1.8
+    slide(client, 2.0)
+    client.wait(lambda page: page.got("failed", text="this page does not control the machine"))
+    client.send(type="take")
+    client.wait(lambda page: page.messages[-1] == {"type": "control", "holder": "you"})
+
+
+def test_closed_pages_end_with_a_graceful_stop(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(services, "GRACE", 0.6)
+    with Client(served) as page:
+        page.wait(lambda one: bool(one.frame) and one.got("control", holder="you"))
+        page.send(type="target", name="base", value=2.6, stops=0)
+        page.wait(lambda one: one.axis("base")["position"] > 0.1)
+    wait_for(lambda: not served.robot.snapshot().axes["base"].torque)
+    assert served.position("base") < 2.3
+
+
+def test_a_held_button_jogs_and_a_released_one_stops(served: Served, client: Client) -> None:
+    for name, velocity in (("pan", 0.5), ("slide", 0.01)):
+        before = served.position(name)
+        client.send(type="jog_start", name=name, velocity=velocity, stops=client.frame["stops"])
+        client.wait(lambda page, name=name: page.frame["activity"] == f"jog {name}")  # type: ignore[misc]
+        time.sleep(0.2)
+        client.send(type="jog_end")
+        client.wait(lambda page: not page.frame["activity"])
+        after = served.robot.snapshot().axes[name].position
+        assert after is None or before <= after < before + 0.4  # a stepper does not know how far it came
+
+
+def test_a_recording_is_taught_and_replayed(served: Served, client: Client) -> None:
+    client.send(type="teach", file="wave", seconds=20, names=["base"])
+    client.wait(lambda page: page.frame["activity"] == "teach")
+    time.sleep(0.5)
+    client.send(type="finish")
+    client.wait(lambda page: page.got("done", of="teach"))
+    assert json.loads(ask(served, "/recordings", served.headers())[2]) == ["wave"]
+    client.send(type="replay", file="wave")
+    client.wait(lambda page: page.got("done", of="replay"))
+
+
+def test_an_injected_fault_is_seen(client: Client) -> None:
+    client.send(type="inject", bus="arm", order="unplug 1")
+    client.wait(lambda page: page.axis("base")["age"] > 1.0)
+    slide_other = {"type": "target", "name": "shoulder", "value": 0.2, "stops": client.frame["stops"]}
+    client.send(**slide_other)  # the others still move
+    client.wait(lambda page: abs(page.axis("shoulder")["position"] - 0.2) < 0.02)
+
+
+def test_a_slow_page_delays_no_other(served: Served, client: Client) -> None:
+    with Client(served):  # reads nothing
+        slide(client, 1.0)
+        numbers = []
+        end = time.monotonic() + 1.5
+        while time.monotonic() < end:
+            client.wait(lambda page: page.frame["state"]["number"] not in numbers)
+            numbers.append(client.frame["state"]["number"])
+            slide(client, 1.0 + 0.1 * (len(numbers) % 2))
+    assert len(numbers) > 30
