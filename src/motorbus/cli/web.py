@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from msgspec import Struct
 
 from motorbus.cli.common import Common
-from motorbus.cli.output import emit, note, note_once
+from motorbus.cli.output import emit, note
 from motorbus.errors import RequestError
 
 LOOPBACK: Final = ("", "127.0.0.1", "localhost")
@@ -69,7 +69,7 @@ def web(
         if demo:
             robot.set_position("slide", 0.0)
         if any(bus.simulated for bus in robot.buses.values()) and not common.json:
-            note_once("simulated")
+            note("simulated", once=True)
         for text in robot.warnings:
             note(f"note: {text}")
         stack.callback(robot.shutdown)

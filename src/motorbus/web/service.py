@@ -24,7 +24,7 @@ from msgspec import Struct, structs
 from motorbus.errors import Interrupted, MotorbusError, Refused, RequestError
 from motorbus.motion import commands
 from motorbus.motion.loop import ControlLoop
-from motorbus.motion.moves import Running, StopsIfInterrupted
+from motorbus.motion.moves import StopsIfInterrupted
 from motorbus.motion.robot import Robot
 from motorbus.web import messages
 from motorbus.web.guide import PageFace, verify_axes
@@ -411,7 +411,7 @@ class Service:
 async def _lead(robot: Robot, names: Sequence[str], feed: Callable[[ControlLoop], bool]) -> None:
     """Program: a loop of these axes while `feed`, which sets its targets, is true; then they brake."""
     loop = ControlLoop(robot, names, policy="clamp")
-    async with StopsIfInterrupted(loop.members), Running(loop):
+    async with StopsIfInterrupted(loop.members), loop:
         while feed(loop):
             await loop.cycle()
 
