@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import ceil, floor
-from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 import msgspec
@@ -143,7 +142,8 @@ class Program:
     def load(cls, path: str) -> Program:
         """From a file. Raises RequestError if it cannot be read, and as `parse`."""
         try:
-            source = Path(path).read_text("utf-8")
+            with open(path, encoding="utf-8") as file:
+                source = file.read()
         except (OSError, UnicodeDecodeError) as error:
             why = getattr(error, "strerror", "") or "it is not UTF-8 text"
             raise RequestError(f"{path} cannot be read: {why.lower()}") from error
