@@ -142,8 +142,8 @@ class Program:
     def load(cls, path: str) -> Program:
         """From a file. Raises RequestError if it cannot be read, and as `parse`."""
         try:
-            with open(path, encoding="utf-8") as stream:
-                source = stream.read()
+            with open(path, encoding="utf-8") as file:
+                source = file.read()
         except (OSError, UnicodeDecodeError) as error:
             why = getattr(error, "strerror", "") or "it is not UTF-8 text"
             raise RequestError(f"{path} cannot be read: {why.lower()}") from error
