@@ -21,7 +21,7 @@ def main(path: str | Path = HERE) -> None:
         moved = robot.move({"shoulder": -0.3, "pan": 0.2, "slide": 0.02}, duration=1.0)
         print(moved)
         for name, end in moved.axes.items():
-            print(f"{name} at {end.position:.3f}{', estimated' if end.estimated else ''}")
+            print(f"{name} at {end.position:.2f}{', estimated' if end.estimated else ''}")
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ EXPECTED = {
         "bench: 9 axes, simulated",
         "planned=1.0",
         "shoulder at -0.30",
-        "slide at 0.020, estimated",
+        "slide at 0.02, estimated",
     ],
     "async_robot.py": ["MoveResult", "held up: True", "tilt 0.20 rad"],
     TEST: ["1 passed"],
