@@ -167,7 +167,7 @@ MALFORMED: Final = [
     '{"type":"move","goals":{"base":"far"}}',
     '{"type":"target","name":"base","value":NaN,"stops":0}',
     '{"type":"target","name":"base","value":1e999,"stops":0}',
-    '{"type":"target","name":"nobody","value":0,"stops":0}',
+    '{"type":"target","name":"no_axis","value":0,"stops":0}',
     '{"type":"device_command","name":"base","function":"reset"}',
     '{"type":"follow","pairs":{"base":"shoulder"},"seconds":1}',
     '{"type":"teach","file":"../../etc/x","seconds":1}',

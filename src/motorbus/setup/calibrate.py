@@ -165,18 +165,24 @@ def offset_of(bus: Bus, joint: Joint) -> int:
     return feetech.Servo(bus, joint.id).zero().raw_offset
 
 
-def apply(bus: Bus, calibration: JointCalibration) -> None:
-    """Write offset and limits of a joint to its servo, and read them back; it goes limp."""
+def check(calibration: JointCalibration, joint: str) -> None:
+    """Raise RequestError, which names the joint, for a range or an offset that a servo cannot hold."""
     if not 0 <= calibration.range_min < calibration.range_max < TURN:
         raise RequestError(
-            f"id {calibration.id}: the range {calibration.range_min} to {calibration.range_max} is not possible",
+            f"{joint} has the range {calibration.range_min} to {calibration.range_max}",
             expected=f"0 to {TURN - 1}, the lower one first",
         )
     if abs(calibration.homing_offset) > LARGEST_OFFSET:
         raise RequestError(
-            f"id {calibration.id}: the homing offset {calibration.homing_offset} does not fit its register",
+            f"{joint} has the homing offset {calibration.homing_offset}",
             expected=f"-{LARGEST_OFFSET} to {LARGEST_OFFSET}",
+            advice="calibrate it again: its register cannot hold this",
         )
+
+
+def apply(bus: Bus, calibration: JointCalibration) -> None:
+    """Write offset and limits of a joint to its servo, and read them back; it goes limp."""
+    check(calibration, f"id {calibration.id}")
     servo = feetech.Servo(bus, calibration.id)
     servo.disable_torque()
     servo.write(

@@ -13,7 +13,7 @@ from typing import Final
 import msgspec
 
 from motorbus.errors import RequestError
-from motorbus.setup.calibrate import LARGEST_OFFSET, TURN, JointCalibration
+from motorbus.setup.calibrate import TURN, JointCalibration, check
 
 STEPS: Final = TURN - 1  # of a turn, as LeRobot counts
 TOLERANCE: Final = 2  # counts between two homing offsets that are the same
@@ -29,17 +29,7 @@ def parse(text: str | bytes, name: str = "calibration") -> dict[str, JointCalibr
             expected='{"shoulder_pan": {"id": 1, "drive_mode": 0, "homing_offset": …, "range_min": …, "range_max": …}}',
         ) from None
     for joint, one in found.items():
-        if not 0 <= one.range_min < one.range_max <= STEPS:
-            raise RequestError(
-                f"{name}: {joint} has the range {one.range_min} to {one.range_max}",
-                expected=f"0 to {STEPS}, the lower one first",
-            )
-        if abs(one.homing_offset) > LARGEST_OFFSET:
-            raise RequestError(
-                f"{name}: {joint} has the homing offset {one.homing_offset}",
-                expected=f"-{LARGEST_OFFSET} to {LARGEST_OFFSET}",
-                advice="calibrate it again: its register cannot hold this",
-            )
+        check(one, f"{name}: {joint}")
         if one.drive_mode not in (0, 1):
             raise RequestError(f"{name}: {joint} has drive_mode {one.drive_mode}", expected="0 or 1")
     return found

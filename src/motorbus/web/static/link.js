@@ -29,9 +29,9 @@ let count = 0;
 export async function open() {
   const answer = await fetch("/describe");
   if (!answer.ok) throw new Error(await answer.text());
-  const told = await answer.json();
-  Object.assign(link, { machine: told.machine, scales: told.scales, demo: told.demo });
-  told.warnings.forEach((text) => say(text, true));
+  const description = await answer.json();
+  Object.assign(link, { machine: description.machine, scales: description.scales, demo: description.demo });
+  description.warnings.forEach((text) => say(text, true));
   connect();
   setInterval(() => link.control === "you" && send({ type: "heartbeat" }), BEAT);
 }
