@@ -75,6 +75,6 @@ def web(
         stack.callback(robot.shutdown)
         service = stack.enter_context(Service(robot, Path("recordings"), faults))
         server = stack.enter_context(Server(service, host=host, port=port, token=token))
-        emit(Page(server.url), common)
         with suppress(KeyboardInterrupt):
+            emit(Page(server.url), common)
             Event().wait()
