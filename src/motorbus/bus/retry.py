@@ -41,9 +41,8 @@ async def carry_out(engine: Engine, request: Request[Any], attempt: Attempt | No
             is_probed = is_probed or failed is None
             if failed is None:
                 continue
-            tries += probes
             if len(request.expected) == 1:  # type: ignore[arg-type]  # never ANY here
-                raise _error(engine, request, failed, tries, sent)
+                raise _error(engine, request, failed, tries + probes, sent)
             excluded += (node,)
         if excluded and len(excluded) == len(request.expected):  # type: ignore[arg-type]
             return Response((), excluded, await Sleep(0))

@@ -60,10 +60,11 @@ class Subscription:
         self._changed = Condition()
 
     def put(self, state: RobotState) -> None:
-        """Add a state, unless the last one is too young."""
+        """Add a state, unless it comes before its turn."""
         if state.at < self._next:
             return
-        self._next = state.at + self._period * 0.999
+        # A late state does not delay the next one.
+        self._next = max(self._next + self._period, state.at + self._period / 2)
         with self._changed:
             self.dropped += len(self._states) == self._states.maxlen
             self._states.append(state)

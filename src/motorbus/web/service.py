@@ -414,6 +414,7 @@ async def _lead(robot: Robot, names: Sequence[str], feed: Callable[[ControlLoop]
     async with StopsIfInterrupted(loop.members), loop:
         while feed(loop):
             await loop.cycle()
+            await loop.wait()
 
 
 def failed(name: str, error: MotorbusError) -> Failed:
