@@ -29,6 +29,7 @@ FEWEST: Final = 20  # of one device
 SLOW_READS: Final = 10  # of a device without a position
 TRIES: Final = 3  # for a device that the scan missed
 LOST: Final = 0.02  # share of reads that may fail
+SAG: Final = 1.5  # V that a device may have less than the others # assumption
 SLOW: Final = 0.008  # s that a read may take beyond its air time
 SLOWEST: Final = 0.1  # s of latency with which a bus is tried whose replies come too late
 LISTEN: Final = 0.3  # s
@@ -198,18 +199,25 @@ class BusDoctor:
             before = self.name(self.chain[first - 1])
             cause = f"the cable after {before}, or the devices after it have no supply"
             fix = f"check the plug between {before} and {self.name(missing[0])}"
+        heard = {one.id & 0x7F for one in self._received() if isinstance(one, CanFrame)}
         for node in missing:
-            self.add("device-missing", self.name(node), evidence, cause, fix)
+            if node in heard:
+                self.add("can-mute-node", self.name(node), "it sends frames, no reply to a read")
+            else:
+                self.add("device-missing", self.name(node), evidence, cause, fix)
 
     def _check_ids(self, answering: Sequence[int]) -> None:
         if len(self._suspects) == len(answering) > 1:
             self._suspects.clear()  # noise disturbs all, a second device only its own id
         for node, evidence in self._suspects.items():
             self.add("duplicate-id", self.name(node), evidence)
-        for node in answering:
-            if self.names and node not in self.names:
-                code = "factory-id" if node == self.checks.FACTORY_ID else "device-unnamed"
-                self.add(code, self.name(node), f"id {node} answers, no axis has it")
+        for node in answering if self.chain else ():
+            if node in self.chain:
+                continue
+            if node == self.checks.FACTORY_ID:
+                self.add("factory-id", self.name(node), f"the factory id {node} answers, it is not expected")
+            elif self.names:
+                self.add("device-unnamed", self.name(node), f"id {node} answers, no axis has it")
 
     # -- line --------------------------------------------------------------------------------------------------
 
@@ -253,9 +261,9 @@ class BusDoctor:
             return
         kinds = ", ".join(f"{count} {kind}" for kind, count in errors.items())
         evidence = f"{failed} of {reads + failed} reads failed ({kinds}), limit {LOST:.0%}"
-        self.add(
-            "replies-lost" if errors["silence"] * 2 > failed else "line-noise", self.name(node), evidence
-        )
+        broken = self._is_can and any(one.id & ERROR_FLAG for one in self._received())
+        is_silent = errors["silence"] * 2 > failed and not broken
+        self.add("replies-lost" if is_silent else "line-noise", self.name(node), evidence)
 
     # -- devices -----------------------------------------------------------------------------------------------
 
@@ -274,10 +282,20 @@ class BusDoctor:
                 subject.add("model-unknown", evidence)
             self._measure(subject)
             self.found += subject.found
+        self._check_supplies()
         for model, firmwares in versions.items():
             if len(firmwares) > 1:
                 shown = "; ".join(f"{firmware}: {', '.join(names)}" for firmware, names in firmwares.items())
                 self.add("firmware-mixed", self.where, f"{model} {shown}")
+
+    def _check_supplies(self) -> None:
+        """A device whose supply is far below that of the others of its model."""
+        for subject in self.subjects.values():
+            own = self.health[subject.where]
+            alike = [one.voltage for one in self.health.values() if one.model == own.model and one.voltage]
+            if own.voltage and own.voltage < (usual := median(alike)) - SAG:
+                evidence = f"supply {own.voltage:.1f} V, of the others {usual:.1f} V"
+                self.add("supply-sag", subject.where, evidence, "a long or thin cable, or a loose plug")
 
     def _run_checks(self, subject: Subject) -> None:
         for check in self.checks.CHECKS:

@@ -67,6 +67,8 @@ def _examine(
             machine.check_journal(doctor)
             if config is not None:
                 machine.check_axes(doctor, config)
+            else:
+                machine.check_saved(doctor)
             if rate:
                 trial.measure_loop(doctor, rate)
         except LinkError as error:
