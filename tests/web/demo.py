@@ -7,7 +7,7 @@ import json
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from importlib.resources import as_file, files
+from importlib.resources import files
 from pathlib import Path
 from threading import Event, Thread
 from typing import Any, NamedTuple, Self
@@ -51,8 +51,9 @@ class Served(NamedTuple):
 @contextmanager
 def serve(folder: Path) -> Iterator[Served]:
     """Serve the demo machine."""
-    with as_file(files("motorbus.cli") / "demo.toml") as file:
-        config = MachineConfig.load(file)
+    file = folder / "demo.toml"
+    file.write_bytes((files("motorbus.cli") / "demo.toml").read_bytes())
+    config = MachineConfig.load(file)
     with (
         simulated(config) as (config, faults),
         Robot(config) as robot,

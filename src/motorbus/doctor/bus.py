@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from statistics import median, quantiles
 from typing import Any, Final, TypeVar
@@ -17,9 +17,9 @@ from motorbus.core.can_frame import ERROR_FLAG, CanFrame
 from motorbus.core.family import Found, Identity, State
 from motorbus.core.findings import Finding, Subject
 from motorbus.core.request import Request
-from motorbus.core.steps import Runnable, Sleep, catch
+from motorbus.core.steps import Runnable, Sleep, catch, discard
 from motorbus.doctor.findings import DeviceHealth
-from motorbus.errors import LinkError, MotorbusError
+from motorbus.errors import Interrupted, LinkError, MotorbusError
 
 T = TypeVar("T")
 
@@ -38,9 +38,21 @@ TEXT: Final = re.compile(rb"[\t\n\r -~]{12,}")  # of a board that prints a menu
 
 
 class BusDoctor:
-    """The examination of one open bus. `names` are the axes of the machine file by id, `ids` other expected ids."""
+    """The examination of one open bus. `names` are the axes of the machine file by id, `ids` other expected ids.
 
-    def __init__(self, bus: Bus, where: str, names: Mapping[int, str] = {}, ids: Sequence[int] = ()) -> None:
+    It ends with Interrupted once `is_stopped`.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        where: str,
+        names: Mapping[int, str] = {},
+        ids: Sequence[int] = (),
+        *,
+        tries_rates: bool = True,
+        is_stopped: Callable[[], bool] = bool,
+    ) -> None:
         self.bus, self.where, self.names = bus, where, names
         self.chain = list(dict.fromkeys([*names, *ids]))
         self.checks: Any = import_module(bus.family.checks_module)
@@ -51,6 +63,8 @@ class BusDoctor:
         self._records = bus.trace.subscribe(TRACED)
         self._suspects: dict[int, str] = {}
         """Ids that two devices seem to have, and the evidence."""
+        self._tries_rates = tries_rates
+        self._is_stopped = is_stopped
         self._is_can = bus.family.link.kind == "frames"
 
     def add(self, code: str, where: str, evidence: str, cause: str = "", action: str = "") -> None:
@@ -67,8 +81,15 @@ class BusDoctor:
         self._trace += self._records
         return self._trace
 
+    def end(self) -> None:
+        """Stop recording what goes over the wire."""
+        self.bus.trace.unsubscribe(self._records)
+
     def read(self, runnable: Runnable[T]) -> T | MotorbusError:
-        """The value, or the error as a value; a lost port is raised."""
+        """The value, or the error as a value; a lost port is raised, and Interrupted after a stop."""
+        if self._is_stopped():
+            discard(runnable)
+            raise Interrupted("the doctor was stopped", advice="run it again")
         value = self.bus.run(catch(runnable))
         if isinstance(value, LinkError):
             raise value
@@ -149,7 +170,7 @@ class BusDoctor:
 
     def _scan_other_rates(self, ids: Sequence[int]) -> list[Found]:
         others = [rate for rate in self.bus.family.link.rates if rate != self.bus.rate]
-        return self._scan(ids, others) if others else []
+        return self._scan(ids, others) if others and self._tries_rates else []
 
     def _report_rate(self, found: Sequence[Found], where: str) -> None:
         code, option = ("can-wrong-bitrate", "bitrate") if self._is_can else ("wrong-rate", "baud")
@@ -172,7 +193,11 @@ class BusDoctor:
         elif frames:
             self.add("can-mute-node", self.where, f"frames {', '.join([*frames][:6])}, no reply to a read")
         elif self._is_can:
-            self.add("can-silent", self.where, f"no frame in {LISTEN} s, no reply at any rate")
+            self.add(
+                "can-silent",
+                self.where,
+                f"no frame in {LISTEN} s, no reply{' at any rate' * self._tries_rates}",
+            )
         elif text := TEXT.search(stray):
             self.add("adapter-menu", self.where, f"received {text[0].decode().strip()[:40]!r}")
         elif stray:
@@ -180,7 +205,8 @@ class BusDoctor:
             evidence = f"{len(stray)} bytes that are no reply, as {stray[:8].hex(' ').upper()}"
             self.add(code, self.where, evidence)
         else:
-            self.add("bus-silent", self.where, f"no reply, rates tried: {len(self.bus.family.link.rates)}")
+            tried = len(self.bus.family.link.rates) if self._tries_rates else 1
+            self.add("bus-silent", self.where, f"no reply, rates tried: {tried}")
 
     def _check_missing(self, answering: Sequence[int]) -> None:
         missing = [node for node in self.chain if node not in answering]

@@ -6,6 +6,12 @@ export { render };
 export { useEffect, useRef, useState } from "./vendor/hooks.mjs";
 export const html = htm.bind(h);
 
+/** A choice of one text. */
+export function Select({ label, value, options, set }) {
+  return html`<select aria-label=${label} value=${value} onChange=${(event) => set(event.target.value)}>
+    ${options.map((one) => html`<option>${one}</option>`)}</select>`;
+}
+
 /** A number with few digits, "–" for null. */
 export function number(value, places = 1) {
   return value === null || value === undefined ? "–" : value.toFixed(places);
