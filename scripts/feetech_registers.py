@@ -26,8 +26,8 @@ HEAD: Final = """# FEETECH registers
 
 FEETECH servos have six register maps, and the model does not tell which: firmware and byte order do. This page has
 every row of each map with its source. Where sources disagree, or none confirms a row, "In doubt" names who says what,
-and what was chosen. `python -m scripts.feetech_registers` generates the page from the rows that the program uses, and the
-same rows [as JSON](feetech-registers.json).
+and what was chosen. `python -m scripts.feetech_registers` generates the page from the rows that the program uses, and
+the same rows [as JSON](feetech-registers.json).
 
 Servos of all six maps are found, identified, read, written, moved and simulated. One address means another register in
 another map: 48 is the torque limit in three maps and the lock in three. A servo with other firmware is read by what all

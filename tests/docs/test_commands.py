@@ -1,6 +1,6 @@
 """Every command line of README and docs runs as written, on simulated devices.
 
-A port is replaced by a simulated bus of this process, in virtual time. `test_first_machine` runs the page of that name.
+A port is replaced by a simulated bus of this process, in virtual time. `test_tutorials` runs the tutorials.
 """
 
 from __future__ import annotations
@@ -19,13 +19,12 @@ import pytest
 
 import motorbus
 from motorbus.cli import main
-from motorbus.motion.machine import MachineConfig
 from tests.cli.shell import PROGRAM, Ran
-from tests.docs.pages import FIRST_MACHINE, PAGES, ROOT, blocks, commands
+from tests.docs.pages import PAGES, ROOT, TUTORIALS, commands
 
 BY_HAND = re.compile("motorbus setup( calibrate| replace| --)")  # tests/setup moves the arm
 LINES = sorted(
-    {line for page in PAGES if page != FIRST_MACHINE for line in commands(page) if not BY_HAND.match(line)}
+    {line for page in PAGES if page not in TUTORIALS for line in commands(page) if not BY_HAND.match(line)}
 )
 PORT = re.compile(r"(feetech|kst|stepper):(?!sim\b)([^\s#,]+)")
 IDS = {"feetech": "1-7", "kst": "0x25", "stepper": "1"}
@@ -118,11 +117,6 @@ def finite(line: str) -> str:
 
 def test_there_are_commands_to_run() -> None:
     assert len(LINES) > 90
-
-
-def test_the_machine_file_of_the_readme_is_valid() -> None:
-    (text,) = blocks(ROOT / "README.md", "toml")
-    assert list(MachineConfig.parse(text).axes) == ["shoulder"]
 
 
 @pytest.mark.parametrize("line", LINES)
