@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from motorbus import errors
+from motorbus.cli import main
 from motorbus.families.stepper import Program
 from motorbus.motion.machine import MachineConfig
 from tests.docs.pages import PAGES, ROOT, blocks, missing, name_of
@@ -90,6 +91,19 @@ def test_every_error_is_explained() -> None:
     assert dict(explained) == {
         name: "" if parent == "MotorbusError" else parent for name, parent in parents.items()
     }
+
+
+def test_every_option_of_every_command_is_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    text = (ROOT / "docs" / "reference" / "commands.md").read_text(encoding="utf-8")
+    shared = {"--json", "--machine", "--bus", "--preset", "--port", "--arm"}
+    rows = re.findall(r"^\| `([a-z-]+(?: [a-z-]+)?)[^`]*` \| .*? \| ?([^|]*)\|$", text, re.MULTILINE)
+    for words, options in rows:
+        assert main([*words.split(), "--help"]) == 0
+        heads = re.findall(r"^  (-.*?):", capsys.readouterr().out, re.MULTILINE)
+        has = {*re.findall(r"--[a-z-]+", " ".join(heads))}
+        wanted = {*re.findall(r"--[a-z-]+", options), *({"--yes", "--dry-run"} if "W" in options else ())}
+        assert has - shared == wanted - shared, words
+    assert len(rows) > 40
 
 
 def test_every_error_has_an_exit_code() -> None:

@@ -11,7 +11,8 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import pytest
@@ -58,21 +59,31 @@ def set_up(folder: Path, command: Command) -> str:
     with Conversation(folder, *shlex.split(command.line)[2:]) as talk:
         talk.wait("middle pose", "")
         talk.wait("end to end")
-        subprocess.run([sys.executable, "hand.py"], check=True, timeout=60)
-        talk.wait("", "")
-        for joint in JOINTS:
-            talk.wait(f"{joint.name}: {joint.positive}", "")
+        subprocess.run([*PROGRAMS["python"], "hand.py", control_of(command)], check=True, timeout=60)
+        for _ in range(1 + len(JOINTS)):  # the end of the sweep; each joint moves as named
+            talk.wait("", "")
         assert talk.child.wait(60) == 0, talk.text
         return talk.text
 
 
-def run(command: Command, capsys: pytest.CaptureFixture[str]) -> tuple[int, str]:
+def control_of(command: Command) -> str:
+    """The control socket of the arm that this command is about."""
+    return "leader.control" if "leader" in command.line else "arm.control"
+
+
+def follow(command: Command) -> tuple[int, str]:
+    """A command that follows the leader, while `hand.py` moves that."""
+    with subprocess.Popen([*PROGRAMS["python"], "hand.py", control_of(command)]):
+        return run(command)
+
+
+def run(command: Command) -> tuple[int, str]:
     """Exit code and output of a command that ends by itself."""
     first, *words = shlex.split(command.line)
     if first == "motorbus":
-        capsys.readouterr()
-        code = main(words)
-        return code, "".join(capsys.readouterr())
+        out = StringIO()
+        with redirect_stdout(out), redirect_stderr(out):
+            return main(words), out.getvalue()
     done = subprocess.run(
         [*PROGRAMS[first], *words],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
@@ -90,10 +101,10 @@ def test_there_is_a_tutorial_for_each_user() -> None:
 
 
 @pytest.mark.parametrize("page", TUTORIALS, ids=name_of)
-def test_the_page_does_what_it_says(page: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_page_does_what_it_says(page: Path, folder: Path) -> None:
     count = 0
     with ExitStack() as stack:
-        for kind, text in BLOCK.findall(page.read_text(encoding="utf-8")):
+        for kind, text in BLOCK.findall(page.read_text(encoding="utf-8").replace("/tmp/", f"{folder}/")):
             if kind in ("py", "toml", "json"):
                 name = NAMED.match(text)
                 assert name, text
@@ -103,8 +114,10 @@ def test_the_page_does_what_it_says(page: Path, folder: Path, capsys: pytest.Cap
                     code, out = 0, stack.enter_context(served(command))
                 elif re.match("motorbus setup (calibrate )?--", command.line):
                     code, out = 0, set_up(folder, command)
+                elif " follow " in command.line:
+                    code, out = follow(command)
                 else:
-                    code, out = run(command, capsys)
+                    code, out = run(command)
                 assert code == command.code, f"{command.line}: {out}"
                 assert command.output, f"{command.line}: the page shows no output"
                 assert missing(command.output, out) == [], f"{command.line}: {out}"
