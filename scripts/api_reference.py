@@ -31,7 +31,9 @@ Every name that a program needs, with its docstring. `python -m scripts.api_refe
 - Failures are [errors](errors.md). A method that a device does not support is absent, or raises RequestError before
   anything is sent.
 """
-INTERNAL: Final = "raw row value refusal note_reply settings traits table carry_out publish program chosen now unsubscribe line link"
+INTERNAL: Final = """
+raw row value refusal note_reply settings traits table carry_out publish program chosen now unsubscribe line link
+"""
 ONLY: Final = {
     "ControlLoop": "set_target",
     "Bus": "run exchange estop trigger_estop reset latched rate read_only simulated close",

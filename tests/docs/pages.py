@@ -39,12 +39,6 @@ def shown(text: str) -> Iterator[Command]:
         yield Command(line.strip(), tuple(output), int(code[1]) if code else 0)
 
 
-def commands(page: Path) -> list[str]:
-    """The command lines of `motorbus` that a page shows, without comments."""
-    lines = [one.line for text in blocks(page, "console") for one in shown(text)]
-    return [line for line in lines if line.startswith("motorbus ")]
-
-
 def masked(lines: list[str] | tuple[str, ...]) -> list[str]:
     """Lines without what differs between two runs: numbers, the width of columns, frames of tables."""
     found = (re.sub(r"-?\d+(\.\d+)?(e-?\d+)?", "0", line) for line in lines)
@@ -53,6 +47,9 @@ def masked(lines: list[str] | tuple[str, ...]) -> list[str]:
 
 
 def missing(wanted: tuple[str, ...], got: str) -> list[str]:
-    """Shown lines that the output does not have, in their order; a line `…` stands for any lines."""
+    """Shown lines that the output does not have, in their order. `…` stands for any text, alone for any lines."""
     rest = iter(masked(got.splitlines()))
-    return [line for line in masked(wanted) if line != "…" and line not in rest]
+    lines = [line for line in masked(wanted) if line != "…"]
+    patterns = [re.escape(line).replace("…", ".*") for line in lines]
+    found = [any(re.fullmatch(pattern, other) for other in rest) for pattern in patterns]
+    return [line for line, there in zip(lines, found, strict=True) if not there]
