@@ -35,7 +35,10 @@ WAVE = "time (s),shoulder (deg),elbow (deg)\n0,0,0\n1,10,-10\n2,0,0\n"
 PING = bytes.fromhex("FF FF 01 02 01 FB")
 TRACE = """date Mon Nov 30 12:00:00 2026
 base hex  timestamps absolute
-   0.100000 1  625             Rx   d 8 22 03 60 00 84 03 00 00
+internal events logged
+Begin Triggerblock Mon Nov 30 12:00:00.0 2026
+ 0.100000 1  625             Rx   d 8 22 03 60 00 84 03 00 00
+End TriggerBlock
 """
 
 
