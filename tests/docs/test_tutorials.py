@@ -63,7 +63,7 @@ def set_up(folder: Path, command: Command) -> str:
         for _ in range(1 + len(JOINTS)):  # the end of the sweep; each joint moves as named
             talk.wait("", "")
         assert talk.child.wait(60) == 0, talk.text
-        return talk.text
+        return talk.text.replace("[Enter] ", "[Enter]\n")  # a terminal shows the Enter of its user
 
 
 def control_of(command: Command) -> str:
