@@ -52,6 +52,7 @@ docs: $(READY)
 	$(BIN)/python -m scripts.kst_reference
 	$(BIN)/python -m scripts.stepper_reference
 	$(BIN)/python -m scripts.machine_file
+	$(BIN)/python -m scripts.api_reference
 	$(BIN)/zensical build --strict --clean
 
 check: lint types contracts docs interpreters lerobot

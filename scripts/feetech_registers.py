@@ -15,34 +15,34 @@ from motorbus.core.register import Register, RegisterMap
 from motorbus.families.feetech.models import FIRMWARE, MODELS, model_number
 from motorbus.families.feetech.registers import TABLES
 from motorbus.families.feetech.registers.codes import ALARM_BITS, BAUD_CODES, BAUD_CODES_OF, PHASE_BITS
-from scripts.pages import kept, listed
+from scripts.pages import assumptions, kept, listed
 
 ROOT: Final = Path(__file__).resolve().parent.parent
 PAGE: Final = ROOT / "docs" / "reference" / "feetech-registers.md"
 DATABASE: Final = PAGE.with_suffix(".json")
+FAMILY: Final = ROOT / "src" / "motorbus" / "families" / "feetech"
 
 HEAD: Final = """# FEETECH registers
 
 FEETECH servos have six register maps, and the model does not tell which: firmware and byte order do. This page has
-every row of each map with its source. Where sources disagree, or none confirms it, the column "in doubt" says who says
-what, and what was chosen; in the database that is `conflict`, which is empty elsewhere. The page is made by
-`python -m scripts.feetech_registers` from the rows that the program itself uses; the same rows are there
-[as JSON](feetech-registers.json).
+every row of each map with its source. Where sources disagree, or none confirms a row, "In doubt" names who says what,
+and what was chosen. `python -m scripts.feetech_registers` generates the page from the rows that the program uses, and
+the same rows [as JSON](feetech-registers.json).
 
-What motorbus does with them: servos of all six maps are found, identified, read, written, moved and simulated. Which
-map it is matters, for the same address means another thing in each: 48 is the torque limit here and the lock there. A
-servo with other firmware is read by what all maps share, and never written, but for torque off.
+Servos of all six maps are found, identified, read, written, moved and simulated. One address means another register in
+another map: 48 is the torque limit in three maps and the lock in three. A servo with other firmware is read by what all
+maps share, and never written, but for torque off.
 
 A word has its low byte first (little-endian), on SCS its high byte. A negative number is the magnitude with the sign
-bit set; never two's complement. The range bounds the raw number; times the unit it is a value. `effect` is the worst
-that writing can do; what is kept in EEPROM is only kept when the lock is open.
+bit set; never two's complement. The range bounds the raw number; times the unit it is a value. The effect is the worst
+that writing can do. What is written to EEPROM lasts only when the lock is open.
 """
 
 
 def page() -> str:
     """The whole page."""
     maps = [line for table in TABLES.values() for line in _map(table)]
-    parts = (_choice(), maps, _models(), _baud_codes(), _alarms(), _phase())
+    parts = (_choice(), maps, _models(), _baud_codes(), _alarms(), _phase(), _assumptions())
     return "\n".join([HEAD, *(line for part in parts for line in part)])
 
 
@@ -97,20 +97,32 @@ def _choice() -> Iterator[str]:
 def _map(table: RegisterMap) -> Iterator[str]:
     yield f"## {table.name}\n"
     yield f"{table.title[0].upper()}{table.title[1:]}. {len(table)} registers.\n"
-    columns = ("address", "register", "bytes", "in", "access", "sign", "range", "default", "unit", "effect")
-    yield from listed((*columns, "meaning", "source", "in doubt", "note"), map(_row, table.values()))
+    yield from listed(("address", "register", "meaning and source"), map(_row, table.values()))
 
 
 def _row(row: Register) -> list[object]:
-    return [
-        *(row.address, f"`{row.name}`", row.size, row.storage.value, row.access.value),
-        "" if row.sign_bit is None else f"bit {row.sign_bit}",
+    facts = [
+        f"{row.size} byte{'s' if row.size > 1 else ''}",
+        row.storage.value,
+        row.access.value,
         f"{row.low} to {row.high}",
-        "" if row.default is None else row.default,
-        f"{row.scale:.6g} {row.unit}" if row.unit else "",
-        row.effect.name.lower() if row.writable else "",
-        *("<br>".join(_meanings(row)), row.source, row.conflict, row.note),
     ]
+    if row.sign_bit is not None:
+        facts.append(f"sign in bit {row.sign_bit}")
+    if row.default is not None:
+        facts.append(f"shipped {row.default}")
+    if row.unit:
+        facts.append(f"1 = {row.scale:.6g} {row.unit}")
+    if row.writable:
+        facts.append(f"effect {row.effect.name.lower()}")
+    parts = [
+        ", ".join(facts),
+        "; ".join(_meanings(row)),
+        row.note,
+        row.source and f"Source: {row.source}",
+        row.conflict and f"In doubt: {row.conflict}",
+    ]
+    return [row.address, f"`{row.name}`", "<br>".join(part for part in parts if part)]
 
 
 def _models() -> Iterator[str]:
@@ -159,6 +171,12 @@ def _phase() -> Iterator[str]:
 def _bits(of_maps: Mapping[str, Mapping[int, str]]) -> Iterator[str]:
     rows: list[list[object]] = [[bit, *(bits.get(bit, "") for bits in of_maps.values())] for bit in range(8)]
     yield from listed(("bit", *of_maps), rows)
+
+
+def _assumptions() -> Iterator[str]:
+    yield "## Assumptions\n"
+    yield "What no source states, by file of `motorbus.families.feetech`; each is a constant in the code.\n"
+    yield from listed(("where", "assumed"), assumptions(FAMILY))
 
 
 def main() -> int:

@@ -9,12 +9,12 @@ from types import ModuleType
 import pytest
 
 from motorbus.families.kst import Servo
-from scripts import feetech_registers, kst_reference, machine_file, stepper_reference
+from scripts import api_reference, feetech_registers, kst_reference, machine_file, stepper_reference
 
 
 @pytest.mark.parametrize(
     "script",
-    [machine_file, feetech_registers, kst_reference, stepper_reference],
+    [api_reference, machine_file, feetech_registers, kst_reference, stepper_reference],
     ids=lambda one: one.__name__,
 )
 def test_page_is_current(script: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:

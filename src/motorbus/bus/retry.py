@@ -17,7 +17,10 @@ RETRIES: Final = 2
 
 
 async def carry_out(engine: Engine, request: Request[Any], attempt: Attempt | None = None) -> Response:
-    """The reply to this request; `attempt` is its first one, which has failed. Raises when the last one fails."""
+    """The reply to this request. `attempt` is a first one that has failed. Raises when the last one fails.
+
+    `Sleep(0)` reads the clock.
+    """
     tries, sent = 0, False
     while True:
         if attempt is not None:

@@ -105,6 +105,8 @@ def _report(doctor: BusDoctor, config: MachineConfig | None, rate: float = 0.0) 
         machine.check_journal(doctor)
         if config is not None:
             machine.check_axes(doctor, config)
+        else:
+            machine.check_saved(doctor)
         if rate:
             trial.measure_loop(doctor, rate)
     except LinkError as error:

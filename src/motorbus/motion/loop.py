@@ -280,6 +280,7 @@ class ControlLoop(Guard):
         }
         for bus, requests in once.items():
             batches[bus] = [*requests, *batches.get(bus, ())]
+        # Without any request the exchange still waits for the slot.
         values = await Exchange(
             {bus: batch for bus, batch in batches.items() if batch} or batches, self._next
         )
