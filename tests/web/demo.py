@@ -136,11 +136,6 @@ class Client:
         """A message of this type, with these fields, has come."""
         return any(one.items() >= (fields | {"type": kind}).items() for one in self.messages)
 
-    @property
-    def last(self) -> dict[str, Any]:
-        """The last message that is no state."""
-        return self.messages[-1]
-
     def axis(self, name: str) -> dict[str, Any]:
         """An axis in the last state."""
         found: dict[str, Any] = self.frame["state"]["axes"][name]

@@ -253,7 +253,7 @@ class Service:
                 buses, config = self.robot.buses, self.robot.config
                 self._start(page, "doctor", lambda: examine_open(config, buses, lambda: self._released))
             case messages.SetUp():
-                face = PageFace(self.broadcast, lambda: self._released)
+                face = PageFace(self.broadcast, lambda: self._released or self._is_left())
                 self._start(page, message.kind, lambda: self._set_up(message, face))
                 self._face = face
             case messages.Answer(question, text):
@@ -353,7 +353,7 @@ class Service:
                     self.activity = job[1]
                 elif self._targets:
                     job, self.activity = (None, FOLLOWING, self._follow), FOLLOWING  # type: ignore[assignment]
-                elif self._is_abandoned():
+                elif self._is_left() and any(axis.status.engaged for axis in self.robot.axes.values()):
                     job, self.activity = (None, "shutdown", self._park), "shutdown"  # type: ignore[assignment]
             if job is None:
                 self._end()
@@ -436,14 +436,9 @@ class Service:
 
     # -- end of the pages ------------------------------------------------------------------------------------------
 
-    def _is_abandoned(self) -> bool:
-        """No page is left, the lease is lost, and an axis has torque."""
-        return (
-            not self.pages
-            and self.lease.lost
-            and monotonic() - self._left_at > GRACE
-            and any(axis.status.engaged for axis in self.robot.axes.values())
-        )
+    def _is_left(self) -> bool:
+        """No page has been open for a while."""
+        return not self.pages and self.lease.lost and monotonic() - self._left_at > GRACE
 
     def _park(self) -> None:
         """Graceful stop; for its time the machine needs no lease."""

@@ -40,7 +40,7 @@ function columns(states, chosen) {
 function ends(low, high, index) {
   if (low === null) return [-1, 1];
   const space = Math.max((high - low) * 0.08, Math.abs(high) * 0.02, 0.1);
-  return [low - space * (1 + index % 2), high + space * (1 + index % 3)];
+  return [low - space * (1 + index % 3), high + space * (1 + (index + 1) % 3)];
 }
 
 function build(box, chosen, seconds) {

@@ -51,7 +51,8 @@ export function Setup() {
   const [bus, setBus] = useState(buses[0]);
   const [left, setLeft] = useState([]); // joints that are left out
   if (!buses.length) return html`<p>This machine has no bus of FEETECH servos. Only these can be set up by hand.</p>`;
-  const joints = Object.keys(link.machine.axes).filter((name) => link.machine.axes[name].device.startsWith(`${bus}#`));
+  const joints = Object.entries(link.machine.axes)
+    .filter(([, axis]) => axis.device.startsWith(`${bus}#`) && axis.kind !== "wheel").map(([name]) => name);
   const running = KINDS[frame?.activity] && frame.activity;
   const begin = (kind) => {
     Object.assign(link, { step: null, notes: [] });
