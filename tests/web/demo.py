@@ -119,6 +119,11 @@ class Client:
             for one in self.messages
         )
 
+    @property
+    def last(self) -> dict[str, Any]:
+        """The last message that is no state."""
+        return self.messages[-1]
+
     def axis(self, name: str) -> dict[str, Any]:
         """An axis in the last state."""
         found: dict[str, Any] = self.frame["state"]["axes"][name]

@@ -233,13 +233,3 @@ def test_no_panel_scrolls_sideways_on_a_phone(browser: Browser, served: Served) 
     expect(page.get_by_role("table")).to_be_visible()
     check("table of the set-up")
     page.close()
-
-
-def test_missing_libraries_are_named(
-    served: Served, browser: Browser, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("motorbus.web.app.LIBRARIES", (*LIBRARIES, "other.mjs"))
-    page = browser.new_page()
-    page.goto(served.server.url)
-    expect(page.locator("body")).to_contain_text("`make assets` fetches them")
-    page.close()

@@ -64,8 +64,6 @@ class Guard:
         self._any_address = bool(host)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] not in ("http", "websocket"):
-            return
         response = self._refuse(HTTPConnection(scope))
         if response is None:
             await self.app(scope, receive, send)
@@ -134,13 +132,10 @@ class Routes:
     async def describe(self, request: Request) -> Response:
         """The machine, the scale of each unit, the simulated buses in which faults can be injected."""
         robot = self._service.robot
-        description = {
-            "machine": robot.describe(),
-            "scales": {**units.SCALES["position"], **units.SCALES["length"]},
-            "demo": self._service.demo is not None,
-            "warnings": robot.warnings,
-        }
-        return _json(description)
+        scales = {**units.SCALES["position"], **units.SCALES["length"]}
+        has_faults = self._service.demo is not None
+        description = {"machine": robot.describe(), "warnings": robot.warnings}
+        return _json({**description, "scales": scales, "demo": has_faults})
 
     async def registers(self, request: Request) -> Response:
         """The registers of an axis."""
@@ -152,7 +147,7 @@ class Routes:
 
     async def recordings(self, request: Request) -> Response:
         """The names of the recordings."""
-        return _json(self._service.recordings())
+        return _json(sorted(path.stem for path in self._service.folder.glob("*.csv")))
 
     async def socket(self, connection: WebSocket) -> None:
         """A page: its messages, and the states for it."""
@@ -217,9 +212,8 @@ class Server:
         self.token: Final = token or secrets.token_urlsafe(16)
         shown = socket.gethostname() if host in ("0.0.0.0", "::") else host or "127.0.0.1"
         self.url: Final = f"http://{shown}:{self.port}/?token={self.token}"
-        own = shown if host else ""
         config = uvicorn.Config(
-            Guard(Routes(service).app, token=self.token, host=own, port=self.port),
+            Guard(Routes(service).app, token=self.token, host=shown if host else "", port=self.port),
             ws="websockets-sansio",
             ws_max_size=MAX_MESSAGE,
             ws_per_message_deflate=False,

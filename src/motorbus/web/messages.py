@@ -60,12 +60,11 @@ class Inject(Struct, frozen=True, tag="inject"):
 
 
 class SetUp(Struct, frozen=True, tag="setup"):
-    """Set up a FEETECH bus by hand; the steps, `Prompt`, `Live` and `Note` of `setup.engine`, go to every page."""
+    """Set up joints of a FEETECH bus, () means all. Its `Prompt`, `Live` and `Note` go to every page."""
 
     kind: Literal["number", "calibrate", "verify"]
     bus: str
     names: tuple[str, ...] = ()
-    """Joints; () means all."""
 
 
 class Answer(Struct, frozen=True, tag="answer"):

@@ -17,7 +17,7 @@ from queue import Empty, SimpleQueue
 from re import fullmatch
 from threading import Event, Lock, Thread
 from time import monotonic
-from typing import Any, Final, Self
+from typing import Any, Final, Self, TypeAlias
 
 import msgspec
 from msgspec import Struct, structs
@@ -46,7 +46,7 @@ SHOW: Final = 0.1  # s between two live tables of a set-up
 LOOK: Final = 0.2  # s between two looks at a stop while the user thinks
 LONGEST_JOG: Final = 10.0  # s of a jog that the device times itself
 FOLLOWING: Final = "follow"  # activity while sliders lead axes
-PARKING: Final = "shutdown"
+Job: TypeAlias = Callable[[], Any]
 
 
 class Page:
@@ -122,7 +122,8 @@ class PageFace:
 class Service:
     """Carries out the messages of pages, and sends them the states of the robot. Use it in a `with`.
 
-    `folder` has the recordings. Its end stops what moves; the robot stays open.
+    `folder` has the recordings. Its end stops what moves; the robot stays open. `changed` is set when a calibration has
+    changed the machine file: open the machine again.
     """
 
     def __init__(self, robot: Robot, folder: Path, demo: SimulatedMachine | None = None) -> None:
@@ -130,14 +131,13 @@ class Service:
         self.folder: Final = folder
         self.demo: Final = demo
         self.changed: Final = Event()
-        """Set when the machine file was changed here: open the machine again."""
         self.activity = ""
         self.stops = 0
         self.pages: list[Page] = []
         self._holder: Page | None = None
         self._left_at = monotonic()
         self._targets: dict[str, float] = {}
-        self._next: tuple[Page, str, Callable[[], Any]] | None = None
+        self._next: tuple[Page, str, Job] | None = None
         self._released = False  # the jog button, the recording, the set-up
         self._face = PageFace(lambda step: None, lambda: self._released)
         self._lock = Lock()  # of the fields above
@@ -281,10 +281,6 @@ class Service:
         self.folder.mkdir(exist_ok=True)
         return str(self.folder / f"{name}.csv")
 
-    def recordings(self) -> list[str]:
-        """The names of all recordings."""
-        return sorted(path.stem for path in self.folder.glob("*.csv"))
-
     # -- stop ------------------------------------------------------------------------------------------------------
 
     def _stop(self, page: Page | None, command: commands.Stop | commands.EStop) -> None:
@@ -313,7 +309,7 @@ class Service:
         """Carry out a command beside what runs."""
         self._pool.submit(self._report, page, tag_of(command), lambda: self.robot.execute(command))
 
-    def _start(self, page: Page, name: str, job: Callable[[], Any]) -> None:
+    def _start(self, page: Page, name: str, job: Job) -> None:
         """Carry out a command after the sliders. Raises Refused while another one runs."""
         with self._lock:
             self._check_free()
@@ -334,9 +330,7 @@ class Service:
             self._idle.clear()
         self._wake.set()
 
-    def _report(
-        self, page: Page | None, name: str, job: Callable[[], Any], end: Callable[[], object] = bool
-    ) -> None:
+    def _report(self, page: Page | None, name: str, job: Job, end: Job = bool) -> None:
         """Run a job, then `end`; the page, without one every page, gets its result or error."""
         message: Done | Failed
         try:
@@ -360,7 +354,7 @@ class Service:
                 elif self._targets:
                     job, self.activity = (None, FOLLOWING, self._follow), FOLLOWING  # type: ignore[assignment]
                 elif self._is_abandoned():
-                    job, self.activity = (None, PARKING, self._park), PARKING  # type: ignore[assignment]
+                    job, self.activity = (None, "shutdown", self._park), "shutdown"  # type: ignore[assignment]
             if job is None:
                 self._end()
             else:
@@ -484,9 +478,10 @@ async def _lead(robot: Robot, names: Sequence[str], feed: Callable[[ControlLoop]
 
 def failed(name: str, error: MotorbusError) -> Failed:
     """An error as a message."""
-    notes = tuple(getattr(error, "__notes__", ()))
     advice = "press Take control" if getattr(error, "reason", "") == "lease" else error.advice
-    return Failed(name, error.summary, error.expected, error.cause, advice, notes)
+    return Failed(
+        name, error.summary, error.expected, error.cause, advice, tuple(getattr(error, "__notes__", ()))
+    )
 
 
 def tag_of(command: Any) -> str:

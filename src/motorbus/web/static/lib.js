@@ -19,7 +19,7 @@ export function number(value, places = 1) {
 
 /** Decimals that fit a unit. */
 export function places(unit) {
-  return unit === "rad" || unit === "m" ? 3 : 1;
+  return { rad: 3, m: 3, turn: 2 }[unit] ?? 1;
 }
 
 /** Save a file on the computer of the user. */
