@@ -17,6 +17,7 @@ import pytest
 import motorbus
 from motorbus import feetech, stepper
 from motorbus.bus.blocking import exchange_on, run_on
+from motorbus.bus.turn import Wake
 from motorbus.core.request import Effect, Request
 from motorbus.core.steps import Exclusive, Sleep, catch, gather
 from motorbus.errors import Interrupted, LinkLost
@@ -374,3 +375,14 @@ def test_two_loops_in_two_threads_use_two_buses(clock: str) -> None:
     for thread in threads:
         thread.join(2 * LIMIT)
     assert sorted(right) == [1, 2]
+
+
+def test_a_sleep_of_a_microsecond_ends() -> None:
+    """The time-out may pass before the thread waits; a SimpleQueue of CPython 3.11 and 3.12 then waits for ever."""
+    for seconds in (3e-7, 1e-6, 2e-6):
+        for _ in range(5_000):
+            wake = Wake()
+            wake.set()
+            wake.set()
+            wake.wait()
+            wake.wait(seconds)

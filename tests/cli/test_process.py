@@ -71,6 +71,12 @@ def moving(served: Simulator) -> bool:
     return '"moving": true' in served.command("status")
 
 
+def until_running(controller: Simulator) -> None:
+    end = time.monotonic() + LIMIT
+    while '"project": 2' not in controller.command("status"):
+        assert time.monotonic() < end, controller.command("status")
+
+
 def until_moving(served: Simulator) -> None:
     end = time.monotonic() + LIMIT
     while time.monotonic() < end:
@@ -88,6 +94,22 @@ def test_estop_stops_a_process_that_holds_the_port(served: Simulator) -> None:
     assert out
     assert process.returncode not in (0, 1), stopped
     assert "emergency stop" in stopped
+
+
+def test_estop_ends_the_run_of_a_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    with simulator(tmp_path / "step", "stepper") as controller:
+        code, _, err = run("stepper", "write", "examples/pick_and_place.toml", controller.address, "--yes")
+        assert code == 0, err
+        with start("stepper", "run", controller.address, "2", "--yes") as process:
+            until_running(controller)
+            code, _, refused = run("stop", controller.address)
+            assert (code, "motorbus estop" in refused) == (4, True)
+            code, _, err = run("estop", controller.address)
+            _, stopped = process.communicate(timeout=LIMIT)
+        assert (code, process.returncode) == (0, 10), err + stopped
+        code, _, err = run("stepper", "write", "examples/pick_and_place.toml", controller.address, "--yes")
+        assert code == 0, err  # the journal has no unfinished run
 
 
 def test_a_second_command_names_the_owner(served: Simulator) -> None:

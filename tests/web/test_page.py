@@ -172,46 +172,64 @@ def test_a_register_is_written_after_a_question(page: Page, served: Served) -> N
 
 def test_the_sketch_has_the_shape_of_the_arm(page: Page) -> None:
     expect(page.get_by_test_id("sketch")).to_be_visible()
-    lines = page.evaluate("async () => (await import('/static/sketch.js')).segments([0, 0, 0, 0, 0, 0])")
-    elbow, wrist = lines[3][0], lines[3][1]
+    lines = page.evaluate("""async () => {
+        const [{ jointsOf, segments }, { link }] = [await import("/static/sketch.js"), await import("/static/link.js")];
+        return segments(jointsOf(link.machine), [0, 0, 0, 0, 0, 0]); }""")
+    elbow, wrist = lines[3]
     assert elbow[2] == pytest.approx(wrist[2], abs=0.006)  # at zero the forearm is level, 0.234 m high
     assert elbow[2] == pytest.approx(0.234, abs=0.01)
 
 
-def test_an_injected_fault_shows(page: Page) -> None:
+def test_the_doctor_finds_an_injected_fault(page: Page) -> None:
     page.get_by_role("tab", name="Faults").click()
+    page.get_by_role("button", name="supply 12").click()
+    page.get_by_label("axis").select_option("gripper")
     page.get_by_role("button", name="unplug", exact=True).click()
     page.get_by_role("tab", name="Axes").click()
-    expect(page.get_by_test_id("axis-base")).to_contain_text("no reply for")
+    expect(page.get_by_test_id("axis-gripper")).to_contain_text("no reply for")
+    page.get_by_role("tab", name="Doctor").click()
+    page.get_by_role("button", name="Examine").click()
+    expect(page.get_by_test_id("finding-device-missing")).to_contain_text("gripper", timeout=30_000)
+    expect(page.get_by_test_id("finding-supply-out-of-range")).to_contain_text("base")
 
 
 def test_the_set_up_is_answered(page: Page, served: Served) -> None:
     page.get_by_role("tab", name="Setup").click()
-    page.get_by_role("button", name="Begin").click()
-    expect(page.get_by_role("tabpanel")).to_contain_text("base: move it by hand")
+    page.get_by_role("button", name="begin verify").click()
+    expect(page.get_by_role("dialog")).to_contain_text("base: ")
     served.faults.inject("arm", "push 1 30deg")
     expect(page.get_by_test_id("notes")).to_contain_text("base moves as named")
-    page.get_by_role("button", name="Pass over").click()
-    expect(page.get_by_role("tabpanel")).to_contain_text("elbow: move it by hand")
+    page.get_by_role("button", name="Enter").click()
+    expect(page.get_by_role("dialog")).to_contain_text("elbow: ")
     page.get_by_role("button", name="End").click()
-    expect(page.get_by_role("button", name="Begin")).to_be_enabled()
+    page.get_by_role("button", name="begin calibrate").click()
+    page.get_by_role("button", name="go").click()
+    expect(page.get_by_role("dialog")).to_contain_text("travel deg")
+    page.get_by_role("button", name="End").click()
+    expect(page.get_by_role("button", name="begin number")).to_be_enabled()
 
 
 def test_no_panel_scrolls_sideways_on_a_phone(browser: Browser, served: Served) -> None:
     page = show(browser, served, 400)
+
+    def check(what: str) -> None:
+        expect(page.locator("#stop")).to_be_in_viewport()
+        page.wait_for_timeout(200)
+        assert page.evaluate("document.documentElement.scrollWidth") <= 400, what
+
     for tab in page.get_by_role("tab").all():
         tab.click()
-        expect(page.locator("#stop")).to_be_in_viewport()
-        page.wait_for_timeout(300)
-        assert page.evaluate("document.documentElement.scrollWidth") <= 400, tab.inner_text()
-    page.close()
-
-
-def test_missing_libraries_are_named(
-    served: Served, browser: Browser, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("motorbus.web.app.LIBRARIES", (*LIBRARIES, "other.mjs"))
-    page = browser.new_page()
-    page.goto(served.server.url)
-    expect(page.locator("body")).to_contain_text("`make assets` fetches them")
+        check(tab.inner_text())
+    page.get_by_role("tab", name="Registers").click()
+    page.get_by_test_id("value-max_temperature").click()
+    check("editor of a register")
+    page.get_by_role("tab", name="Doctor").click()
+    page.get_by_role("button", name="Examine").click()
+    expect(page.get_by_test_id("summary")).to_be_visible(timeout=30_000)
+    check("report of the doctor")
+    page.get_by_role("tab", name="Setup").click()
+    page.get_by_role("button", name="begin calibrate").click()
+    page.get_by_role("button", name="go").click()
+    expect(page.get_by_role("table")).to_be_visible()
+    check("table of the set-up")
     page.close()

@@ -12,7 +12,6 @@ import signal
 from collections import deque
 from collections.abc import Callable, Coroutine, Iterable, Mapping
 from functools import partial
-from queue import SimpleQueue
 from threading import Thread
 from typing import Any, Final, Self, TypeVar
 from weakref import WeakKeyDictionary
@@ -21,6 +20,7 @@ from motorbus.bus.base import BaseBus, check_clocks
 from motorbus.bus.blocking import Part, wait_for
 from motorbus.bus.interrupts import DEFAULTS, SIGNALS
 from motorbus.bus.tasks import Notify, Starting, Tree
+from motorbus.bus.turn import Wake
 from motorbus.core.steps import Runnable, discard
 
 T = TypeVar("T")
@@ -161,7 +161,7 @@ class _Worker:
 
     def __init__(self) -> None:
         self._inbox: deque[Call] = deque()
-        self._wakes: SimpleQueue[None] = SimpleQueue()
+        self._wakes = Wake()
         self._calls: list[Call] = []
         self._parts: dict[BaseBus, Part] = {}
         self._ended = False
@@ -174,8 +174,7 @@ class _Worker:
 
     def wake(self) -> None:
         """Let the thread look at its procedures; from any thread."""
-        if self._wakes.empty():
-            self._wakes.put(None)
+        self._wakes.set()
 
     def end(self) -> None:
         """Let the thread end when its procedures have."""
@@ -186,7 +185,7 @@ class _Worker:
         """Run what is added until `end`; for a thread."""
         while True:
             while not (self._inbox or self._ended):
-                self._wakes.get()
+                self._wakes.wait()
             if not self._inbox:
                 return
             while self._inbox or self._calls:

@@ -8,7 +8,6 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import inf
-from queue import Empty, SimpleQueue
 from threading import get_ident
 from typing import Any, Final, Self, TypeVar
 
@@ -17,6 +16,7 @@ from motorbus.bus.base import IDLE, BaseBus, check_clocks
 from motorbus.bus.engine import PENDING
 from motorbus.bus.interrupts import ELSEWHERE, INTERRUPTS, MAIN, interrupts
 from motorbus.bus.tasks import STEPPING, Notify, Starting, Tree, check_outside, decode
+from motorbus.bus.turn import Wake
 from motorbus.core.register import shown
 from motorbus.core.request import Priority, Request, Response
 from motorbus.core.steps import Runnable, discard, gather
@@ -281,14 +281,13 @@ def run_on(procedures: Mapping[Any, Runnable[Any]]) -> dict[BaseBus, Any]:
 class Part:
     """The procedures of this thread on one bus. `blocked`: another thread had the turn of the bus.
 
-    `sends_at` is when (s) more may be sent. `orders` are carried out when this thread has the turn. An entry of
-    `wakes` ends a sleep.
+    `sends_at` is when (s) more may be sent. `orders` are carried out when this thread has the turn.
     """
 
-    def __init__(self, bus: BaseBus, wakes: SimpleQueue[None] | None = None) -> None:
+    def __init__(self, bus: BaseBus, wakes: Wake | None = None) -> None:
         bus.check_thread()
         self.bus = bus
-        self.wakes: SimpleQueue[None] = wakes or SimpleQueue()
+        self.wakes = wakes or Wake()
         self.trees: list[Tree[Any]] = []
         self.finished = True
         """Every procedure had ended after the last `advance`."""
@@ -313,8 +312,7 @@ class Part:
 
     def wake(self) -> None:
         """End `_sleep`; from any thread."""
-        if self.wakes.empty():
-            self.wakes.put(None)
+        self.wakes.set()
 
     def advance(self, timeout: float) -> bool:
         """Step the trees and send; True when all have ended.
@@ -385,8 +383,7 @@ class Part:
     def _sleep(self, seconds: float) -> None:
         """Sleep this long, or until something that a tree waits for has ended."""
         if not self.orders and not any(tree.ready for tree in self.trees):
-            with contextlib.suppress(Empty):
-                self.wakes.get(timeout=max(0.0, seconds))
+            self.wakes.wait(max(0.0, seconds))
 
 
 def run_parts(parts: Sequence[Part], *, single: bool = False) -> None:

@@ -17,7 +17,10 @@ RETRIES: Final = 2
 
 
 async def carry_out(engine: Engine, request: Request[Any], attempt: Attempt | None = None) -> Response:
-    """The reply to this request; `attempt` is its first one, which has failed. Raises when the last one fails."""
+    """The reply to this request. `attempt` is a first one that has failed. Raises when the last one fails.
+
+    `Sleep(0)` reads the clock.
+    """
     tries, sent = 0, False
     while True:
         if attempt is not None:
@@ -41,9 +44,8 @@ async def carry_out(engine: Engine, request: Request[Any], attempt: Attempt | No
             is_probed = is_probed or failed is None
             if failed is None:
                 continue
-            tries += probes
             if len(request.expected) == 1:  # type: ignore[arg-type]  # never ANY here
-                raise _error(engine, request, failed, tries, sent)
+                raise _error(engine, request, failed, tries + probes, sent)
             excluded += (node,)
         if excluded and len(excluded) == len(request.expected):  # type: ignore[arg-type]
             return Response((), excluded, await Sleep(0))

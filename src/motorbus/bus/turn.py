@@ -1,7 +1,8 @@
-"""The turn of a bus: a lock whose holder alone has requests in flight."""
+"""The turn of a bus: a lock whose holder alone has requests in flight. And what ends the sleep of a thread."""
 
 from __future__ import annotations
 
+import contextlib
 from bisect import insort
 from itertools import count
 from math import inf
@@ -76,3 +77,23 @@ class Turn:
 
     def __exit__(self, *exc: object) -> None:
         self.release()
+
+
+class Wake:
+    """Ends a wait of one thread; `set` is for any thread and for signal handlers.
+
+    The `get` of a SimpleQueue would do, but it waits for ever when its time-out passes too early (CPython 3.11, 3.12).
+    """
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._lock.acquire()
+
+    def set(self) -> None:
+        """End the present wait, or the next one."""
+        with contextlib.suppress(RuntimeError):  # it is set already
+            self._lock.release()
+
+    def wait(self, seconds: float = -1.0) -> None:
+        """Wait until `set`, at most `seconds` (-1: no limit)."""
+        self._lock.acquire(timeout=seconds)

@@ -26,7 +26,7 @@ from motorbus.cli.target import (
     parse_quantity,
     parse_time,
 )
-from motorbus.errors import LinkError, MotorbusError, RequestError, VerificationFailed
+from motorbus.errors import LinkError, MotorbusError, PortBusy, RequestError, VerificationFailed
 from motorbus.motion.commands import DeviceCommand, LoopResult, Move, MoveResult, Pose, StopResult, StopState
 from motorbus.motion.moves import check_reach
 from motorbus.session.address import parse_address
@@ -504,6 +504,8 @@ def _visit(
                         error.summary = f"{name}: {error.summary}"
                         errors.append(error)
         except MotorbusError as error:
+            if method == "stop" and isinstance(error, PortBusy):
+                error.advice = "`motorbus estop BUS` reaches it now, through that program"
             errors.append(error)
     if skipped:
         text = f"{', '.join(skipped)}: the device has no {method.replace('_', ' ')}"

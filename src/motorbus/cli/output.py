@@ -200,6 +200,7 @@ def confirm(question: str, writing: Writing) -> None:
         print(f"{escape(question)}? [y/N] ", end="", file=sys.stderr, flush=True)
         if sys.stdin.readline().strip().lower() in ("y", "yes"):
             return
+        raise NeedsConsent(f"not confirmed: {question}", advice="nothing was changed")
     raise NeedsConsent(f"needs consent: {question}", advice="--yes carries it out; nothing was changed")
 
 

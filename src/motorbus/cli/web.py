@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack, suppress
-from importlib.resources import as_file, files
+from contextlib import ExitStack
+from importlib.resources import files
 from pathlib import Path
-from threading import Event
-from typing import Annotated, Final
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Parameter
-from msgspec import Struct
+from msgspec import Struct, structs
 
 from motorbus.cli.common import Common
 from motorbus.cli.output import emit, note
+from motorbus.cli.target import bus_address, is_address
 from motorbus.errors import RequestError
+
+if TYPE_CHECKING:
+    from motorbus.motion.machine import MachineConfig
 
 LOOPBACK: Final = ("", "127.0.0.1", "localhost")
 
@@ -25,7 +29,7 @@ class Page(Struct, frozen=True, tag="web"):
 
 
 def web(
-    machine: str = "",
+    machine: Annotated[str, Parameter(name="MACHINE|BUS")] = "",
     /,
     *,
     demo: Annotated[bool, Parameter(help="Nine simulated axes; no hardware.")] = False,
@@ -40,6 +44,7 @@ def web(
 
         motorbus web --demo
         motorbus web motorbus.toml
+        motorbus web feetech:/dev/ttyACM0            # a new arm: set it up in the page
         motorbus web --host 0.0.0.0 --token "$(openssl rand -hex 16)"
 
     At the end the machine stops, goes to the pose `park` if there is one, and torque goes off.
@@ -61,20 +66,46 @@ def web(
     with ExitStack() as stack:
         faults = None
         if demo:
-            config = MachineConfig.load(stack.enter_context(as_file(files("motorbus.cli") / "demo.toml")))
-            config, faults = stack.enter_context(simulated(config))
+            file = Path(stack.enter_context(TemporaryDirectory())) / "demo.toml"
+            file.write_bytes((files("motorbus.cli") / "demo.toml").read_bytes())
+            config, faults = stack.enter_context(simulated(MachineConfig.load(file)))
         else:
-            config = MachineConfig.load(machine or common.machine)
-        robot = stack.enter_context(Robot(config))
-        if demo:
-            robot.set_position("slide", 0.0)
-        if any(bus.simulated for bus in robot.buses.values()) and not common.json:
-            note("simulated", once=True)
-        for text in robot.warnings:
-            note(f"note: {text}")
-        stack.callback(robot.shutdown)
-        service = stack.enter_context(Service(robot, Path("recordings"), faults))
-        server = stack.enter_context(Server(service, host=host, port=port, token=token))
-        with suppress(KeyboardInterrupt):
-            emit(Page(server.url), common)
-            Event().wait()
+            config = _machine(machine, common)
+        again = False
+        while True:
+            with ExitStack() as opened:
+                robot = opened.enter_context(Robot(config, None if config.axes else ()))
+                if demo:
+                    robot.set_position("slide", 0.0)
+                if any(bus.simulated for bus in robot.buses.values()) and not common.json:
+                    note("simulated", once=True)
+                for text in robot.warnings:
+                    note(f"note: {text}")
+                parking = opened.enter_context(ExitStack())
+                parking.callback(robot.shutdown)
+                service = opened.enter_context(Service(robot, Path("recordings"), faults))
+                server = opened.enter_context(Server(service, host=host, port=port, token=token))
+                port, token = server.port, server.token
+                try:
+                    if not again:
+                        emit(Page(server.url), common)
+                    service.changed.wait()
+                except KeyboardInterrupt:
+                    return
+                parking.pop_all()
+            again = True
+            changed = MachineConfig.load(config.path)
+            config = structs.replace(changed, buses=config.buses) if demo else changed
+
+
+def _machine(word: str, common: Common) -> MachineConfig:
+    """The machine of a file; of an address with ids; of an arm at an address that has no axes yet."""
+    from motorbus.motion.machine import BusConfig, MachineConfig
+    from motorbus.motion.opening import machine_at
+
+    if not is_address(word):
+        return MachineConfig.load(word or common.machine)
+    address = bus_address(word, common)
+    if "#" in address:
+        return machine_at(address)
+    return MachineConfig(buses={"arm": BusConfig(address)}, path=common.machine)

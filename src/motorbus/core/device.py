@@ -1,4 +1,4 @@
-"""One list of driver functions for a blocking and an async device class.
+"""Methods of blocking and async devices, made from the same driver functions.
 
     class Methods:
         position = device_method(driver.position)
@@ -70,7 +70,7 @@ class AsyncDevice(_Device):
 
     Raises RequestError for a blocking bus, or one of another family.
 
-    A method calls its driver function at once; what that refuses by itself is raised before the `await`.
+    A method calls its driver function at once. A plain driver function raises its refusals before the `await`.
     """
 
     _is_async = True

@@ -18,7 +18,7 @@ BITS: Final = 10  # bits of a byte on the wire: start, eight of data, stop
 
 
 class HalfDuplexSerial(BusDriver):
-    """Base of serial drivers; a subclass adds `receiver probe stop identify axis decode`, its ids and its figures."""
+    """Base of serial drivers; a subclass adds `receiver probe stop identify axis decode`, its ids and its times."""
 
     window = 1
     full_duplex = False
@@ -35,8 +35,8 @@ class HalfDuplexSerial(BusDriver):
     """s in which all devices have replied to a request that expects `ANY`."""
     broadcast_bytes: ClassVar[int] = 1024  # bytes of all these replies
     longest_reply: ClassVar[int] = 256  # bytes
-    longest_gap: ClassVar[float] = 0.040
-    """s that a device, the adapter and the host together may hold back a reply."""
+    longest_delay: ClassVar[float] = 0.040
+    """s by which device, adapter and host together may delay a reply."""
 
     def __init__(self, family: Family) -> None:
         self.family = family
@@ -56,7 +56,7 @@ class HalfDuplexSerial(BusDriver):
         return self.delays[request.reply_within] + self.delay_per_reply * len(request.expected)
 
     def quiet_time(self, rate: int) -> float:
-        return self.longest_reply * BITS / rate + self.longest_gap
+        return self.longest_reply * BITS / rate + self.longest_delay
 
     def echo_test(self) -> Request[Any] | None:
         """A probe: its echo has another length than its reply."""

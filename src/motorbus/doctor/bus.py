@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from statistics import median, quantiles
 from typing import Any, Final, TypeVar
@@ -17,9 +17,9 @@ from motorbus.core.can_frame import ERROR_FLAG, CanFrame
 from motorbus.core.family import Found, Identity, State
 from motorbus.core.findings import Finding, Subject
 from motorbus.core.request import Request
-from motorbus.core.steps import Runnable, Sleep, catch
+from motorbus.core.steps import Runnable, Sleep, catch, discard
 from motorbus.doctor.findings import DeviceHealth
-from motorbus.errors import LinkError, MotorbusError
+from motorbus.errors import Interrupted, LinkError, MotorbusError
 
 T = TypeVar("T")
 
@@ -29,6 +29,7 @@ FEWEST: Final = 20  # of one device
 SLOW_READS: Final = 10  # of a device without a position
 TRIES: Final = 3  # for a device that the scan missed
 LOST: Final = 0.02  # share of reads that may fail
+SAG: Final = 1.5  # V that a device may have less than the others # assumption
 SLOW: Final = 0.008  # s that a read may take beyond its air time
 SLOWEST: Final = 0.1  # s of latency with which a bus is tried whose replies come too late
 LISTEN: Final = 0.3  # s
@@ -37,9 +38,21 @@ TEXT: Final = re.compile(rb"[\t\n\r -~]{12,}")  # of a board that prints a menu
 
 
 class BusDoctor:
-    """The examination of one open bus. `names` are the axes of the machine file by id, `ids` other expected ids."""
+    """The examination of one open bus. `names` are the axes of the machine file by id, `ids` other expected ids.
 
-    def __init__(self, bus: Bus, where: str, names: Mapping[int, str] = {}, ids: Sequence[int] = ()) -> None:
+    It ends with Interrupted once `is_stopped`.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        where: str,
+        names: Mapping[int, str] = {},
+        ids: Sequence[int] = (),
+        *,
+        tries_rates: bool = True,
+        is_stopped: Callable[[], bool] = bool,
+    ) -> None:
         self.bus, self.where, self.names = bus, where, names
         self.chain = list(dict.fromkeys([*names, *ids]))
         self.checks: Any = import_module(bus.family.checks_module)
@@ -50,6 +63,8 @@ class BusDoctor:
         self._records = bus.trace.subscribe(TRACED)
         self._suspects: dict[int, str] = {}
         """Ids that two devices seem to have, and the evidence."""
+        self._tries_rates = tries_rates
+        self._is_stopped = is_stopped
         self._is_can = bus.family.link.kind == "frames"
 
     def add(self, code: str, where: str, evidence: str, cause: str = "", action: str = "") -> None:
@@ -66,8 +81,15 @@ class BusDoctor:
         self._trace += self._records
         return self._trace
 
+    def end(self) -> None:
+        """Stop recording what goes over the wire."""
+        self.bus.trace.unsubscribe(self._records)
+
     def read(self, runnable: Runnable[T]) -> T | MotorbusError:
-        """The value, or the error as a value; a lost port is raised."""
+        """The value, or the error as a value; a lost port is raised, and Interrupted after a stop."""
+        if self._is_stopped():
+            discard(runnable)
+            raise Interrupted("the doctor was stopped", advice="run it again")
         value = self.bus.run(catch(runnable))
         if isinstance(value, LinkError):
             raise value
@@ -148,7 +170,7 @@ class BusDoctor:
 
     def _scan_other_rates(self, ids: Sequence[int]) -> list[Found]:
         others = [rate for rate in self.bus.family.link.rates if rate != self.bus.rate]
-        return self._scan(ids, others) if others else []
+        return self._scan(ids, others) if others and self._tries_rates else []
 
     def _report_rate(self, found: Sequence[Found], where: str) -> None:
         code, option = ("can-wrong-bitrate", "bitrate") if self._is_can else ("wrong-rate", "baud")
@@ -171,7 +193,11 @@ class BusDoctor:
         elif frames:
             self.add("can-mute-node", self.where, f"frames {', '.join([*frames][:6])}, no reply to a read")
         elif self._is_can:
-            self.add("can-silent", self.where, f"no frame in {LISTEN} s, no reply at any rate")
+            self.add(
+                "can-silent",
+                self.where,
+                f"no frame in {LISTEN} s, no reply{' at any rate' * self._tries_rates}",
+            )
         elif text := TEXT.search(stray):
             self.add("adapter-menu", self.where, f"received {text[0].decode().strip()[:40]!r}")
         elif stray:
@@ -179,7 +205,8 @@ class BusDoctor:
             evidence = f"{len(stray)} bytes that are no reply, as {stray[:8].hex(' ').upper()}"
             self.add(code, self.where, evidence)
         else:
-            self.add("bus-silent", self.where, f"no reply, rates tried: {len(self.bus.family.link.rates)}")
+            tried = len(self.bus.family.link.rates) if self._tries_rates else 1
+            self.add("bus-silent", self.where, f"no reply, rates tried: {tried}")
 
     def _check_missing(self, answering: Sequence[int]) -> None:
         missing = [node for node in self.chain if node not in answering]
@@ -198,18 +225,25 @@ class BusDoctor:
             before = self.name(self.chain[first - 1])
             cause = f"the cable after {before}, or the devices after it have no supply"
             fix = f"check the plug between {before} and {self.name(missing[0])}"
+        heard = {one.id & 0x7F for one in self._received() if isinstance(one, CanFrame)}
         for node in missing:
-            self.add("device-missing", self.name(node), evidence, cause, fix)
+            if node in heard:
+                self.add("can-mute-node", self.name(node), "it sends frames, no reply to a read")
+            else:
+                self.add("device-missing", self.name(node), evidence, cause, fix)
 
     def _check_ids(self, answering: Sequence[int]) -> None:
         if len(self._suspects) == len(answering) > 1:
             self._suspects.clear()  # noise disturbs all, a second device only its own id
         for node, evidence in self._suspects.items():
             self.add("duplicate-id", self.name(node), evidence)
-        for node in answering:
-            if self.names and node not in self.names:
-                code = "factory-id" if node == self.checks.FACTORY_ID else "device-unnamed"
-                self.add(code, self.name(node), f"id {node} answers, no axis has it")
+        for node in answering if self.chain else ():
+            if node in self.chain:
+                continue
+            if node == self.checks.FACTORY_ID:
+                self.add("factory-id", self.name(node), f"the factory id {node} answers, it is not expected")
+            elif self.names:
+                self.add("device-unnamed", self.name(node), f"id {node} answers, no axis has it")
 
     # -- line --------------------------------------------------------------------------------------------------
 
@@ -253,9 +287,9 @@ class BusDoctor:
             return
         kinds = ", ".join(f"{count} {kind}" for kind, count in errors.items())
         evidence = f"{failed} of {reads + failed} reads failed ({kinds}), limit {LOST:.0%}"
-        self.add(
-            "replies-lost" if errors["silence"] * 2 > failed else "line-noise", self.name(node), evidence
-        )
+        broken = self._is_can and any(one.id & ERROR_FLAG for one in self._received())
+        is_silent = errors["silence"] * 2 > failed and not broken
+        self.add("replies-lost" if is_silent else "line-noise", self.name(node), evidence)
 
     # -- devices -----------------------------------------------------------------------------------------------
 
@@ -274,10 +308,20 @@ class BusDoctor:
                 subject.add("model-unknown", evidence)
             self._measure(subject)
             self.found += subject.found
+        self._check_supplies()
         for model, firmwares in versions.items():
             if len(firmwares) > 1:
                 shown = "; ".join(f"{firmware}: {', '.join(names)}" for firmware, names in firmwares.items())
                 self.add("firmware-mixed", self.where, f"{model} {shown}")
+
+    def _check_supplies(self) -> None:
+        """A device whose supply is far below that of the others of its model."""
+        for subject in self.subjects.values():
+            own = self.health[subject.where]
+            alike = [one.voltage for one in self.health.values() if one.model == own.model and one.voltage]
+            if own.voltage and own.voltage < (usual := median(alike)) - SAG:
+                evidence = f"supply {own.voltage:.1f} V, of the others {usual:.1f} V"
+                self.add("supply-sag", subject.where, evidence, "a long or thin cable, or a loose plug")
 
     def _run_checks(self, subject: Subject) -> None:
         for check in self.checks.CHECKS:

@@ -1,10 +1,12 @@
-"""Examine buses and machines: open, read, close. Nothing is written to a device."""
+"""Examine buses and machines: open, read, close; or what is open already. Nothing is written to a device."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final, TypeAlias
+
+from msgspec import structs
 
 from motorbus import session
 from motorbus.bus.blocking import Bus
@@ -12,7 +14,7 @@ from motorbus.bus.trace import TraceRecord
 from motorbus.core.findings import Finding
 from motorbus.doctor import machine, trial
 from motorbus.doctor.bus import BusDoctor
-from motorbus.doctor.findings import DeviceHealth, Report, arrange, complete, sort
+from motorbus.doctor.findings import Report, arrange, complete, sort
 from motorbus.errors import LinkError, LinkLost, PortBusy, PortNotFound, RequestError
 from motorbus.motion.machine import MachineConfig
 from motorbus.session.address import parse_address
@@ -29,22 +31,52 @@ def examine_machine(path: str, trace: Trace, rate: float = 0.0) -> Report:
     except RequestError as error:
         fix = error.advice or (f"write {error.expected}" if error.expected else "")
         return Report(path, (complete(Finding("machine-file", path, error.summary, action=fix), path),))
-    found: list[Finding] = []
-    devices: dict[str, DeviceHealth] = {}
-    simulated = True
+    parts = []
     for name, bus in config.buses.items():
-        axes = {axis.node: one for one, axis in config.axes.items() if axis.bus == name}
-        part = _examine(bus.address, name, trace, rate, names=axes, config=config)
-        found += part.findings
-        devices |= part.devices
-        simulated = simulated and part.simulated
-    return Report(path, tuple(sort(found)), devices, simulated)
+        parts.append(_examine(bus.address, name, trace, rate, names=_names(config, name), config=config))
+    return _join(path, parts)
 
 
 def examine_bus(address: str, trace: Trace, rate: float = 0.0) -> Report:
     """The bus of an address, `FAMILY:PORT`, with the expected ids behind #. Raises RequestError for a bad one."""
     spot = parse_address(address)
     return _examine(spot.bus, spot.bus, trace, rate, ids=spot.nodes)
+
+
+def examine_open(config: MachineConfig, buses: Mapping[str, Bus], is_stopped: Callable[[], bool]) -> Report:
+    """The open buses of a machine; they refuse all but reads meanwhile.
+
+    Silent devices are not searched at other rates, and settings in RAM are not judged: they may be from here.
+    A stop on another thread must clear `read_only` of each bus first. Raises Interrupted once `is_stopped`.
+    """
+    parts = []
+    try:
+        for bus in buses.values():
+            bus.read_only = True
+        for name, bus in buses.items():
+            latency = bus.latency
+            doctor = BusDoctor(bus, name, _names(config, name), tries_rates=False, is_stopped=is_stopped)
+            try:
+                part = _report(doctor, config)
+                found = tuple(one for one in part.findings if one.code != "settings-left")
+                parts.append(structs.replace(part, findings=found))
+            finally:
+                bus.latency = latency
+                doctor.end()
+    finally:
+        for bus in buses.values():
+            bus.read_only = False
+    return _join(config.name or config.path, parts)
+
+
+def _names(config: MachineConfig, bus: str) -> dict[int, str]:
+    return {axis.node: name for name, axis in config.axes.items() if axis.bus == bus}
+
+
+def _join(target: str, parts: Sequence[Report]) -> Report:
+    found = sort(one for part in parts for one in part.findings)
+    devices = {name: one for part in parts for name, one in part.devices.items()}
+    return Report(target, tuple(found), devices, all(part.simulated for part in parts))
 
 
 def _examine(
@@ -62,17 +94,26 @@ def _examine(
         return Report(where, (complete(bus, where),))
     with bus:
         doctor = BusDoctor(bus, where, names, ids)
-        try:
-            doctor.examine()
-            machine.check_journal(doctor)
-            if config is not None:
-                machine.check_axes(doctor, config)
-            if rate:
-                trial.measure_loop(doctor, rate)
-        except LinkError as error:
-            doctor.found.append(_of_port(error, where))
+        report = _report(doctor, config, rate)
         trace[where] = doctor.trace
-    return Report(where, tuple(arrange(doctor.found, where)), doctor.health, bus.simulated)
+    return report
+
+
+def _report(doctor: BusDoctor, config: MachineConfig | None, rate: float = 0.0) -> Report:
+    try:
+        doctor.examine()
+        machine.check_journal(doctor)
+        if config is not None:
+            machine.check_axes(doctor, config)
+        else:
+            machine.check_saved(doctor)
+        if rate:
+            trial.measure_loop(doctor, rate)
+    except LinkError as error:
+        doctor.found.append(_of_port(error, doctor.where))
+    return Report(
+        doctor.where, tuple(arrange(doctor.found, doctor.where)), doctor.health, doctor.bus.simulated
+    )
 
 
 # -- host -----------------------------------------------------------------------------------------------------

@@ -38,7 +38,6 @@ def check_axes(doctor: BusDoctor, machine: MachineConfig) -> None:
         bus_options(machine, bus)
     except RequestError as error:
         doctor.add("axis-mismatch", bus, error.summary, "the family lacks this stop")
-    offsets: dict[str, int] = {}
     for node, name in doctor.names.items():
         subject = doctor.subjects.get(node)
         if subject is None or not subject.identity.table:
@@ -50,11 +49,9 @@ def check_axes(doctor: BusDoctor, machine: MachineConfig) -> None:
         if not axis.is_wheel and "position" in driver:
             _check_limits(doctor, subject, axis, driver)
         doctor.found += subject.found
-        if "homing_offset" in doctor.bus.family.registers.get(subject.identity.table, {}):
-            raw = doctor.read(type(subject.device).read_raw.function(subject.device, "homing_offset"))
-            if not isinstance(raw, MotorbusError):
-                offsets[name.removeprefix(f"{bus}_")] = raw["homing_offset"]
-    _check_owner(doctor, offsets)
+    joints = {name.removeprefix(f"{bus}_"): node for node, name in doctor.names.items()}
+    offsets = _read_offsets(doctor)
+    _check_owner(doctor, {joint: offsets[node] for joint, node in joints.items() if node in offsets})
 
 
 def _check_fit(subject: Subject, axis: AxisConfig, driver: AxisDriver) -> None:
@@ -109,6 +106,34 @@ def saved_calibrations() -> dict[str, dict[str, JointCalibration]]:
         except RequestError:
             continue  # of a robot of another kind
     return found
+
+
+def _read_offsets(doctor: BusDoctor) -> dict[int, int]:
+    """The homing offsets (counts) of the devices that have one, by id."""
+    offsets = {}
+    for node, subject in doctor.subjects.items():
+        if "homing_offset" in doctor.bus.family.registers.get(subject.identity.table, {}):
+            raw = doctor.read(type(subject.device).read_raw.function(subject.device, "homing_offset"))
+            if not isinstance(raw, MotorbusError):
+                offsets[node] = raw["homing_offset"]
+    return offsets
+
+
+def check_saved(doctor: BusDoctor) -> None:
+    """A bus without a machine file: devices that differ from the saved calibration that fits most of them."""
+    saved = saved_calibrations()
+    offsets = _read_offsets(doctor) if saved else {}
+    candidates = []
+    for name, calibration in saved.items():
+        if offsets.keys() == {one.id for one in calibration.values()}:
+            own = {joint: offsets[one.id] for joint, one in calibration.items()}
+            candidates.append((name, calibration, lerobot.differences(own, calibration)))
+    if not candidates:
+        return
+    name, calibration, differing = min(candidates, key=lambda one: len(one[2]))
+    for joint, (found, wanted) in differing.items() if 2 * len(differing) < len(offsets) else ():
+        evidence = f"homing offset of {joint} {found}, saved {wanted} in {name}"
+        doctor.add("calibration-other", doctor.name(calibration[joint].id), evidence)
 
 
 def _check_owner(doctor: BusDoctor, offsets: Mapping[str, int]) -> None:

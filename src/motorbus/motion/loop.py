@@ -12,7 +12,7 @@ from msgspec import Struct
 from motorbus.bus.base import BaseBus
 from motorbus.core.family import Positions, PositionStream
 from motorbus.core.request import Precondition, Request, SetpointGroup, SetpointWrite, Stops
-from motorbus.core.steps import Guard, catch, discard, gather
+from motorbus.core.steps import Guard, Sleep, catch, discard, gather
 from motorbus.core.stream import read_positions
 from motorbus.errors import Interrupted, LimitExceeded, MotorbusError, NoReply, Refused, RequestError
 from motorbus.motion.axis import FRESH, Axis, by_bus, name_axis, on_axes
@@ -32,6 +32,7 @@ CATCH_UP: Final = 3  # periods that a late cycle makes good by one longer step
 MIN_RATE: Final = 4.0  # Hz; goals are one period ahead
 MAX_RATE: Final = 1000.0  # Hz
 USUAL_RATE: Final = 100.0  # Hz
+LEAD: Final = 0.002  # s from the end of `wait` to the slot
 WIRE_SHARE: Final = 0.7  # of what the wire carries, for a rate that is chosen here
 ENTRY_TRIES: Final = 5  # reads in which each axis must answer once
 
@@ -260,6 +261,12 @@ class ControlLoop(Guard):
         batches = {group.bus: group.reads for group in self.groups if group.reads}
         return await Exchange(batches) if batches else {}
 
+    async def wait(self) -> None:
+        """Wait until 2 ms before the next slot: a target that is set then is sent in that slot."""
+        pause = self._next + 1 / self.rate - LEAD - self.machine.now()
+        if self.slot >= 0 and pause > 0:
+            await OnBuses({self.groups[0].bus: Sleep(pause)})
+
     async def cycle(self) -> LoopState:
         """Send the next goals in the next slot of the grid, read all positions, publish the state."""
         await self._begin()
@@ -273,6 +280,7 @@ class ControlLoop(Guard):
         }
         for bus, requests in once.items():
             batches[bus] = [*requests, *batches.get(bus, ())]
+        # Without any request the exchange still waits for the slot.
         values = await Exchange(
             {bus: batch for bus, batch in batches.items() if batch} or batches, self._next
         )

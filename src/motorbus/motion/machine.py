@@ -27,6 +27,9 @@ Names: TypeAlias = "str | Iterable[str] | None"  # of axes, groups and buses; No
 FORMAT: Final = 1
 NAME: Final = "^[a-z][a-z0-9_-]{0,39}$"
 DEVICE: Final = r"^[a-z][a-z0-9_-]*#(0[xX][0-9a-fA-F]+|[0-9]+)$"
+NUMBERS: Final = r"(-?[0-9]+(\.[0-9]+)? ){3}"
+PLACE: Final = f"^{NUMBERS}mm$"
+FRAME: Final = f"^{NUMBERS}mm, {NUMBERS}deg$"
 LARGEST: Final = 1e6  # of a number in API units
 SLACK: Final = 1e-9  # rounding of a limit that went to the device and back
 WHEEL_EXITS: Final = ("stop", "torque_off", "leave")
@@ -136,6 +139,15 @@ class AxisConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Annotated[float, Meta(gt=0, le=1)] | None, Meta(description="share of the full torque")
     ] = None
     monitor_load: Annotated[bool, Meta(description="overload and heat end a movement")] = True
+    parent: Annotated[str | None, Meta(description="for the sketch: the axis that carries it")] = None
+    frame: Annotated[
+        Annotated[str, Meta(pattern=FRAME)] | None,
+        Meta(description='for the sketch: place and roll, pitch, yaw on its parent, "0 0 62 mm, 0 0 90 deg"'),
+    ] = None
+    tip: Annotated[
+        Annotated[str, Meta(pattern=PLACE)] | None,
+        Meta(description='for the sketch: end of the part that it moves, "0 0 98 mm"'),
+    ] = None
 
     @property
     def bus(self) -> str:
@@ -292,6 +304,7 @@ class MachineConfig(Struct, frozen=True, kw_only=True):
                 raise RequestError(f"{where}.device: {axis.device} belongs to axis.{other}")
             owners[axis.bus, axis.node] = name
             _check_axis(where, axis)
+            self._check_parents(name)
             if axis.exit == "park" and name not in self.poses.get("park", {}):
                 raise RequestError(f'{where}.exit: "park" needs its position in [pose.park]')
         for name, members in self.groups.items():
@@ -307,6 +320,15 @@ class MachineConfig(Struct, frozen=True, kw_only=True):
                 _check_kind(where, axis, place)
                 if not axis.allows(place):
                     raise RequestError(f"{where}: {axis.show(place)} is outside the limits of the axis")
+
+    def _check_parents(self, name: str) -> None:
+        above = [name]
+        while (parent := self.axes[above[-1]].parent) is not None:
+            if parent in above or parent not in self.axes or not self.axes[parent].frame:
+                raise RequestError(
+                    f"axis.{above[-1]}.parent: {shown(parent)}", expected="an axis with a frame, not below it"
+                )
+            above.append(parent)
 
     def _axis(self, where: str, name: str) -> AxisConfig:
         if name not in self.axes:

@@ -42,17 +42,20 @@ def machine_at(address: str, max_velocity: float = USUAL_VELOCITY) -> MachineCon
 
 
 def select(config: MachineConfig, names: Names) -> MachineConfig:
-    """The machine with these axes only, and what needs no other one. Raises RequestError for an unknown name."""
+    """The machine with these axes only, and what needs no other one; with () no axis and all buses.
+
+    Raises RequestError for an unknown name.
+    """
     wanted = config.axes_of(names)
     used = {config.axes[name].bus for name in wanted}
-    if not wanted:
+    if not wanted and names is None:
         raise RequestError(
             "the machine has no axis", advice="add [axis.NAME]; `motorbus init BUS` writes a file"
         )
     return structs.replace(
         config,
         axes={name: config.axes[name] for name in wanted},
-        buses={name: bus for name, bus in config.buses.items() if name in used},
+        buses={name: bus for name, bus in config.buses.items() if name in used or not wanted},
         groups={name: axes for name, axes in config.groups.items() if set(axes) <= set(wanted)},
         poses={name: pose for name, pose in config.poses.items() if set(pose) <= set(wanted)},
     )

@@ -60,10 +60,11 @@ class Subscription:
         self._changed = Condition()
 
     def put(self, state: RobotState) -> None:
-        """Add a state, unless the last one is too young."""
+        """Add a state, unless it comes before its turn."""
         if state.at < self._next:
             return
-        self._next = state.at + self._period * 0.999
+        # A late state does not delay the next one.
+        self._next = max(self._next + self._period, state.at + self._period / 2)
         with self._changed:
             self.dropped += len(self._states) == self._states.maxlen
             self._states.append(state)
@@ -109,7 +110,7 @@ class OpenMachine:
 
     def chosen(self, names: Names = None) -> list[Axis]:
         """The axes of these names of axes, groups and buses; None means all. Raises RequestError."""
-        if not self.axes:
+        if not self.buses:
             raise RequestError("the machine is not open", advice="use `with Robot.load(…)`")
         return [self.axes[name] for name in self.config.axes_of(names)]
 
@@ -196,7 +197,7 @@ async def poll(machine: OpenMachine) -> None:
 class AxisDescription(Struct, frozen=True):
     """One axis. Positions in rad (m), velocities in rad/s (m/s); `low` and `high` None without a limit.
 
-    `commands` are the functions of its device.
+    `commands` are the functions of its device. `parent`, `frame` and `tip` are those of the machine file.
     """
 
     device: str
@@ -210,6 +211,9 @@ class AxisDescription(Struct, frozen=True):
     exit: str
     estop: str
     commands: tuple[str, ...]
+    parent: str | None = None
+    frame: str | None = None
+    tip: str | None = None
 
 
 class BusDescription(Struct, frozen=True):
@@ -261,4 +265,7 @@ def _describe_axis(axis: Axis) -> AxisDescription:
         exit=config.exit_action,
         estop=config.estop or (stops[0] if stops else "stop"),
         commands=tuple(sorted(axis.driver.names)),
+        parent=config.parent,
+        frame=config.frame,
+        tip=config.tip,
     )

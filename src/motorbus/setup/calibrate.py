@@ -97,6 +97,13 @@ def calibrate(bus: Bus, preset: Preset, names: Sequence[str] = ()) -> Steps[dict
 
     Raises NoReply for a joint that is silent, RequestError for an unknown name.
     """
+    found = yield from measure(bus, preset, names)
+    yield from write(bus, found)
+    return found
+
+
+def measure(bus: Bus, preset: Preset, names: Sequence[str] = ()) -> Steps[dict[str, JointCalibration]]:
+    """Sweep these joints by hand; they go limp, nothing else is written. Raises as `calibrate`."""
     joints = [preset.joint(name) for name in names] or list(preset.joints)
     for joint in joints:
         feetech.Servo(bus, joint.id).disable_torque()
@@ -105,16 +112,16 @@ def calibrate(bus: Bus, preset: Preset, names: Sequence[str] = ()) -> Steps[dict
         sweeps = yield from _sweep(bus, joints)
         problems = [problem for joint in joints if (problem := judge(joint, sweeps[joint.name]))]
         if not problems:
-            break
+            return {joint.name: solve(joint, sweeps[joint.name]) for joint in joints}
         for problem in problems:
             yield Note(problem, warning=True)
-    found = {joint.name: solve(joint, sweeps[joint.name]) for joint in joints}
-    for name, calibration in found.items():
-        apply(bus, calibration)
-        yield Note(
-            f"{name}: offset {calibration.homing_offset}, {calibration.range_min} to {calibration.range_max}"
-        )
-    return found
+
+
+def write(bus: Bus, calibration: Mapping[str, JointCalibration]) -> Steps[None]:
+    """Write offsets and limits of these joints to their servos."""
+    for name, one in calibration.items():
+        apply(bus, one)
+        yield Note(f"{name}: offset {one.homing_offset}, {one.range_min} to {one.range_max}")
 
 
 def _sweep(bus: Bus, joints: Sequence[Joint]) -> Steps[dict[str, Sweep]]:

@@ -29,8 +29,11 @@ def axes_of(
         if one.drive_mode:
             table["sign"] = -1
         table |= {"low": f"{-reach:.2f} deg", "high": f"{reach:.2f} deg", "max_velocity": preset.max_velocity}
-        if joint.max_torque is not None:
-            table["max_torque"] = joint.max_torque
+        optional: dict[str, Any] = {"max_torque": joint.max_torque}
+        if joint.parent is None or joint.parent in calibration:
+            parent = joint.parent and axis_name(arm, joint.parent)
+            optional |= {"parent": parent, "frame": joint.frame, "tip": joint.tip}
+        table |= {key: value for key, value in optional.items() if value is not None}
         axes[axis_name(arm, joint.name)] = table
     return axes
 
@@ -61,6 +64,19 @@ def update(
     machine = MachineConfig.parse(text, str(path))
     path.write_text(text, "utf-8")
     return machine
+
+
+def recalibrated(path: Path, preset: Preset, calibration: Mapping[str, JointCalibration]) -> str:
+    """The text of a machine file with other zero, low and high of these axes, which are joints of `preset`.
+
+    Raises RequestError if it is no machine then, as by a pose outside of the new limits.
+    """
+    changes = {
+        f"axis.{name}.{key}": table[key]
+        for name, table in axes_of(preset, calibration, "arm").items()
+        for key in ("zero", "low", "high")
+    }
+    return edit(path.read_text("utf-8"), changes)
 
 
 def calibration_of(

@@ -11,24 +11,20 @@ import ipaddress
 import secrets
 import socket
 from contextlib import suppress
-from http.cookies import CookieError, SimpleCookie
 from pathlib import Path
 from threading import Thread
 from time import monotonic
 from typing import Any, Final, Self
-from urllib.parse import parse_qs
 
 import msgspec
 import uvicorn
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
-from starlette.datastructures import Headers, MutableHeaders
-from starlette.requests import Request
+from starlette.requests import HTTPConnection, Request
 from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Receive, Scope, Send
-from starlette.types import Message as AsgiMessage
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from motorbus.core import units
@@ -68,30 +64,27 @@ class Guard:
         self._any_address = bool(host)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] not in ("http", "websocket"):
-            return
-        headers = Headers(scope=scope)
-        refusal = self._refuse(scope, headers)
-        if refusal is None:
-            await self.app(scope, receive, _with_headers(send))
+        response = self._refuse(HTTPConnection(scope))
+        if response is None:
+            await self.app(scope, receive, send)
         elif scope["type"] == "http":
-            await refusal(scope, receive, _with_headers(send))
+            await response(scope, receive, send)
         else:
             await send({"type": "websocket.close", "code": 1008})
 
-    def _refuse(self, scope: Scope, headers: Headers) -> Response | None:
-        host = headers.get("host", "")
-        origin = headers.get("origin")
+    def _refuse(self, asked: HTTPConnection) -> Response | None:
+        host, origin = asked.headers.get("host", ""), asked.headers.get("origin")
+        is_socket = asked.scope["type"] == "websocket"
         if not self._is_own(host):
             return PlainTextResponse("This Host is not served here.\n", 403)
-        if origin != f"http://{host}" and (origin is not None or scope["type"] == "websocket"):
+        if origin != f"http://{host}" and (origin is not None or is_socket):
             return PlainTextResponse("This Origin may not use the page.\n", 403)
-        given = parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[-1]
-        if scope["type"] == "http" and scope["path"] == "/" and self._is_token(given):
+        given = asked.query_params.get("token", "")
+        if asked.scope["path"] == "/" and not is_socket and self._is_token(given):
             response = RedirectResponse("/", 303)
             response.set_cookie(self.cookie, given, httponly=True, samesite="strict")
             return response
-        if not self._is_token(_cookie(headers, self.cookie)):
+        if not self._is_token(asked.cookies.get(self.cookie, "")):
             return PlainTextResponse("Open the address that `motorbus web` has printed.\n", 401)
         return None
 
@@ -110,28 +103,11 @@ class Guard:
         return secrets.compare_digest(given.encode(), self.token)
 
 
-def _cookie(headers: Headers, name: str) -> str:
-    cookies: SimpleCookie = SimpleCookie()
-    with suppress(CookieError):
-        cookies.load(headers.get("cookie", ""))
-    return cookies[name].value if name in cookies else ""
-
-
-def _with_headers(send: Send) -> Send:
-    async def sending(message: AsgiMessage) -> None:
-        if message["type"] == "http.response.start":
-            MutableHeaders(scope=message).update(HEADERS)
-        await send(message)
-
-    return sending
-
-
 class Routes:
     """What the page asks for. No GET sends a byte to a device but `/registers`, which reads."""
 
     def __init__(self, service: Service) -> None:
         self._service = service
-        self._pages = 0
         self.app = Starlette(
             routes=[
                 Route("/", self.index),
@@ -156,17 +132,10 @@ class Routes:
     async def describe(self, request: Request) -> Response:
         """The machine, the scale of each unit, the simulated buses in which faults can be injected."""
         robot = self._service.robot
-        scales = {
-            unit: scale for kind in ("position", "length") for unit, scale in units.SCALES[kind].items()
-        }
-        return _json(
-            {
-                "machine": robot.describe(),
-                "scales": scales,
-                "demo": self._service.demo is not None,
-                "warnings": robot.warnings,
-            }
-        )
+        scales = {**units.SCALES["position"], **units.SCALES["length"]}
+        has_faults = self._service.demo is not None
+        description = {"machine": robot.describe(), "warnings": robot.warnings}
+        return _json({**description, "scales": scales, "demo": has_faults})
 
     async def registers(self, request: Request) -> Response:
         """The registers of an axis."""
@@ -178,26 +147,22 @@ class Routes:
 
     async def recordings(self, request: Request) -> Response:
         """The names of the recordings."""
-        return _json(self._service.recordings())
+        return _json(sorted(path.stem for path in self._service.folder.glob("*.csv")))
 
     async def socket(self, connection: WebSocket) -> None:
         """A page: its messages, and the states for it."""
-        if self._pages >= MAX_PAGES:
+        if len(self._service.pages) >= MAX_PAGES:
             await connection.close(1013)
             return
-        self._pages += 1
+        await connection.accept()
         page = Page(asyncio.get_running_loop())
+        self._service.join(page)
+        sender = asyncio.create_task(_send(connection, page))
         try:
-            await connection.accept()
-            self._service.join(page)
-            sender = asyncio.create_task(_send(connection, page))
-            try:
-                await self._receive(connection, page)
-            finally:
-                sender.cancel()
-                self._service.leave(page)
+            await self._receive(connection, page)
         finally:
-            self._pages -= 1
+            sender.cancel()
+            self._service.leave(page)
 
     async def _receive(self, connection: WebSocket, page: Page) -> None:
         allowance, at = float(RATE), monotonic()
@@ -247,14 +212,14 @@ class Server:
         self.token: Final = token or secrets.token_urlsafe(16)
         shown = socket.gethostname() if host in ("0.0.0.0", "::") else host or "127.0.0.1"
         self.url: Final = f"http://{shown}:{self.port}/?token={self.token}"
-        own = shown if host else ""
         config = uvicorn.Config(
-            Guard(Routes(service).app, token=self.token, host=own, port=self.port),
+            Guard(Routes(service).app, token=self.token, host=shown if host else "", port=self.port),
             ws="websockets-sansio",
             ws_max_size=MAX_MESSAGE,
             ws_per_message_deflate=False,
             log_level="error",
             lifespan="off",
+            headers=list(HEADERS.items()),
             server_header=False,
             timeout_graceful_shutdown=1,
         )

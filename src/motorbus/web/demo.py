@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from typing import Any, Final
+from typing import Any
 
 from msgspec import structs
 
@@ -14,8 +14,6 @@ from motorbus.motion.machine import BusConfig, MachineConfig
 from motorbus.session.address import parse_address
 from motorbus.simulation.control import carry_out
 from motorbus.simulation.named import Simulation
-
-FAULTS: Final = "faults"
 
 
 class SimulatedMachine:
@@ -30,7 +28,7 @@ class SimulatedMachine:
             raise RequestError(f"no simulated bus {bus!r}", expected=f"one of {', '.join(self._buses)}")
         simulation = self._buses[bus]
         word, _, script = order.partition(" ")
-        if word == FAULTS and script:
+        if word == "faults" and script:
             simulation.faults = "" if script == "off" else script
             return {"ok": True, "faults": str(simulation.faults.script)}
         reply = carry_out(simulation, order)  # type: ignore[arg-type]  # it needs the simulator only

@@ -48,12 +48,8 @@ class JogStart(Struct, frozen=True, tag="jog_start"):
     stops: int
 
 
-class JogEnd(Struct, frozen=True, tag="jog_end"):
-    """The button was released."""
-
-
-class Finish(Struct, frozen=True, tag="finish"):
-    """End a recording."""
+class Release(Struct, frozen=True, tag="release"):
+    """The button of a jog was released, or a recording ends."""
 
 
 class Inject(Struct, frozen=True, tag="inject"):
@@ -63,20 +59,27 @@ class Inject(Struct, frozen=True, tag="inject"):
     order: str
 
 
-class Verify(Struct, frozen=True, tag="verify"):
-    """Verify the axes of a bus by hand; its steps, `Note` and `Live` of `setup.engine`, go to this page."""
+class SetUp(Struct, frozen=True, tag="setup"):
+    """Set up joints of a FEETECH bus, () means all. Its `Prompt`, `Live` and `Note` go to every page."""
 
+    kind: Literal["number", "calibrate", "verify"]
     bus: str
+    names: tuple[str, ...] = ()
 
 
 class Answer(Struct, frozen=True, tag="answer"):
-    """The text of the user for the present step; "" for Enter."""
+    """The text of the user for the step with the text `question`; "" for Enter."""
 
+    question: str
     text: str = ""
 
 
+class Examine(Struct, frozen=True, tag="doctor"):
+    """Run the doctor on the open machine; its report is the result."""
+
+
 PageMessage: TypeAlias = (
-    Heartbeat | Take | Leave | Target | JogStart | JogEnd | Finish | Inject | Verify | Answer
+    Heartbeat | Take | Leave | Target | JogStart | Release | Inject | SetUp | Answer | Examine
 )
 PageCommand: TypeAlias = (
     commands.Move
@@ -133,6 +136,7 @@ class Failed(Struct, frozen=True, tag="failed"):
 
 
 class Notice(Struct, frozen=True, tag="notice"):
-    """A text for every page."""
+    """A text for every page. `reopens`: the server opens the machine again, then the page must load itself."""
 
     text: str
+    reopens: bool = False

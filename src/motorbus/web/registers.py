@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Final
 
 from msgspec import Struct
 
 from motorbus.core.register import Register, RegisterMap
 from motorbus.errors import MotorbusError
-from motorbus.motion.axis import Axis
 from motorbus.motion.commands import ReadRegisters
 from motorbus.motion.program import run
 from motorbus.motion.robot import Robot
+
+SAME: Final = ("name", "address", "unit", "choices", "bits", "readable", "source")
 
 
 class RegisterRow(Struct, frozen=True):
@@ -24,8 +26,8 @@ class RegisterRow(Struct, frozen=True):
     low: float
     high: float
     default: float | None
-    choices: dict[str, str]
-    bits: dict[str, str]
+    choices: Mapping[int, str]
+    bits: Mapping[int, str]
     storage: str
     readable: bool
     writable: bool
@@ -47,8 +49,9 @@ class RegisterTable(Struct, frozen=True):
 def read_table(robot: Robot, name: str) -> RegisterTable:
     """Read all registers of the device of an axis. Only reads are sent. Raises RequestError for an unknown axis."""
     axis = robot.axis(name)
-    table = _map_of(robot, axis)
-    if table is None:
+    identity = robot.carry_out(run(axis.bus, axis.bus.driver.identify(axis.config.node)))
+    table: RegisterMap | None = getattr(axis.device, "table", None)
+    if table is None and (table := axis.bus.family.registers.get(identity.table)) is None:
         return RegisterTable(name, "", (), f"{axis.config.device} has no registers")
     values: dict[str, Any] = {}
     error = ""
@@ -61,28 +64,17 @@ def read_table(robot: Robot, name: str) -> RegisterTable:
     return RegisterTable(name, table.title, rows, error)
 
 
-def _map_of(robot: Robot, axis: Axis) -> RegisterMap | None:
-    identity = robot.carry_out(run(axis.bus, axis.bus.driver.identify(axis.config.node)))
-    table = getattr(axis.device, "table", None)
-    return table if table is not None else axis.bus.family.registers.get(identity.table)
-
-
 def _row(row: Register, value: Any) -> RegisterRow:
+    same = {name: getattr(row, name) for name in SAME}
     return RegisterRow(
-        name=row.name,
-        address=row.address,
-        unit=row.unit,
+        **same,
         step=row.scale if row.unit else 1,
         low=row.to_value(row.low),
         high=row.to_value(row.high),
         default=None if row.default is None else row.to_value(row.default),
-        choices={str(code): text for code, text in row.choices.items()},
-        bits={str(bit): text for bit, text in row.bits.items()},
         storage=row.storage.value,
-        readable=row.readable,
         writable=row.writable and not row.protected,
         effect=row.effect.name.lower(),
-        source=row.source,
         note=" ".join(filter(None, (row.note, row.conflict))),
         value=None if value is None else float(value),
     )

@@ -13,21 +13,25 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from math import isfinite
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from re import fullmatch
 from threading import Event, Lock, Thread
 from time import monotonic
-from typing import Any, Final, Protocol, Self
+from typing import Any, Final, Self, TypeAlias
 
 import msgspec
 from msgspec import Struct, structs
 
+from motorbus.doctor.examine import examine_open
 from motorbus.errors import Interrupted, MotorbusError, Refused, RequestError
 from motorbus.motion import commands
 from motorbus.motion.loop import ControlLoop
 from motorbus.motion.moves import StopsIfInterrupted
 from motorbus.motion.robot import Robot
+from motorbus.setup.engine import Live, Note, Prompt, Step, run
+from motorbus.setup.opened import PROCEDURES
 from motorbus.web import messages
-from motorbus.web.guide import PageFace, verify_axes
+from motorbus.web.demo import SimulatedMachine
 from motorbus.web.messages import Control, Done, Failed, Frame, Message, Notice
 
 LOG: Final = logging.getLogger("motorbus.web")
@@ -38,16 +42,11 @@ SILENT: Final = 1.0  # s without a position; such an axis is left out of the loo
 QUIET: Final = 1.0  # s at rest without a new target after which the loop of the sliders ends
 STOP_TRIES: Final = 10
 STOP_WAIT: Final = 0.2  # s until a stop is repeated
+SHOW: Final = 0.1  # s between two live tables of a set-up
+LOOK: Final = 0.2  # s between two looks at a stop while the user thinks
 LONGEST_JOG: Final = 10.0  # s of a jog that the device times itself
 FOLLOWING: Final = "follow"  # activity while sliders lead axes
-PARKING: Final = "shutdown"
-
-
-class Demo(Protocol):
-    """What carries out `Inject`."""
-
-    def inject(self, bus: str, order: str) -> dict[str, Any]:
-        """Carry out an order to a simulated bus; gives its reply."""
+Job: TypeAlias = Callable[[], Any]
 
 
 class Page:
@@ -61,7 +60,7 @@ class Page:
 
     def put(self, message: Struct) -> None:
         """Send a message."""
-        self._events.append(msgspec.json.encode(message, enc_hook=_plain))
+        self._events.append(msgspec.json.encode(message, enc_hook=str))
         self._wake()
 
     def show(self, frame: bytes) -> None:
@@ -84,23 +83,61 @@ class Page:
         return texts
 
 
+class PageFace:
+    """A `Face`: steps go to `put`, answers of the user come by `answer`. A stop ends the procedure."""
+
+    def __init__(self, put: Callable[[Struct], None], is_stopped: Callable[[], bool]) -> None:
+        self.step: Prompt | Live | None = None
+        self._answers: SimpleQueue[str] = SimpleQueue()
+        self._put = put
+        self._is_stopped = is_stopped
+        self._shown = 0.0
+
+    def answer(self, question: str, text: str) -> None:
+        """The user answers the step with this text; dropped when another one is shown by now."""
+        if self.step is not None and question == self.step.text:
+            self._answers.put(text)
+
+    def show(self, step: Step) -> str | None:
+        """Show a step; waits for the answer of a prompt. Raises Interrupted after a stop."""
+        if isinstance(step, Note):
+            self._put(step)
+            return None
+        if self.step is None or step.text != self.step.text:
+            self._answers = SimpleQueue()
+        self.step = step
+        if isinstance(step, Prompt) or monotonic() - self._shown > SHOW:
+            self._shown = monotonic()
+            self._put(step)
+        while True:
+            if self._is_stopped():
+                raise Interrupted("the set-up was stopped", advice="begin it again")
+            try:
+                return self._answers.get(timeout=LOOK if isinstance(step, Prompt) else 0.0)
+            except Empty:
+                if isinstance(step, Live):
+                    return None
+
+
 class Service:
     """Carries out the messages of pages, and sends them the states of the robot. Use it in a `with`.
 
-    `folder` has the recordings. Its end stops what moves; the robot stays open.
+    `folder` has the recordings. Its end stops what moves; the robot stays open. `changed` is set when a calibration has
+    changed the machine file: open the machine again.
     """
 
-    def __init__(self, robot: Robot, folder: Path, demo: Demo | None = None) -> None:
+    def __init__(self, robot: Robot, folder: Path, demo: SimulatedMachine | None = None) -> None:
         self.robot: Final = robot
         self.folder: Final = folder
         self.demo: Final = demo
+        self.changed: Final = Event()
         self.activity = ""
         self.stops = 0
-        self._pages: list[Page] = []
+        self.pages: list[Page] = []
         self._holder: Page | None = None
         self._left_at = monotonic()
         self._targets: dict[str, float] = {}
-        self._next: tuple[Page, str, Callable[[], Any]] | None = None
+        self._next: tuple[Page, str, Job] | None = None
         self._released = False  # the jog button, the recording, the set-up
         self._face = PageFace(lambda step: None, lambda: self._released)
         self._lock = Lock()  # of the fields above
@@ -125,7 +162,8 @@ class Service:
     def __exit__(self, *exc: object) -> None:
         self._closed.set()
         self._wake.set()
-        self._stop(None, commands.Stop())
+        if not self.changed.is_set():  # then nothing moves, and a stop would end that joints are limp
+            self._stop(None, commands.Stop())
         for thread in self._threads:
             thread.join()
         self._pool.shutdown()
@@ -137,19 +175,21 @@ class Service:
 
     def join(self, page: Page) -> None:
         """A page was opened; it may move the machine if no other one does."""
-        self._pages.append(page)
+        self.pages.append(page)
         self._take(page, force=False)
+        if self.activity and self._face.step is not None:
+            page.put(self._face.step)
 
     def leave(self, page: Page) -> None:
         """A page was closed. If it moved the machine, its lease runs out."""
-        self._pages.remove(page)
+        self.pages.remove(page)
         self._left_at = monotonic()
         if page is self._holder:
             self._give(None)
 
     def broadcast(self, message: Struct) -> None:
         """Send a message to every page."""
-        for page in tuple(self._pages):
+        for page in tuple(self.pages):
             page.put(message)
 
     def _take(self, page: Page, *, force: bool) -> None:
@@ -163,12 +203,8 @@ class Service:
 
     def _give(self, page: Page | None) -> None:
         self._holder = page
-        for one in tuple(self._pages):
+        for one in tuple(self.pages):
             one.put(Control("you" if one is page else "none" if page is None else "other"))
-
-    def _check_holder(self, page: Page) -> None:
-        if page is not self._holder or self.lease.lost:
-            raise Refused("this page does not control the machine", advice="press Take control")
 
     # -- messages --------------------------------------------------------------------------------------------------
 
@@ -184,8 +220,9 @@ class Service:
                 self._take(page, force=force)
             case commands.ReadRegisters():
                 self._run(page, message)
+            case _ if page is not self._holder or self.lease.lost:
+                raise Refused("this page does not control the machine", advice="press Take control")
             case _:
-                self._check_holder(page)
                 self._receive_motion(page, message)
 
     def _receive_motion(self, page: Page, message: Message) -> None:
@@ -201,21 +238,28 @@ class Service:
             case messages.JogStart(name, velocity, stops):
                 self._check_stops(stops)
                 self._start(page, f"jog {name}", lambda: self._jog(name, velocity))
-            case messages.JogEnd() | messages.Finish():
+            case messages.Release():
                 self._released = True
-                if self.activity.startswith("jog ") and not self._leads(self.activity[4:]):
+                if (
+                    self.activity.startswith("jog ")
+                    and not self.robot.axis(self.activity[4:]).follows_setpoints
+                ):
                     self._stop(None, commands.Stop((self.activity[4:],)))
             case messages.Inject(bus, order):
                 if self.demo is None:
                     raise RequestError("faults can be injected in `motorbus web --demo` only")
                 page.put(Done("inject", self.demo.inject(bus, order)))
-            case messages.Verify(bus):
-                face = PageFace(page.put, lambda: self._released)
-                self._start(page, "verify", lambda: verify_axes(self.robot, bus, face))
+            case messages.Examine():
+                buses, config = self.robot.buses, self.robot.config
+                self._start(page, "doctor", lambda: examine_open(config, buses, lambda: self._released))
+            case messages.SetUp():
+                face = PageFace(self.broadcast, lambda: self._released)
+                self._start(page, message.kind, lambda: self._set_up(message, face))
                 self._face = face
-            case messages.Answer(text):
-                self._face.answers.put(text)
+            case messages.Answer(question, text):
+                self._face.answer(question, text)
             case commands.Torque(False) | commands.ClearFault() | commands.Reset():
+                self._allow_writes()
                 self._run(page, message)
             case commands.Teach():
                 options = structs.asdict(message) | {"file": self._recording(message.file)}
@@ -230,19 +274,12 @@ class Service:
         if stops != self.stops:
             raise Interrupted("the machine was stopped since", advice="release the control and take it again")
 
-    def _leads(self, name: str) -> bool:
-        return self.robot.axis(name).follows_setpoints
-
     def _recording(self, name: str) -> str:
         """The path of a recording. Raises RequestError for more than a plain name."""
         if not fullmatch(r"[\w-]{1,60}", name):
             raise RequestError(f"recording {name!r}", expected="a name of letters, digits, _ and -")
         self.folder.mkdir(exist_ok=True)
         return str(self.folder / f"{name}.csv")
-
-    def recordings(self) -> list[str]:
-        """The names of all recordings."""
-        return sorted(path.stem for path in self.folder.glob("*.csv"))
 
     # -- stop ------------------------------------------------------------------------------------------------------
 
@@ -251,14 +288,17 @@ class Service:
         with self._lock:
             self.stops += 1
             self._targets.clear()
-            self._next = None
+            dropped, self._next = self._next, None
             self._released = True
+        if dropped is not None:
+            dropped[0].put(Failed(dropped[1], f"{dropped[1]} was stopped before it began"))
         Thread(target=self._carry_out_stop, args=(page, command), name="motorbus web stop").start()
 
     def _carry_out_stop(self, page: Page | None, command: commands.Stop | commands.EStop) -> None:
         if page is not None:
             self.broadcast(Notice("emergency stop" if isinstance(command, commands.EStop) else "stop"))
         for _ in range(STOP_TRIES):
+            self._allow_writes()
             self._report(page, tag_of(command), lambda: self.robot.execute(command))
             if self._idle.wait(STOP_WAIT):
                 return
@@ -269,7 +309,7 @@ class Service:
         """Carry out a command beside what runs."""
         self._pool.submit(self._report, page, tag_of(command), lambda: self.robot.execute(command))
 
-    def _start(self, page: Page, name: str, job: Callable[[], Any]) -> None:
+    def _start(self, page: Page, name: str, job: Job) -> None:
         """Carry out a command after the sliders. Raises Refused while another one runs."""
         with self._lock:
             self._check_free()
@@ -290,16 +330,18 @@ class Service:
             self._idle.clear()
         self._wake.set()
 
-    def _report(self, page: Page | None, name: str, job: Callable[[], Any]) -> None:
-        """Run a job; the page, without one every page, gets its result or error."""
-        tell = self.broadcast if page is None else page.put
+    def _report(self, page: Page | None, name: str, job: Job, end: Job = bool) -> None:
+        """Run a job, then `end`; the page, without one every page, gets its result or error."""
+        message: Done | Failed
         try:
-            tell(Done(name, job()))
+            message = Done(name, job())
         except MotorbusError as error:
-            tell(failed(name, error))
+            message = failed(name, error)
         except Exception as error:
             LOG.exception("%s", name)
-            tell(Failed(name, f"{name}: {error}"))
+            message = Failed(name, f"{name}: {error}")
+        end()
+        (self.broadcast if page is None else page.put)(message)
 
     def _work(self) -> None:
         while not self._closed.is_set():
@@ -312,18 +354,35 @@ class Service:
                 elif self._targets:
                     job, self.activity = (None, FOLLOWING, self._follow), FOLLOWING  # type: ignore[assignment]
                 elif self._is_abandoned():
-                    job, self.activity = (None, PARKING, self._park), PARKING  # type: ignore[assignment]
-            if job is not None:
-                self._report(*job)
-            with self._lock:
-                self.activity = ""
-                if self._next is None and not self._targets:
-                    self._idle.set()
+                    job, self.activity = (None, "shutdown", self._park), "shutdown"  # type: ignore[assignment]
+            if job is None:
+                self._end()
+            else:
+                self._report(*job, self._end)
+
+    def _end(self) -> None:
+        with self._lock:
+            self.activity = ""
+            if self._next is None and not self._targets:
+                self._idle.set()
+
+    def _allow_writes(self) -> None:
+        """End what the doctor has forbidden; it still only reads."""
+        for bus in self.robot.buses.values():
+            bus.read_only = False
+
+    def _set_up(self, what: messages.SetUp, face: PageFace) -> None:
+        try:
+            if run(PROCEDURES[what.kind](self.robot, what.bus, what.names), face):
+                self.broadcast(Notice("calibrated: the machine is opened again", reopens=True))
+                self.changed.set()
+        finally:
+            face.step = None
 
     def _jog(self, name: str, velocity: float) -> Any:
         if self._released:
             return None
-        if self._leads(name):
+        if self.robot.axis(name).follows_setpoints:
             return self.robot.jog(name, velocity, until=lambda: self._released)
         axis = self.robot.axis(name)
         here, (low, high) = axis.status.known_position, axis.range
@@ -380,7 +439,7 @@ class Service:
     def _is_abandoned(self) -> bool:
         """No page is left, the lease is lost, and an axis has torque."""
         return (
-            not self._pages
+            not self.pages
             and self.lease.lost
             and monotonic() - self._left_at > GRACE
             and any(axis.status.engaged for axis in self.robot.axes.values())
@@ -400,11 +459,11 @@ class Service:
             if self._holder is not None and self.lease.lost:
                 self._give(None)
                 self.broadcast(Notice("control lost: the page sent no heartbeat; the machine holds"))
-            if state is None or not self._pages:
+            if state is None or not self.pages:
                 continue
             latched = any(bus.latched for bus in self.robot.buses.values())
             frame = msgspec.json.encode(Frame(state, self.activity, latched, self.stops))
-            for page in tuple(self._pages):
+            for page in tuple(self.pages):
                 page.show(frame)
 
 
@@ -414,20 +473,17 @@ async def _lead(robot: Robot, names: Sequence[str], feed: Callable[[ControlLoop]
     async with StopsIfInterrupted(loop.members), loop:
         while feed(loop):
             await loop.cycle()
+            await loop.wait()
 
 
 def failed(name: str, error: MotorbusError) -> Failed:
     """An error as a message."""
-    notes = tuple(getattr(error, "__notes__", ()))
     advice = "press Take control" if getattr(error, "reason", "") == "lease" else error.advice
-    return Failed(name, error.summary, error.expected, error.cause, advice, notes)
+    return Failed(
+        name, error.summary, error.expected, error.cause, advice, tuple(getattr(error, "__notes__", ()))
+    )
 
 
 def tag_of(command: Any) -> str:
     """The name of a message."""
     return str(command.__struct_config__.tag)
-
-
-def _plain(value: Any) -> Any:
-    """Results that are no Structs as plain data."""
-    return value._asdict() if hasattr(value, "_asdict") else str(value)

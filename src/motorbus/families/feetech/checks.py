@@ -17,14 +17,13 @@ from motorbus.families.feetech.traits import Mode
 
 FACTORY_ID: Final = 1
 WARM: Final = 10  # °C below the limit at which the servo switches off
-HIGH_LOAD: Final = 0.8  # duty at standstill: it pushes against something # assumption
+HIGH_LOAD: Final = 0.7  # duty at standstill: it pushes against something # assumption
 SLACK: Final = 5.0  # deg outside its limits that play and a hand explain # assumption
 LONG_DELAY: Final = 200  # µs; 250 in register 7 is 500 µs
-AT_REST: Final = (
-    *("its torque is off", "its goal velocity is 0", "its duty is 0", "its goal current is 0"),
-    "goal_torque is 0",
-)
+LIMP: Final = "its torque is off"
+AT_REST: Final = (LIMP, "its goal velocity is 0", "its duty is 0", "its goal current is 0")
 """Reasons of `why_not_moving` that hold for a healthy servo at rest."""
+GAINS: Final = ("p", "i", "d")
 Raw = Callable[[str], int]  # raw value of a row; 1 where the map has no such row
 
 
@@ -47,9 +46,12 @@ async def check(subject: Subject) -> None:
     _check_left_over(subject, raw)
     _check_settings(subject, raw)
     _check_range(subject, state)
-    for reason in await diagnosis.why_not_moving(node):
+    reasons = await diagnosis.why_not_moving(node)
+    is_limp = any(reason.startswith(LIMP) for reason in reasons)
+    at_rest = (*AT_REST, "goal_torque is 0") if is_limp else AT_REST
+    for reason in reasons:
         text, _, fix = reason.partition(": ")
-        if not text.startswith(AT_REST) and text not in state.alarm:
+        if not text.startswith(at_rest) and text not in state.alarm:
             subject.add("motion-blocked", text, action=fix)
 
 
@@ -82,6 +84,10 @@ def _check_left_over(subject: Subject, raw: Raw) -> None:
     if node.known_mode is Mode.POSITION and node.settings.zero_is_maximum and speed:
         value = float(node.value(node.table["goal_velocity"], speed))
         subject.add("settings-left", f"goal_velocity {value:.3g} rad/s, power-up value 0 (maximum)")
+    for gain in GAINS:
+        now, saved = raw(f"live_{gain}"), raw(f"position_{gain}")
+        if f"live_{gain}" in node.table and now != saved:
+            subject.add("settings-left", f"live_{gain} {now}, position_{gain} {saved}")
 
 
 def _check_settings(subject: Subject, raw: Raw) -> None:

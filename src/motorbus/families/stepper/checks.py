@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Final
 
 from motorbus.core.findings import Check, Subject
@@ -11,12 +12,18 @@ from motorbus.families.stepper.program.lint import lint
 from motorbus.families.stepper.protocol import ONLY
 
 FACTORY_ID: Final = ONLY
+DUMPS: Final = 20  # of project 1; they have no checksum
 FEWEST: Final = 3  # numbers that show the byte order of a dump
 
 
 async def check(subject: Subject) -> None:
     """All checks of one controller."""
     node = subject.device
+    dumps = Counter([await projects.dump_once(node, 1) for _ in range(DUMPS)])
+    if len(dumps) > 1:
+        evidence = f"{DUMPS - max(dumps.values())} of {DUMPS} dumps of project 1 differ"
+        subject.add("line-noise", evidence)
+        return
     for number in range(1, PROJECTS + 1):
         project = await projects.read_image(node, number)
         if _is_reversed(project):

@@ -159,9 +159,13 @@ def write(
         target = _controller(devices)
         changes = target.device.difference(program, number)
         rows = [Difference(name, old, new) for name, (old, new) in changes.items()]
-        if writing.dry_run or not (writing.yes or common.json):
+        for finding in program.lint():
+            note(str(finding))
+        if rows and (writing.dry_run or not (writing.yes or common.json)):
             emit(rows, common)
         if writing.dry_run:
+            if not rows:
+                emit(Result(number, "unchanged", "nothing differs"), common)
             return
         if rows:
             confirm(f"write {len(rows)} parameters to project {number} of {target.name}", writing)
@@ -191,8 +195,11 @@ def read(
         number = project or 1
         text = target.device.read_project(number).text()
     if to is not None:
-        with to.open("x", encoding="utf-8") as stream:
-            stream.write(text)
+        try:
+            with to.open("x", encoding="utf-8") as stream:
+                stream.write(text)
+        except FileExistsError:
+            raise RequestError(f"{to} exists", expected="the name of a new file") from None
         emit(Result(number, "read", str(to)), common)
     elif common.json:
         emit(Result(number, "read", text), common)
@@ -209,11 +216,11 @@ def run(
     project: Annotated[int, Parameter(name="N")],
     /,
     *,
-    timeout: Annotated[str, Parameter(help="Longest wait, as 90s; by default from its estimate.")] = "",
+    timeout: Annotated[str, Parameter(help="Longest wait, as 90s.")] = "",
     writing: Writing = Writing(),
     common: Common = Common(),
 ) -> None:
-    """Start project N and wait for its end. A project without end needs --timeout.
+    """Start project N and wait for its end.
 
     Examples:
 
@@ -221,8 +228,8 @@ def run(
         motorbus stepper run stepper:sim 1 --yes
         motorbus stepper run lift 2 --timeout 90s
 
-    Exit code 0 if its notice came, 5 if none came in time, 10 if it was stopped.
-    Ctrl-C ends the wait only: `motorbus stop` ends the project.
+    Without --timeout: 1.2 times the estimate and 2 s; no limit with inputs.
+    Exit code 0: its notice came; 5: not in time; 10: stopped. Ctrl-C stops nothing.
     """
     seconds = parse_quantity(timeout, "time") if timeout else None
     endless = seconds is not None
@@ -240,6 +247,9 @@ def run(
         except (KeyboardInterrupt, SystemExit):
             note(f"project {project} may still run: `motorbus stop {device}` ends it")
             raise
+        except Interrupted:  # an emergency stop; one more that is acknowledged ends the run in the journal
+            target.device.stop()
+            raise Interrupted(f"project {project}: stopped by an emergency stop") from None
     emit(Result(project, ran.outcome.value, f"{ran.why}; estimate: {ran.predicted}", ran.seconds), common)
     if error := ERRORS.get(ran.outcome):
         advice = (

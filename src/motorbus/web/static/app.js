@@ -1,5 +1,6 @@
 // The page: header with the stop, tabs, messages.
 import { Axes } from "./axes.js";
+import { Doctor } from "./doctor.js";
 import { Faults } from "./faults.js";
 import { html, render, useEffect, useState } from "./lib.js";
 import { clearMessages, link, open, order, release, send, stop, useLink } from "./link.js";
@@ -8,7 +9,8 @@ import { Registers } from "./registers.js";
 import { Setup } from "./setup.js";
 import { Teach } from "./teach.js";
 
-const TABS = { Axes, Plot, Registers, Teach, Setup, Faults };
+const TOAST = 6000; // ms for which a new message is shown over the panel
+const TABS = { Axes, Plot, Registers, Teach, Doctor, Setup, Faults };
 
 function Header({ tab, setTab }) {
   const { machine, online, control, frame } = useLink();
@@ -19,7 +21,6 @@ function Header({ tab, setTab }) {
       <h1>${machine.name || "motorbus"}</h1>
       ${simulated && html`<span class="badge">simulated</span>`}
       <span class=${online ? "badge good" : "badge bad"} data-testid="link">${online ? "live" : "no connection"}</span>
-      <span class="badge" data-testid="activity" hidden=${!frame?.activity}>${frame?.activity}</span>
       <span class="space"></span>
       ${control === "you"
         ? html`<button onClick=${release} title="Stop, and let another page move the machine">Release</button>`
@@ -35,16 +36,22 @@ function Header({ tab, setTab }) {
     <nav role="tablist">
       ${Object.keys(tabs()).map((name) => html`
         <button role="tab" aria-selected=${name === tab} onClick=${() => setTab(name)}>${name}</button>`)}
+      <span class="badge" data-testid="activity" hidden=${!frame?.activity}>${frame?.activity}</span>
     </nav>`;
 }
 
+/** The panels by name; without an axis those that set it up. */
 function tabs() {
-  return Object.fromEntries(Object.entries(TABS).filter(([name]) => name !== "Faults" || link.demo));
+  const names = Object.keys(link.machine.axes).length ? Object.keys(TABS) : ["Setup", "Doctor", "Faults"];
+  return Object.fromEntries(names.filter((name) => name !== "Faults" || link.demo).map((name) => [name, TABS[name]]));
 }
 
 function Messages() {
   const { messages } = useLink();
+  const newest = messages[0];
+  const young = newest && Date.now() - newest.at < TOAST;
   return html`
+    ${young && html`<p class="toast ${newest.bad ? "bad" : ""}" aria-hidden="true">${newest.text}</p>`}
     <aside aria-live="polite" data-testid="messages">
       ${messages.length > 0 && html`<button class="small" onClick=${clearMessages}>clear</button>`}
       ${messages.map((one) => html`
@@ -53,7 +60,7 @@ function Messages() {
 }
 
 function App() {
-  const [tab, setTab] = useState(tabs()[location.hash.slice(1)] ? location.hash.slice(1) : "Axes");
+  const [tab, setTab] = useState(tabs()[location.hash.slice(1)] ? location.hash.slice(1) : Object.keys(tabs())[0]);
   useEffect(() => history.replaceState(null, "", `#${tab}`), [tab]);
   const Panel = tabs()[tab];
   return html`<${Header} tab=${tab} setTab=${setTab} /><main role="tabpanel"><${Panel} /></main><${Messages} />`;

@@ -74,7 +74,7 @@ function Jog({ axis, way, disabled }) {
     });
   };
   const end = () => {
-    if (held.current) send({ type: "jog_end" });
+    if (held.current) send({ type: "release" });
     held.current = false;
   };
   useEffect(() => end, []);
@@ -96,13 +96,24 @@ function Entry({ label, title, unit, disabled, use, value = "" }) {
     <button disabled=${disabled}>${label}</button></form>`;
 }
 
+/** What the device reports; a dash for what it does not. */
 function Values({ state }) {
   const items = [
-    [state.load === null ? null : state.load * 100, "%", 0, "load"], [state.current, "A", 2, "current"],
-    [state.voltage, "V", 1, "voltage"], [state.temperature, "°C", 0, "temperature"],
-  ].filter(([value]) => value !== null);
-  return html`<p class="values">${items.map(([value, unit, digits, title]) => html`
-    <span title=${title}>${number(value, digits)} ${unit}</span>`)}</p>`;
+    ["load", state.load === null ? null : state.load * 100, "%", 0], ["current", state.current, "A", 2],
+    ["voltage", state.voltage, "V", 1], ["temperature", state.temperature, "°C", 0],
+  ];
+  return html`<dl class="values">${items.map(([title, value, unit, digits]) => html`
+    <div><dt>${title}</dt><dd title=${value === null ? "its device does not report it" : ""}>
+      ${value === null ? "–" : `${number(value, digits)} ${unit}`}</dd></div>`)}</dl>`;
+}
+
+/** The velocity of a wheel on a dial; the goal is the pale hand. */
+function Dial({ axis, velocity, target }) {
+  const turn = (value) => `rotate(${135 * Math.max(-1, Math.min(1, value / axis.max_velocity))})`;
+  return html`<svg class="dial" viewBox="-50 -50 100 86" role="img" aria-label="velocity of ${axis.name}">
+    <path d="M -31.8 31.8 A 45 45 0 1 1 31.8 31.8" /><path d="M 0 -45 V -38" />
+    ${target !== null && html`<line class="ghost" y2="-36" transform=${turn(target)} />`}
+    ${velocity !== null && html`<line y2="-38" transform=${turn(velocity)} />`}<circle r="4" /></svg>`;
 }
 
 function Trouble({ name, state, idle }) {
@@ -131,6 +142,7 @@ function Axis({ name, speed, locked }) {
       <p class="position"><b data-testid="position">${value === null ? "unknown" : shown(value)}</b>
         ${state.estimated && html`<small>estimated</small>`}
         <small>goal <span data-testid="goal">${shown(state.target)}</span></small></p>
+      ${axis.wheel && html`<${Dial} axis=${axis} velocity=${state.velocity} target=${state.target} />`}
       <div class="drive">
         <${Jog} axis=${axis} way=${-1} disabled=${locked} />
         ${bounded && html`<${Slider} axis=${axis} value=${target} disabled=${locked} />`}

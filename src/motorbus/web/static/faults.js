@@ -1,8 +1,8 @@
 // Faults of the simulated buses of the demo.
-import { html, useState } from "./lib.js";
+import { html, Select, useState } from "./lib.js";
 import { ask, link, say } from "./link.js";
 
-const DEVICE = ["unplug", "plug", "power-cycle", "block", "release", "push 30deg", "load 60%", "supply 5.5", "heat 72"];
+const DEVICE = ["unplug", "plug", "power-cycle", "block", "release", "push 30deg", "push -30deg", "load 60%", "supply 12", "heat 72"];
 const WIRE = ["1%: corrupt", "5%: drop", "5%: delay 0.02", "2%: duplicate", "off"];
 
 export function Faults() {
@@ -20,12 +20,10 @@ export function Faults() {
   };
   return html`
     <section class="card"><h2>A device</h2>
-      <div class="row"><select aria-label="axis" value=${axis} onChange=${(event) => setAxis(event.target.value)}>
-        ${names.map((name) => html`<option>${name}</option>`)}</select>
+      <div class="row"><${Select} label="axis" value=${axis} options=${names} set=${setAxis} />
         ${DEVICE.map((text) => html`<button onClick=${() => toDevice(text)}>${text}</button>`)}</div></section>
     <section class="card"><h2>The wire</h2>
-      <div class="row"><select aria-label="bus" value=${bus} onChange=${(event) => setBus(event.target.value)}>
-        ${buses.map((name) => html`<option>${name}</option>`)}</select>
+      <div class="row"><${Select} label="bus" value=${bus} options=${buses} set=${setBus} />
         ${WIRE.map((text) => html`<button onClick=${() => inject(bus, `faults ${text}`)}>${text}</button>`)}</div>
       <form class="row" onSubmit=${(event) => { event.preventDefault(); inject(bus, `faults ${script}`); }}>
         <input type="text" class="wide" aria-label="fault script" placeholder="at 2.5 s: unplug 0.5" value=${script}

@@ -6,6 +6,12 @@ export { render };
 export { useEffect, useRef, useState } from "./vendor/hooks.mjs";
 export const html = htm.bind(h);
 
+/** A choice of one text. */
+export function Select({ label, value, options, set }) {
+  return html`<select aria-label=${label} value=${value} onChange=${(event) => set(event.target.value)}>
+    ${options.map((one) => html`<option>${one}</option>`)}</select>`;
+}
+
 /** A number with few digits, "–" for null. */
 export function number(value, places = 1) {
   return value === null || value === undefined ? "–" : value.toFixed(places);
@@ -13,7 +19,7 @@ export function number(value, places = 1) {
 
 /** Decimals that fit a unit. */
 export function places(unit) {
-  return unit === "rad" || unit === "m" ? 3 : 1;
+  return { rad: 3, m: 3, turn: 2 }[unit] ?? 1;
 }
 
 /** Save a file on the computer of the user. */

@@ -5,6 +5,7 @@ const BEAT = 150; // ms between two heartbeats
 const RETAKE = 200; // ms until the control is taken again
 const DRAW = 70; // ms between two drawings of the panels
 const MESSAGES = 6;
+const NOTES = 40;
 
 export const link = {
   machine: null, // what /describe gave
@@ -16,6 +17,7 @@ export const link = {
   messages: [],
   notes: [], // of a guided procedure
   step: null, // its question or live table
+  report: null, // of the doctor
 };
 const frameListeners = new Set();
 const drawListeners = new Set();
@@ -23,6 +25,7 @@ const waiting = []; // commands whose results are awaited
 let socket = null;
 let drawn = 0;
 let releasing = false;
+let reopened = false; // the server opens the machine again
 let count = 0;
 
 /** Load the description of the machine, then connect. */
@@ -39,6 +42,7 @@ export async function open() {
 function connect() {
   socket = new WebSocket(`ws://${location.host}/ws`);
   socket.onopen = () => {
+    if (reopened) location.reload();
     link.online = true;
     draw();
   };
@@ -78,9 +82,10 @@ function receive(message) {
     }
     case "notice":
       say(message.text, false);
+      reopened ||= message.reopens;
       break;
     case "note":
-      link.notes = [...link.notes, message];
+      link.notes = [...link.notes, message].slice(-NOTES);
       break;
     case "live":
     case "prompt":

@@ -1,6 +1,6 @@
 // Several signals over time in one chart, each unit with its own scale.
 import { shape } from "./axes.js";
-import { download, html, store, stored, useEffect, useRef, useState } from "./lib.js";
+import { download, html, Select, store, stored, useEffect, useRef, useState } from "./lib.js";
 import { link, onFrame } from "./link.js";
 import uPlot from "./vendor/uPlot.mjs";
 
@@ -36,7 +36,14 @@ function columns(states, chosen) {
     states.map((state) => value(state, name, signal)))];
 }
 
-function build(box, chosen) {
+/** Ends of a scale: some space around its signals, more on one side, so that two level signals do not coincide. */
+function ends(low, high, index) {
+  if (low === null) return [-1, 1];
+  const space = Math.max((high - low) * 0.08, Math.abs(high) * 0.02, 0.1);
+  return [low - space * (1 + index % 2), high + space * (1 + index % 3)];
+}
+
+function build(box, chosen, seconds) {
   const units = [...new Set(chosen.map(([name, signal]) => unit(name, signal)))];
   const ink = getComputedStyle(box).color;
   const grid = { stroke: "#8884", width: 1 };
@@ -45,7 +52,8 @@ function build(box, chosen) {
   }));
   return new uPlot({
     width: box.clientWidth, height: Math.max(240, Math.min(460, innerHeight - 330)),
-    scales: Object.fromEntries([["x", { time: false }], ...units.map((one) => [one, {}])]),
+    scales: Object.fromEntries([["x", { time: false, range: () => [-seconds, 0] }],
+      ...units.map((one, index) => [one, { range: (_, low, high) => ends(low, high, index) }])]),
     axes: [{ stroke: ink, grid, label: "s" }, ...sides],
     series: [{ label: "s", value: (_, at) => (at === null ? "–" : at.toFixed(2)) },
       ...chosen.map(([name, signal], index) => ({
@@ -90,14 +98,14 @@ export function Plot() {
   };
   useEffect(() => {
     store("plot", chosen);
-    chart.current = build(box.current, chosen);
+    chart.current = build(box.current, chosen, seconds);
     const resize = () => chart.current.setSize({ width: box.current.clientWidth, height: chart.current.height });
     addEventListener("resize", resize);
     return () => {
       removeEventListener("resize", resize);
       chart.current.destroy();
     };
-  }, [chosen]);
+  }, [chosen, seconds]);
   useEffect(() => {
     const draw = () => chart.current.setData(columns(states(), chosen));
     draw();
@@ -107,15 +115,12 @@ export function Plot() {
   const has = ([name, signal]) => chosen.some((one) => one[0] === name && one[1] === signal);
   return html`
     <div class="row bar">
-      <select aria-label="axis" value=${added[0]} onChange=${(event) => setAdded([event.target.value, added[1]])}>
-        ${names.map((name) => html`<option>${name}</option>`)}</select>
-      <select aria-label="signal" value=${added[1]} onChange=${(event) => setAdded([added[0], event.target.value])}>
-        ${SIGNALS.map((signal) => html`<option>${signal}</option>`)}</select>
+      <${Select} label="axis" value=${added[0]} options=${names} set=${(name) => setAdded([name, added[1]])} />
+      <${Select} label="signal" value=${added[1]} options=${SIGNALS} set=${(signal) => setAdded([added[0], signal])} />
       <button disabled=${has(added)} onClick=${() => setChosen([...chosen, added])}>Add</button>
       <button aria-pressed=${paused !== null}
         onClick=${() => setPaused(paused ? null : [...history])}>${paused ? "Go on" : "Pause"}</button>
-      <label>last <select aria-label="seconds" value=${seconds} onChange=${(event) => setSeconds(Number(event.target.value))}>
-        ${[5, 10, 30, 60].map((one) => html`<option>${one}</option>`)}</select> s</label>
+      <label>last <${Select} label="seconds" value=${seconds} options=${[5, 10, 30, 60]} set=${(one) => setSeconds(Number(one))} /> s</label>
       <button onClick=${() => download("motorbus.csv", csv(states(), chosen), "text/csv")}>CSV</button>
       <button onClick=${() => picture(chart.current)}>PNG</button>
     </div>

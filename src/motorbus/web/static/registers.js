@@ -1,5 +1,5 @@
 // Registers of the device of an axis: search, favourites, unit, range, choices, source; a write is confirmed and read back.
-import { html, store, stored, useEffect, useState } from "./lib.js";
+import { html, Select, store, stored, useEffect, useState } from "./lib.js";
 import { ask, link, say, useLink } from "./link.js";
 
 function digits(value) {
@@ -38,7 +38,7 @@ function Confirm({ axis, row, value, close, done }) {
     <h2>Write ${row.name} of ${axis}?</h2>
     <p>${words(row, row.value)} → <b>${words(row, value)}</b></p>
     ${row.storage === "EEPROM" && html`<p>It is kept without power (EEPROM).</p>`}
-    ${row.effect !== "none" && html`<p class="bad">Effect of this write: ${row.effect}.</p>`}
+    ${!["none", "persistent"].includes(row.effect) && html`<p class="bad">Effect of this write: ${row.effect}.</p>`}
     ${problem && html`<p class="bad">${problem}</p>`}
     <div class="row"><button class="primary" onClick=${write}>Write</button>
       <button onClick=${close}>Cancel</button></div>
@@ -107,8 +107,7 @@ export function Registers() {
     .sort((one, other) => favourites.includes(other.name) - favourites.includes(one.name));
   return html`
     <div class="row bar">
-      <select aria-label="axis" value=${axis} onChange=${(event) => setAxis(event.target.value)}>
-        ${names.map((name) => html`<option>${name}</option>`)}</select>
+      <${Select} label="axis" value=${axis} options=${names} set=${setAxis} />
       <input type="search" aria-label="search" placeholder="name, address, text" value=${search}
         onInput=${(event) => setSearch(event.target.value)} />
       <button onClick=${load}>Read again</button>

@@ -2,32 +2,31 @@
 import { html, useEffect, useRef } from "./lib.js";
 import { link, onFrame } from "./link.js";
 
-// Joints of an SO-101: parent, origin (m), roll pitch yaw (rad); each turns about its z axis.
-// Source: SO-ARM100, Simulation/SO101, URDF of the new calibration (zero is the middle of the range).
-const SO101 = [
-  { parent: -1, origin: [0.0388353, 0, 0.0624], turn: [Math.PI, 0, -Math.PI] },
-  { parent: 0, origin: [-0.0303992, -0.0182778, -0.0542], turn: [-Math.PI / 2, -Math.PI / 2, 0] },
-  { parent: 1, origin: [-0.11257, -0.028, 0], turn: [0, 0, Math.PI / 2] },
-  { parent: 2, origin: [-0.1349, 0.0052, 0], turn: [0, 0, -Math.PI / 2] },
-  { parent: 3, origin: [0, -0.0611, 0.0181], turn: [Math.PI / 2, 0.0486795, Math.PI] },
-  { parent: 4, origin: [0.0202, 0.0188, -0.0234], turn: [Math.PI / 2, 0, 0] },
-];
-const TIP = { parent: 4, origin: [0, 0, -0.098] };
-const JAW = { parent: 5, origin: [0, -0.09, 0] };
-const NAMES = [
-  ["shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper"],
-  ["base", "shoulder", "elbow", "wrist", "roll", "gripper"], // the demo
-];
 const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
 
-/** The axes that are the joints of an SO-101, in its order; null if one is missing. */
-export function jointsOf(machine) {
-  const axes = Object.keys(machine.axes);
-  for (const names of NAMES) {
-    const found = names.map((joint) => axes.find((axis) => axis === joint || axis.endsWith(`_${joint}`)));
-    if (found.every(Boolean)) return found;
-  }
-  return null;
+/** The numbers of a row: place (m), then roll, pitch, yaw (rad). */
+function numbers(text) {
+  const [place, turn = "0 0 0"] = text.replaceAll(/ mm| deg/g, "").split(", ");
+  return {
+    origin: place.split(" ").map((one) => one / 1000),
+    turn: turn.split(" ").map((one) => one * Math.PI / 180),
+  };
+}
+
+/** The axes that have a frame, each behind its parent. */
+export function jointsOf({ axes }) {
+  const found = [];
+  const add = (name) => {
+    const { parent, frame, tip, unit } = axes[name];
+    if (!frame || found.some((one) => one.name === name)) return;
+    if (parent in axes) add(parent);
+    found.push({
+      name, parent: found.findIndex((one) => one.name === parent), ...numbers(frame),
+      tip: tip && numbers(tip), linear: unit === "mm" || unit === "m",
+    });
+  };
+  Object.keys(axes).forEach(add);
+  return found;
 }
 
 /** Product of two 3 x 4 matrices of rotation and translation. */
@@ -54,28 +53,37 @@ function rotation(axis, angle) {
   return [c, -s, 0, 0, s, c, 0, 0, 0, 0, 1, 0];
 }
 
-function place(parent, { origin, turn = [0, 0, 0] }) {
+function place(parent, { origin, turn }) {
   const [roll, pitch, yaw] = turn;
   const turned = multiply(multiply(rotation("z", yaw), rotation("y", pitch)), rotation("x", roll));
   return multiply(multiply(parent, translation(origin)), turned);
 }
 
-/** Segments of the arm, as pairs of points (m), at these angles (rad). */
-export function segments(angles) {
+/** Segments of these joints, as pairs of points (m), at these positions (rad, m). */
+export function segments(joints, positions) {
   const frames = [];
-  SO101.forEach((joint, index) => {
-    const parent = joint.parent < 0 ? IDENTITY : frames[joint.parent];
-    frames.push(multiply(place(parent, joint), rotation("z", angles[index] ?? 0)));
+  joints.forEach((joint, index) => {
+    const at = positions[index] ?? 0;
+    const moved = joint.linear ? translation([0, 0, at]) : rotation("z", at);
+    frames.push(multiply(place(frames[joint.parent] ?? IDENTITY, joint), moved));
   });
   const point = (frame) => [frame[3], frame[7], frame[11]];
-  const lines = SO101.map((joint, index) => [
-    joint.parent < 0 ? [0, 0, 0] : point(frames[joint.parent]), point(frames[index]),
+  const lines = joints.map((joint, index) => [
+    joint.parent < 0 ? [...point(frames[index]).slice(0, 2), 0] : point(frames[joint.parent]), point(frames[index]),
   ]);
-  for (const end of [TIP, JAW]) lines.push([point(frames[end.parent]), point(place(frames[end.parent], end))]);
+  joints.forEach((joint, index) => {
+    if (joint.tip) lines.push([point(frames[index]), point(place(frames[index], joint.tip))]);
+  });
   return lines;
 }
 
-function draw(canvas, view, angles, goals) {
+/** The length (m) of all parts together. */
+function lengthOf(joints) {
+  const places = joints.flatMap((joint) => [joint.origin, joint.tip?.origin ?? [0, 0, 0]]);
+  return places.reduce((sum, one) => sum + Math.hypot(...one), 0);
+}
+
+function draw(canvas, view, joints, positions, goals) {
   const ratio = devicePixelRatio || 1;
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
   canvas.width = width * ratio;
@@ -83,7 +91,8 @@ function draw(canvas, view, angles, goals) {
   const context = canvas.getContext("2d");
   context.scale(ratio, ratio);
   context.lineCap = "round";
-  const scale = Math.min(width / 0.7, height / 0.5);
+  const length = lengthOf(joints);
+  const scale = Math.min(width / length, height / (0.75 * length));
   const project = ([x, y, z]) => {
     const across = x * Math.cos(view.yaw) - y * Math.sin(view.yaw);
     const depth = x * Math.sin(view.yaw) + y * Math.cos(view.yaw);
@@ -99,13 +108,15 @@ function draw(canvas, view, angles, goals) {
     context.stroke();
   };
   for (let step = -3; step <= 3; step++) {
-    line([[step / 10, -0.3, 0], [step / 10, 0.3, 0]], "#8883", 1);
-    line([[-0.3, step / 10, 0], [0.3, step / 10, 0]], "#8883", 1);
+    const [at, far] = [step * length / 7, length * 3 / 7];
+    line([[at, -far, 0], [at, far, 0]], "#8883", 1);
+    line([[-far, at, 0], [far, at, 0]], "#8883", 1);
   }
-  if (goals) segments(goals).forEach((segment) => line(segment, "#4a90d966", 11));
-  segments(angles).forEach((segment) => line(segment, "#e0792a", 9));
+  if (goals) segments(joints, goals).forEach((segment) => line(segment, "#4a90d966", 11));
+  const lines = segments(joints, positions);
+  lines.forEach((segment) => line(segment, "#e0792a", 9));
   context.fillStyle = "#fff";
-  segments(angles).slice(0, 6).forEach(([, to]) => {
+  lines.slice(0, joints.length).forEach(([, to]) => {
     context.beginPath();
     context.arc(...project(to), 3, 0, 7);
     context.fill();
@@ -116,14 +127,14 @@ export function Sketch() {
   const canvas = useRef(null);
   const joints = jointsOf(link.machine);
   useEffect(() => {
-    if (!joints) return undefined;
+    if (!joints.length) return undefined;
     const view = { yaw: -0.9, pitch: -0.35 };
     const show = () => {
       const axes = link.frame?.state.axes;
       if (!axes) return;
-      const angles = joints.map((name) => axes[name].position ?? 0);
-      const goals = joints.map((name, index) => axes[name].target ?? angles[index]);
-      draw(canvas.current, view, angles, goals.some((goal, index) => goal !== angles[index]) ? goals : null);
+      const here = joints.map(({ name }) => axes[name]?.position ?? 0);
+      const goals = joints.map(({ name }, index) => axes[name]?.target ?? here[index]);
+      draw(canvas.current, view, joints, here, goals.some((goal, index) => goal !== here[index]) ? goals : null);
     };
     const turn = (event) => {
       if (!event.buttons) return;
@@ -141,6 +152,6 @@ export function Sketch() {
     show();
     return end;
   }, []);
-  return joints && html`<canvas class="sketch" ref=${canvas} role="img" data-testid="sketch"
+  return joints.length > 0 && html`<canvas class="sketch" ref=${canvas} role="img" data-testid="sketch"
     aria-label="sketch of the arm; the goal is a ghost"></canvas>`;
 }

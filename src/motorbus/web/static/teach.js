@@ -34,7 +34,7 @@ export function Teach() {
         <label>at most <input type="number" min="1" max="600" value=${seconds}
           onInput=${(event) => setSeconds(event.target.valueAsNumber)} /> s</label>
         ${frame?.activity === "teach"
-          ? html`<button class="primary" onClick=${() => send({ type: "finish" })}>Finish</button>`
+          ? html`<button class="primary" onClick=${() => send({ type: "release" })}>Finish</button>`
           : html`<button disabled=${locked || !axes.length} onClick=${teach}>Record</button>`}
       </div></section>
     <section class="card"><h2>Replay</h2>

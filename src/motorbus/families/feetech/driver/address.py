@@ -264,6 +264,7 @@ async def settle(change: AddressChange, facts: BusFacts) -> str:
 async def move_to(change: AddressChange, here: Address, there: Address, facts: BusFacts) -> None:
     """Unlock, torque off, write the cell, see the servo at `there` unchanged and still unlocked, lock it."""
     await SetBitrate(here.rate)
+    # No `async with`: after a failure `settle` finds the servo at one of the addresses and locks it there.
     unlocked = Unlocked(known(here.id, change.image, facts), change.table)
     await unlocked.enter()
     wire = protocol.write(here.id, change.cell, change.value(there))

@@ -73,7 +73,7 @@ class FeetechDriver(HalfDuplexSerial):
     broadcast_delay = COLLISION
     broadcast_bytes = (protocol.MAX_ID + 1) * protocol.OVERHEAD
     longest_reply = protocol.MAX_LENGTH + 4
-    longest_gap = RETURN_DELAY + 2 * ADAPTER + SCHEDULING
+    longest_delay = RETURN_DELAY + 2 * ADAPTER + SCHEDULING
     ids = range(protocol.MAX_ID + 1)
 
     def __init__(self, family: Family, estop_hold: object = "", arc: object = "", map: str = "") -> None:

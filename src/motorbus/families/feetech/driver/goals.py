@@ -1,4 +1,4 @@
-"""Blocks of goal registers, and what their values order. No I/O.
+"""Blocks of goal registers, and what their values order. Nothing is sent here.
 
 In these registers 0 is special: an acceleration of 0 is the maximum, a velocity of 0 the maximum or standstill, a goal
 torque of 0 no force at all. A bound that a caller gives never becomes 0. Source: STS3215 memory table V3.6; HLS memory

@@ -2,8 +2,8 @@
 
 What servos do by themselves decides the order of requests: a write of the goal position may switch torque on; a servo
 that restarts is limp and has forgotten its goal; the moving flag also drops when a servo stands off its goal. So torque
-switch and goal travel in one packet, and the switch is read back. Source: STS3215 memory table V3.6; feetech-cli and
-servolab, measured on hardware.
+switch and goal travel in one packet where their registers lie side by side (all maps but STS), and the switch is read
+back. Source: STS3215 memory table V3.6; feetech-cli and servolab, measured on hardware.
 """
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ class StepperDriver(HalfDuplexSerial):
         TimeoutClass.STORE: 1.0,
     }  # assumption
     longest_reply: ClassVar[int] = protocol.DUMP_LENGTH
-    longest_gap: ClassVar[float] = GAP
+    longest_delay: ClassVar[float] = GAP
 
     def __init__(
         self,

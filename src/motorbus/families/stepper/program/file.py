@@ -43,7 +43,7 @@ class Quantity:
     def __init__(self, text: object) -> None:
         match = _QUANTITY.fullmatch(text) if isinstance(text, str) else None
         if match is None:
-            raise ValueError("expected a number with a unit in quotes")
+            raise ValueError('a number with a unit in quotes, as "12.5 mm" or "300 rpm"')
         self.text = match.string
         self.number = abs(Fraction(match[1]))
         self.is_negative = match[1].startswith("-")  # also of -0
@@ -192,6 +192,7 @@ def _decode(source: str) -> ProgramFile:
     keys = re.findall(r"[a-z_0-9]+", path.partition("`")[0])
     words = [f"step {int(keys[1]) + 1}", *keys[2:]] if keys[1:] and keys[0] == "step" else keys
     where = ", ".join(words) or "the file"
+    message = message.removeprefix("Object contains ").removeprefix("Expected ")
     if "field" in message:
         table: type[Any] = _TABLES.get("".join(keys[:1]), ProgramFile)
         raise _wrong(f"{where}: {message}", f"one of {', '.join(table.__struct_fields__)}")
@@ -278,9 +279,12 @@ def _input(given: int | str, file: ProgramFile, where: str) -> int:
     try:
         parameters.check_value("start_input", number, expert=file.expert)
     except RequestError as error:
-        hint = "; 3 and 4 with expert = true" if number in (3, 4) else ""
-        expected = f"{error.expected}{hint}, or a name of [inputs]"
-        raise _wrong(f"{where}: {shown(given)} is not possible", expected) from None
+        if number in (3, 4):
+            what = f"{where}: {shown(given)} is input {number}, which starts or stops projects"
+            raise _wrong(what, f"{error.expected}, or expert = true") from None
+        raise _wrong(
+            f"{where}: {shown(given)} is not possible", f"{error.expected}, or a name of [inputs]"
+        ) from None
     return number
 
 
