@@ -50,6 +50,6 @@ def missing(wanted: tuple[str, ...], got: str) -> list[str]:
     """Shown lines that the output does not have, in their order. `…` stands for any text, alone for any lines."""
     rest = iter(masked(got.splitlines()))
     lines = [line for line in masked(wanted) if line != "…"]
-    patterns = [re.escape(line).replace("…", ".*") for line in lines]
+    patterns = [re.sub(r"(\\ )?…", ".*", re.escape(line)) for line in lines]
     found = [any(re.fullmatch(pattern, other) for other in rest) for pattern in patterns]
     return [line for line, there in zip(lines, found, strict=True) if not there]

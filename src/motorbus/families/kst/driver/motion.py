@@ -40,8 +40,8 @@ class Promise(Enum):
     """What an acknowledged stop means."""
 
     HOLD_REQUESTED = (
-        "target := last fresh position: requested of each node that acknowledged; it goes back or on to where it "
-        "was then and holds there; standstill was not verified, and there is no way to switch its torque off"
+        "target := last measured position, acknowledged: it holds there; standstill was not verified, its torque "
+        "cannot be switched off"
     )
 
 
