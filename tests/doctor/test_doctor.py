@@ -441,3 +441,15 @@ def test_every_code_has_a_scenario_and_a_section() -> None:
     assert set(CODES) - staged == set()
     page = Path("docs/reference/doctor.md").read_text()
     assert [line[4:] for line in page.splitlines() if line.startswith("### ")] == list(CODES)
+
+
+def test_a_bus_of_the_machine_file_is_examined_with_its_axes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with motorbus.simulate("feetech", ids="1-2") as sim:
+        buses = f'[bus.arm]\naddress = "{sim.url}"\n[bus.other]\naddress = "kst:/dev/ttyNONE"\n'
+        (tmp_path / "motorbus.toml").write_text(f"format = 1\n{buses}{axes('1+2+3')}")
+        assert doctor("arm") == 5
+        assert "device-missing  a3" in capsys.readouterr().out
+        assert doctor("leg") == 2

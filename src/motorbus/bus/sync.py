@@ -2,7 +2,7 @@
 
 A node whose reply did not come in time owes it. Before the next request to it the bus is silent for a quiet time, then
 sends a probe: a request whose reply differs in key or length from every reply that the node owes. A link is first in,
-first out, so when the probe is answered no older reply can follow. Decision record 0039.
+first out, so when the probe is answered no older reply can follow.
 """
 
 from __future__ import annotations

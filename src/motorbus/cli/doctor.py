@@ -97,10 +97,11 @@ def doctor(
 def _examine(target: str, rate: float, common: Common, trace: examine.Trace) -> Report:
     if target.endswith(".toml"):
         return examine.examine_machine(target, trace, rate)
-    if target or common.bus:
-        return examine.examine_bus(bus_address(target, common), trace, rate)
-    if Path(common.machine).exists():
-        return examine.examine_machine(common.machine, trace, rate)
+    word = target or common.bus
+    if is_address(word):
+        return examine.examine_bus(bus_address(word, common), trace, rate)
+    if word or Path(common.machine).exists():
+        return examine.examine_machine(common.machine, trace, rate, word)
     names = ", ".join(one.device for one in ports())
     advice = f"ports: {names}" if names else "no serial port is there: plug the adapter in"
     raise RequestError("no bus", expected="FAMILY:PORT, or a machine file", advice=advice)

@@ -24,15 +24,22 @@ Trace: TypeAlias = "dict[str, list[TraceRecord]]"
 CH340: Final = ("1a86", "7523")  # the adapter that brltty takes for a Braille display
 
 
-def examine_machine(path: str, trace: Trace, rate: float = 0.0) -> Report:
-    """The buses of a machine file, and the file itself; `rate` (Hz) of a control loop to measure."""
+def examine_machine(path: str, trace: Trace, rate: float = 0.0, only: str = "") -> Report:
+    """The buses of a machine file, or `only` one; `rate` (Hz) of a control loop to measure.
+
+    Raises RequestError for a bus that the file does not have.
+    """
     try:
         config = MachineConfig.load(path)
     except RequestError as error:
         fix = error.advice or (f"write {error.expected}" if error.expected else "")
         return Report(path, (complete(Finding("machine-file", path, error.summary, action=fix), path),))
+    if only and only not in config.buses:
+        raise RequestError(f"no bus {only!r}", expected=f"one of {', '.join(config.buses)}")
     parts = []
     for name, bus in config.buses.items():
+        if only not in ("", name):
+            continue
         parts.append(_examine(bus.address, name, trace, rate, names=_names(config, name), config=config))
     return _join(path, parts)
 

@@ -97,7 +97,7 @@ _TABLE: Final[dict[str, tuple[tuple[str, Severity, str, str], ...]]] = {
         ("calibration-wrap", "error", "the seam of the encoder lies inside the travel, or the offset is a foreign one",
          "`motorbus setup calibrate` of this joint"),
         ("motion-blocked", "error", "a goal is acknowledged and nothing moves", "change this setting"),
-        ("settings-left", "warning", "another program left it in RAM; it lasts until the supply is cut",
+        ("settings-left", "warning", "a program left it in RAM, maybe motorbus; it lasts until the supply is cut",
          "cut its supply for a moment"),
         ("no-acknowledgement", "warning", "writes are not acknowledged, so none can be confirmed",
          "`motorbus write {where} status_return_level=1`"),

@@ -17,6 +17,7 @@ from motorbus.families import feetech
 from motorbus.setup.engine import Note, Steps, ask
 from motorbus.setup.presets import Joint, Preset
 
+TRIES: Final = 3  # scans for a servo that is silent; a busy computer may miss a reply
 IDS: Final = tuple(range(1, 21))  # where new servos and those of an arm are
 FACTORY_RATES: Final = (1_000_000, 115_200, 500_000)  # bit/s: STS and HLS, SMS, some SCS
 
@@ -34,9 +35,12 @@ def number(bus: Bus, preset: Preset) -> Steps[tuple[int, ...]]:
 
 
 def present(bus: Bus, preset: Preset) -> set[int]:
-    """The ids of the preset that answer at its rate."""
-    found = bus.run(feetech.scan([joint.id for joint in preset.joints]))
-    return {one.node for one in found}
+    """The ids of the preset that answer at its rate; a silent one is asked three times."""
+    found: set[int] = set()
+    for _ in range(TRIES):
+        if silent := [joint.id for joint in preset.joints if joint.id not in found]:
+            found |= {one.node for one in bus.run(feetech.scan(silent))}
+    return found
 
 
 def number_one(bus: Bus, preset: Preset, joint: Joint, done: Iterable[int] = ()) -> Steps[bool]:
