@@ -199,6 +199,7 @@ def test_the_set_up_is_answered(page: Page, served: Served) -> None:
     expect(page.get_by_role("dialog")).to_contain_text("base: ")
     served.faults.inject("arm", "push 1 30deg")
     expect(page.get_by_test_id("notes")).to_contain_text("base moves as named")
+    expect(page.get_by_role("dialog")).to_contain_text("shoulder: ")
     page.get_by_role("button", name="Enter").click()
     expect(page.get_by_role("dialog")).to_contain_text("elbow: ")
     page.get_by_role("button", name="End").click()

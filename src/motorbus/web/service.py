@@ -103,10 +103,11 @@ class PageFace:
         if isinstance(step, Note):
             self._put(step)
             return None
-        if self.step is None or step.text != self.step.text:
+        is_new = self.step is None or step.text != self.step.text
+        if is_new:
             self._answers = SimpleQueue()
         self.step = step
-        if isinstance(step, Prompt) or monotonic() - self._shown > SHOW:
+        if is_new or isinstance(step, Prompt) or monotonic() - self._shown > SHOW:
             self._shown = monotonic()
             self._put(step)
         while True:
