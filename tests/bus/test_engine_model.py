@@ -300,11 +300,11 @@ class Model(RuleBasedStateMachine):
         return [number for number, one in enumerate(self.sent) if self.mark_of(one.frame) == call.mark]
 
     def _judge_result(self, call: Call, outcome: Any) -> None:
+        self.seen["results"] += 1
+        if outcome == {}:  # a group whose nodes are all silent lately is not sent
+            return
         own = self._frames_of(call)
         assert own, "a call has a result and was never sent"
-        self.seen["results"] += 1
-        if outcome == {}:
-            return
         if call.kind == "stop":
             stops = {number for number, one in enumerate(self.sent) if one.stop and call.node in one.nodes}
             assert stops & self.answered, "the reply to something else acknowledged a stop"
